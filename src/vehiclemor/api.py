@@ -327,8 +327,8 @@ def plot(
     results
         Results folder in which studies are looked for.
     **at
-        Point of a study's grid, such as `rank=3`; else factors are 1 and the others first.  All
-        methods are drawn where none is chosen.
+        Point of a study's grid, such as `rank=3`; else factors are 1 and the others first, but
+        errors are over all of them.  All methods are drawn where none is chosen.
 
     Raises
     ------

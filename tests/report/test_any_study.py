@@ -6,11 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import vehiclemor as vm
-from tests.report.figure_texts import check_texts
+from tests.report.figure_texts import checked
 from vehiclemor.cli import main
 from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
@@ -114,10 +112,9 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     assert row["largest"] <= before["mine", "dropped", "tire_force"]["largest"]
     figure = plot_result(data, None, "errors")
     assert "a run has failed" in [text.get_text() for text in figure.legends[0].get_texts()]
-    check_texts_of(figure)
-    # What a protocol would not trust has the status ok, a mark and a remark.
+    checked(figure)
+    # What a protocol would not trust has the status ok, and a remark.
     data["remark"] = data["remark"].astype(object)
-    data["warned"].loc[there | {"frequency_factor": 1.0}] = True
     data["remark"].loc[there | {"frequency_factor": 1.0}] = "not driven; not to be trusted on Mars"
     data["remark"].loc[there | {"frequency_factor": 0.8}] = "not driven"
     now = {(r["label"], r["start"], r["output"]): r["warned"] for r in grid_rows(data)}
@@ -169,7 +166,7 @@ def test_figures_of_a_study_and_a_protocol(place, capsys):
     data = run_studies(str(place / "both.toml"), results)
     with styled():
         figure = entries[0].draw(data)
-        check_texts_of(figure)
+        checked(figure)
     assert "mine" in " ".join(text.get_text() for text in figure.legends[0].get_texts())
     folders = ["--results", results, "--out", place / "figures"]
     assert main(["figures", "--only", str(place / "road.toml"), *map(str, folders)]) == 0
@@ -178,84 +175,3 @@ def test_figures_of_a_study_and_a_protocol(place, capsys):
         f"figure-road-pareto.{suffix}" for suffix in ("pdf", "svg", "png")
     ]
     assert all(path.stat().st_size > 10_000 for path in written)
-
-
-def check_texts_of(figure):
-    FigureCanvasAgg(figure).draw()
-    check_texts(figure)
-
-
-def varied(**dimensions):
-    """Errors that a study could have over any dimensions, of two methods."""
-    outputs = ["second_euler_angle", "spindle_y"]
-    names = [*dimensions, "label"]
-    sizes = [len(values) for values in dimensions.values()]
-    rng = np.random.default_rng(3)
-    errors = 10.0 ** rng.uniform(-6.0, -2.0, (*sizes, 2, 2))
-    variables = {
-        "rms_error": ((*names, "output"), errors),
-        "signal_range": ((*names, "output"), np.ones_like(errors)),
-        "status": (names, np.full(errors.shape[:-1], "ok", dtype=object)),
-    }
-    units = {"output_unit": ("output", ["rad", "m"])}
-    coordinates = {**dimensions, "label": ["pod", "my_own_method"], "output": outputs, **units}
-    attributes = {"title": "what varies", "model": "double_wishbone", "configuration": "{}"}
-    return xr.Dataset(variables, coordinates, attributes)
-
-
-FACTOR = {"frequency_factor": [0.8, 1.0, 1.2, 1.4]}
-
-
-@pytest.mark.parametrize(
-    ("dimensions", "label", "panels", "meshes"),
-    [
-        (FACTOR | {"rank": [1, 2, 3]}, "frequency perturbation (%)", 2, 0),
-        (FACTOR | {"amplitude_factor": [0.9, 1.0]}, "frequency perturbation (%)", 4, 4),
-        ({"tolerance": [1e-8, 1e-6, 1e-3]}, "tolerance", 2, 0),
-        ({"rank": [*range(1, 9)], "snapshots": [*range(5, 11)]}, "rank", 4, 4),
-        ({"start": ["a", "b"], "rank": [1, 2, 3]}, "rank", 4, 0),
-        ({"formulation": ["coordinates", "state", "paired"]}, "formulation", 2, 0),
-        ({"equation_seed": [*range(30)]}, "equation seed, sorted by error", 2, 0),
-    ],
-)
-def test_figures_follow_from_what_varies(dimensions, label, panels, meshes):
-    dataset = varied(**dimensions)
-    figure = plot_result(dataset, None, "errors")
-    shown = [axis for axis in figure.axes if axis.get_label() != "<colorbar>"]
-    assert len(shown) == panels
-    assert shown[-1].get_xlabel() == label
-    found = [axis for axis in shown if any(hasattr(c, "get_coordinates") for c in axis.collections)]
-    assert len(found) == meshes
-    assert (shown[-1].get_xscale() == "log") == (label == "tolerance")
-    check_texts_of(figure)
-
-
-def test_curves_show_every_error_once(place):
-    dataset = varied(**FACTOR, rank=[2, 3])
-    # One method does not depend on the rank.
-    dataset["rms_error"][:, 1, 1] = dataset["rms_error"][:, 0, 1]
-    figure = plot_result(dataset, None, "errors")
-    axis = figure.axes[0]
-    lines = {line.get_label(): line for line in axis.lines if np.size(line.get_xdata())}
-    own = {"POD, rank 2", "POD, rank 3", "my own method"}
-    assert set(lines) == own | {"published, nominal"}
-    for rank_ in (2, 3):
-        place = {"label": "pod", "rank": rank_, "output": "second_euler_angle"}
-        line = lines[f"POD, rank {rank_}"]
-        np.testing.assert_array_equal(line.get_ydata(), dataset["rms_error"].sel(place))
-        np.testing.assert_allclose(line.get_xdata(), [-20.0, 0.0, 20.0, 40.0], atol=1e-12)
-
-
-def test_samples_are_drawn_over_what_was_sampled():
-    dataset = varied(sample=[*range(40)])
-    values = np.linspace(0.0, 1.0, 40)
-    names = ("first", "second", "third", "fourth")
-    for number, name in enumerate(names):
-        places = np.roll(values, 7 * number)
-        dataset = dataset.assign_coords({name: ("sample", places, {"units": "kg"})})
-    dataset["rms_error"] = dataset["rms_error"] * 0.0 + np.exp(dataset["third"])
-    figure = plot_result(dataset, None, "errors")
-    assert len(figure.axes) == 6
-    # Of four quantities the errors follow the third.
-    assert figure.axes[3].get_xlabel() == "third (kg)"
-    check_texts_of(figure)

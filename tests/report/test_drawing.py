@@ -1,4 +1,4 @@
-"""Studies that end in every way, over unequal axes, of one to seven methods: all are drawn."""
+"""Any result is drawn: runs that end in every way, over any axes, of one to seven methods."""
 
 import json
 from collections import Counter
@@ -8,11 +8,13 @@ import pytest
 
 import vehiclemor as vm
 from tests.report import endings
-from tests.report.figure_texts import check_texts
+from tests.report.figure_texts import checked, varied
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.report.figures import result_plot, theme
+from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.runs import PATH
+from vehiclemor.report.labels import readable_unit
 from vehiclemor.study.netcdf_file import read_dataset
 
 ENDS = ("ok", "untrusted", "diverged", "rejected", "unreachable", "error", "exact")
@@ -33,11 +35,8 @@ def study(*ends, grid="", above=0.0, **entries):
 
 
 # Each end alone, beside another over a curve, or on a map of few and of all methods.
-STUDIES = {f"alone-{end}": study(end) for end in ("ok", "diverged", "unreachable", "error")}
-STUDIES |= {
-    f"beside-{end}": study(end, "ok", grid=CURVE)
-    for end in ("untrusted", "diverged", "rejected", "exact")
-}
+STUDIES = {f"alone-{end}": study(end) for end in ("diverged", "unreachable")}
+STUDIES |= {f"beside-{end}": study(end, "ok", grid=CURVE) for end in ("untrusted", "rejected")}
 STUDIES |= {f"map-{n}": study(*ENDS[:n], grid=MAP, above=PARTLY) for n in (1, 4, 7)}
 NUMBERS = "amplitude_factor = [1.0, 1.2]"
 STUDIES |= {
@@ -50,7 +49,7 @@ STUDIES |= {
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
+def folder(tmp_path_factory):
     """Folder with all studies and their results."""
     folder = tmp_path_factory.mktemp("drawn")
     for name, text in STUDIES.items():
@@ -65,11 +64,8 @@ def results(tmp_path_factory):
         yield folder
 
 
-def checked(figure):
-    figure.draw_without_rendering()
-    check_texts(figure)
-    assert all(axis.lines or axis.collections for axis in figure.axes)
-    return figure
+def stored(folder, name):
+    return read_dataset(folder / "studies" / f"{name}.nc", "source", "vehiclemor")
 
 
 def said(figure):
@@ -79,24 +75,29 @@ def said(figure):
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", STUDIES)
-def test_every_study_is_drawn(results, name):
+def test_every_study_is_drawn(folder, name):
     if name.startswith(("alone", "none")):
-        checked(vm.plot(results / f"{name}.toml", results=results))
+        checked(vm.plot(folder / f"{name}.toml", results=folder))
     if name.startswith("map"):
         # One output of two is enough.
-        data = read_dataset(results / "studies" / f"{name}.nc", "source", "vehiclemor")
-        panels = checked(vm.plot(data.sel(output=["spindle_y"]), "errors")).axes
+        data = stored(folder, name).sel(output=["spindle_y"])
+        panels = checked(vm.plot(data, "errors")).axes
         ticks = [tick.get_text() for tick in panels[0].get_yticklabels()]
         assert ticks == ["\N{MINUS SIGN}150", "0", "20"]
-        assert sum(axis.get_label() != "<colorbar>" for axis in panels) == int(name[-1])
+        maps = [axis for axis in panels if axis.get_label() != "<colorbar>"]
+        assert len(maps) == int(name[-1])
+        for axis, label in zip(maps, data["label"].values, strict=True):
+            crosses = sum(np.size(line.get_xdata()) for line in axis.lines)
+            ended = data["status"].sel(label=label).isin(("ok", "untrusted"))
+            assert crosses == int((~ended).sum())
     else:
-        checked(vm.plot(results / f"{name}.toml", "errors", results=results))
+        checked(vm.plot(folder / f"{name}.toml", "errors", results=folder))
 
 
-@pytest.mark.parametrize("name", ["all", "late", "at-once", "beside-exact", "beside-rejected"])
-def test_a_run_is_drawn_to_its_end_and_only_a_diverged_one_has_diverged(results, name):
-    data = read_dataset(results / "studies" / f"{name}.nc", "source", "vehiclemor")
-    figure = vm.plot(str(results / f"{name}.toml"), results=results)
+@pytest.mark.parametrize("name", ["all", "late", "at-once", "beside-untrusted", "beside-rejected"])
+def test_a_run_is_drawn_to_its_end_and_only_a_diverged_one_has_diverged(folder, name):
+    data = stored(folder, name)
+    figure = vm.plot(str(folder / f"{name}.toml"), results=folder)
     legend, notes = said(checked(figure))
     assert ("has diverged" in legend) == (name in ("all", "late", "at-once"))
     assert "leaves the axes" not in legend
@@ -113,44 +114,65 @@ def test_a_run_is_drawn_to_its_end_and_only_a_diverged_one_has_diverged(results,
         assert np.isfinite(shown[-1]) == (status in ("ok", "untrusted"))
 
 
-def test_what_has_no_values_says_so(results):
-    legend, notes = said(vm.plot("alone-unreachable", results=results))
+def test_a_run_far_from_full_order_is_cut_where_it_leaves(folder):
+    data = stored(folder, "all").sel(label=["ok_0", "untrusted_1"]).squeeze()
+    data["outputs"].loc[{"label": "untrusted_1"}] *= 10.0
+    figure = checked(vm.plot(data))
+    axis = figure.axes[0]
+    assert "leaves the axes" in said(figure)[0]
+    (line,) = (x for x in axis.lines if x.get_label().startswith("untrusted"))
+    seen = line.get_ydata()[np.isfinite(line.get_ydata())]
+    low, high = axis.get_ylim()
+    assert 10 < seen.size < data.sizes["time"]
+    assert not low <= seen[-1] <= high
+    assert all(low <= value <= high for value in seen[:-1])
+    full = 1e3 * data["reference_outputs"].sel(output="second_euler_angle")
+    assert high - low < 3.0 * float(full.max() - full.min())
+
+
+def test_what_has_no_values_says_so(folder):
+    legend, notes = said(vm.plot("alone-unreachable", results=folder))
     assert legend == ["unreachable 0 (unreachable)"]
     assert notes == ["no finite values"] * 2
 
 
-def test_a_figure_that_fails_is_named_and_stops_no_other(results, capsys, monkeypatch):
-    names = ("numbers", "map-4", "alone-error")
-    only = ["--only", ",".join(str(results / f"{name}.toml") for name in names)]
-    arguments = ["figures", *only, "--results", str(results), "--out", str(results / "figures")]
+def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeypatch):
+    names = ("numbers", "map-4", "alone-diverged")
+    only = ["--only", ",".join(str(folder / f"{name}.toml") for name in names)]
+    arguments = ["figures", *only, "--results", str(folder), "--out", str(folder / "figures")]
     assert main([*arguments, "--dpi", "20"]) == 0
-    written = {path.stem.removeprefix("figure-") for path in (results / "figures").iterdir()}
+    written = {path.stem.removeprefix("figure-") for path in (folder / "figures").iterdir()}
     kinds = {name: ("errors", "histories")[: 1 + (name != "numbers")] for name in names}
     assert written == {f"{name}-{kind}" for name, every in kinds.items() for kind in every}
-    vm.write_report(str(results / "none.toml"), results / "page.html", results)
-    assert "Left out" not in (results / "page.html").read_text(encoding="utf-8")
+    vm.write_report(str(folder / "none.toml"), folder / "page.html", folder)
+    assert "Left out" not in (folder / "page.html").read_text(encoding="utf-8")
     capsys.readouterr()
 
     def broken(*_):
         raise IndexError("index 51 is out of bounds")
 
     monkeypatch.setitem(result_plot.DRAWINGS, "histories", broken)
-    only = ["--only", f"{results / 'alone-ok.toml'},1", "--results", str(results)]
-    assert main(["figures", *only, "--out", str(results / "some"), "--dpi", "20"]) == 1
+    only = ["--only", f"{folder / 'late.toml'},1", "--results", str(folder)]
+    assert main(["figures", *only, "--out", str(folder / "some"), "--dpi", "20"]) == 1
     printed = capsys.readouterr()
     (line,) = printed.err.splitlines()
-    assert line.startswith("figure alone-ok-histories can't be drawn: IndexError")
+    assert line.startswith("figure late-histories can't be drawn: IndexError")
     assert [row.rpartition("-")[2] for row in printed.out.split()] == ["errors.png", "1.png"]
-    page = vm.write_report([str(results / "alone-ok.toml")], results / "page.html", results)
+    page = vm.write_report([str(folder / "late.toml")], folder / "page.html", folder)
     head, _, rest = page.read_text(encoding="utf-8").partition("<ol")
-    assert "Left out: histories of alone-ok (IndexError: index 51" in head
+    assert "Left out: histories of late (IndexError: index 51" in head
     assert "RMS errors" in rest
 
 
-def test_paths_of_runs_that_have_failed(results):
-    data = read_dataset(results / "studies" / "all.nc", "source", "vehiclemor")
-    data = data.sel(output=["spindle_x", "spindle_y"]).assign_coords(output=list(PATH))
-    assert "diverged 2* (diverged)" in said(checked(vm.plot(data.squeeze(), "paths")))[0]
+def test_paths_of_runs_that_have_failed(folder):
+    data = stored(folder, "all").sel(output=["spindle_x", "spindle_y"])
+    data = data.assign_coords(output=list(PATH)).squeeze()
+    figure = checked(vm.plot(data, "paths"))
+    assert "diverged 2* (diverged)" in said(figure)[0]
+    (line,) = (x for x in figure.axes[1].lines if x.get_label() == "ok 0*")
+    error = (data["outputs"] - data["reference_outputs"]).sel(label="ok_0")
+    away = np.hypot(*(error.sel(output=output).values for output in PATH))
+    np.testing.assert_allclose(line.get_ydata(), np.where(away > 0.0, away, np.nan), rtol=1e-12)
 
 
 def test_what_was_not_compared_is_drawn_alone(tmp_path):
@@ -163,45 +185,172 @@ def test_what_was_not_compared_is_drawn_alone(tmp_path):
         assert len(legend) == 1
         shown = 1e3 * result["outputs"].sel(output="second_euler_angle")
         np.testing.assert_array_equal(figure.axes[0].lines[-1].get_ydata(), shown)
-        with pytest.raises(InputError, match="not compared with full order"):
+        with pytest.raises(InputError, match="not compared"):
             vm.plot(result, "errors")
 
 
-def test_a_study_is_drawn_by_the_name_of_its_results(results, tmp_path, monkeypatch, capsys):
+def test_a_study_is_drawn_by_the_name_of_its_results(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["plot", "all", "--results", str(results)]) == 0
+    assert main(["plot", "all", "--results", str(folder)]) == 0
     assert (tmp_path / "all-histories.png").exists()
     # Another study of that name is stored beside it.
     other = tmp_path / "all.toml"
     other.write_text(study("ok", grid=CURVE))
-    vm.run_study(other, results=results)
-    shown = vm.plot(other, "errors", results=results).axes[0]
+    vm.run_study(other, results=folder)
+    shown = vm.plot(other, "errors", results=folder).axes[0]
     assert shown.get_xlabel() == "frequency perturbation (%)"
-    assert main(["plot", "al", "--results", str(results)]) == 2
-    assert "unknown study 'al'" in capsys.readouterr().err
+    assert main(["plot", "al", "--results", str(folder)]) == 2
+    assert "'al'" in capsys.readouterr().err
 
 
-def test_a_map_of_two_amplitudes_has_its_published_line(results):
-    values = ", ".join(f"{value:.3f}" for value in np.linspace(0.8, 1.2, 51))
-    grid = f"frequency_factor = [{values}]\namplitude_factor = [1.0, 1.1]"
-    (results / "wide.toml").write_text(
-        study("ok", grid=grid, keep="metrics").replace("0.01", "1e-4")
-    )
-    checked(vm.plot(vm.run_study(results / "wide.toml", results=results), "errors"))
+def test_errors_are_drawn_over_what_is_not_chosen(folder):
+    data = stored(folder, "map-4")
+    chosen = vm.plot(data, "errors", label="untrusted_1")
+    assert chosen.axes[0].get_title(loc="left") == "(a) untrusted 1"
+    assert len(chosen.axes[0].texts) == 9
+    curve = checked(vm.plot(data, "errors", amplitude_factor=1.2)).axes[0]
+    lines = {line.get_label(): line for line in curve.lines}
+    place = {"label": "ok_0", "amplitude_factor": 1.2, "output": "second_euler_angle"}
+    np.testing.assert_array_equal(lines["ok 0"].get_ydata(), data["rms_error"].sel(place).squeeze())
 
 
-def test_counts_agree(results, capsys):
-    path, name = str(results / "numbers.toml"), "numbers"
-    assert main(["run", path, "--results", str(results)]) == 1
+def test_counts_agree(folder, capsys):
+    path, name = str(folder / "numbers.toml"), "numbers"
+    assert main(["run", path, "--results", str(folder)]) == 1
     printed = " ".join(capsys.readouterr().out.split())
-    data = read_dataset(results / "studies" / f"{name}.nc", "source", "vehiclemor")
+    data = stored(folder, name)
     found = Counter(data["status"].values.ravel().tolist())
     doubted = int(data["remark"].str.contains("not to be trusted").sum())
     assert doubted
     counts = ", ".join(f"{found[end]} {end}" for end in sorted(found))
     told = counts.replace(" ok", f" ok ({doubted} not to be trusted)")
     assert f"{name}: 8 grid points, 8 cells: {told};" in printed
-    assert main(["status", path, "--results", str(results)]) == 0
+    assert main(["status", path, "--results", str(folder)]) == 0
     assert f" {counts};" in " ".join(capsys.readouterr().out.split())
-    page = vm.write_report([path], results / "page.html", results)
+    page = vm.write_report([path], folder / "page.html", folder)
     assert f": {told}" in page.read_text(encoding="utf-8")
+
+
+def test_a_picture_shows_both_runs_and_their_difference(results):
+    run = results["figures-6-7"].sel({"label": "pod", "rank": 3}).squeeze(drop=False)
+    figure = checked(plot_result(run))
+    upper, lower = figure.axes[0], figure.axes[2]
+    angle = run.sel(output="second_euler_angle")
+    full, reduced = angle["reference_outputs"], angle["outputs"]
+    for line, outputs in zip(upper.lines, (full, reduced), strict=False):
+        np.testing.assert_array_equal(line.get_ydata(), 1e3 * outputs)
+    assert "mrad" in upper.get_ylabel()
+    factor, unit = readable_unit(float(abs(full - reduced).max()), "rad")
+    np.testing.assert_allclose(lower.lines[0].get_ydata(), factor * (reduced - full), atol=1e-9)
+    assert unit in lower.get_ylabel()
+    (shade,) = (p for p in lower.patches if "best approximation" in p.get_label())
+    best = factor * angle["floor_rms_error"].item()
+    assert shade.get_height() == pytest.approx(2.0 * best)
+    others = [name for name in run["output"].values if name not in shown_outputs(run)]
+    assert plot_result(run.sel(output=others)).axes[0].get_ylabel().startswith("spindle disp")
+    point = results["figures-2-4"].sel(start="dropped")
+    for kind in ("histories", "paths", "errors"):
+        assert checked(plot_result(point, None, kind)).get_suptitle()
+
+
+@pytest.mark.parametrize(
+    ("study", "drawn", "word"),
+    [
+        ("figure-13-frequency", {}, "no histories"),
+        ("figure-11", {"kind": "paths"}, "no path"),
+        ("figures-2-4", {"kind": "curve"}, "curve"),
+        ("figures-2-4", {"kind": 3}, "kind"),
+        ("figures-2-4", {"rank": 99}, "99"),
+        ("figures-2-4", {"start": ["dropped"]}, "start"),
+        ("figures-2-4", {"r": 3}, "'r'"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(results, study, drawn, word):
+    with pytest.raises(InputError, match=word):
+        vm.plot(results[study], **drawn)
+
+
+def test_pictures_need_a_point_a_method_and_outputs(results):
+    starts, study = results["figures-2-4"], results["figure-11"].isel(rank=0)
+    alone = study.sel({"label": ["full_order"]})
+    without = study.isel(output=slice(0)), study.drop_vars("signal_range")
+    kinds = {"histories": [starts], "errors": [alone, *without]}
+    for kind, lacking in kinds.items():
+        for dataset in lacking:
+            with pytest.raises(InputError):
+                plot_result(dataset, None, kind)
+    with pytest.raises(InputError, match="jobs"):
+        vm.figures(["5"], jobs=10**39)
+
+
+FACTOR = {"frequency_factor": [0.8, 1.0, 1.2, 1.4]}
+MANY = {"rank": [*range(1, 9)]}
+
+
+@pytest.mark.parametrize(
+    ("dimensions", "label", "panels", "meshes"),
+    [
+        (FACTOR | {"rank": [1, 2, 3]}, "frequency perturbation (%)", 2, 0),
+        (FACTOR | {"amplitude_factor": [0.9, 1.0]}, "frequency perturbation (%)", 4, 4),
+        ({"tolerance": [1e-8, 1e-6, 1e-3]}, "tolerance", 2, 0),
+        (MANY | {"snapshots": [*range(5, 11)]}, "rank", 4, 4),
+        (MANY | {"formulation": ["state", "paired"], "start": ["a", "b", "c"]}, "rank", 4, 4),
+        ({"start": ["a", "b"], "rank": [1, 2, 3]}, "rank", 2, 0),
+        ({"formulation": ["coordinates", "state", "paired"]}, "formulation", 2, 0),
+        ({"equation_seed": [*range(30)]}, "equation seed, sorted by error", 2, 0),
+    ],
+)
+def test_figures_follow_from_what_varies(dimensions, label, panels, meshes):
+    figure = checked(plot_result(varied(**dimensions), None, "errors"))
+    shown = [axis for axis in figure.axes if axis.get_label() != "<colorbar>"]
+    assert len(shown) == panels
+    assert shown[-1].get_xlabel() == label
+    found = [axis for axis in shown if any(hasattr(c, "get_coordinates") for c in axis.collections)]
+    assert len(found) == meshes
+    assert (shown[-1].get_xscale() == "log") == (label == "tolerance")
+    if label == "rank":
+        ticks = shown[-1].get_xticks()
+        assert all(float(tick).is_integer() for tick in ticks)
+
+
+def test_curves_and_maps_show_the_errors():
+    dataset = varied(**FACTOR, rank=[2, 3])
+    # One method does not depend on the rank.
+    dataset["rms_error"][:, 1, 1] = dataset["rms_error"][:, 0, 1]
+    axis = plot_result(dataset, None, "errors").axes[0]
+    lines = {line.get_label(): line for line in axis.lines if np.size(line.get_xdata())}
+    own = {"POD, rank 2", "POD, rank 3", "my own method"}
+    assert set(lines) == own | {"published, nominal"}
+    for rank in (2, 3):
+        place = {"label": "pod", "rank": rank, "output": "second_euler_angle"}
+        line = lines[f"POD, rank {rank}"]
+        np.testing.assert_array_equal(line.get_ydata(), dataset["rms_error"].sel(place))
+        np.testing.assert_allclose(line.get_xdata(), [-20.0, 0.0, 20.0, 40.0], atol=1e-12)
+    dataset = varied(**MANY, formulation=["state", "paired"], start=["a", "b", "c"])
+    figure = plot_result(dataset, None, "errors")
+    assert "formulation" in figure.get_suptitle()
+    errors = dataset["rms_error"].max("formulation").sel(label="pod", output="second_euler_angle")
+    shown = figure.axes[0].collections[0].get_array().ravel()
+    assert 1e-3 * shown.max() == pytest.approx(float(errors.max()))
+    assert shown.size == errors.size
+
+
+def test_samples_are_drawn_over_what_was_sampled():
+    dataset = varied(sample=[*range(40)])
+    for number, name in enumerate(("first", "second", "third", "fourth")):
+        places = np.roll(np.linspace(0.0, 1.0, 40), 7 * number)
+        dataset = dataset.assign_coords({name: ("sample", places, {"units": "kg"})})
+    dataset["rms_error"] = dataset["rms_error"] * 0.0 + np.exp(dataset["third"])
+    figure = checked(plot_result(dataset, None, "errors"))
+    assert len(figure.axes) == 6
+    # Of four quantities the errors follow the third.
+    assert figure.axes[3].get_xlabel() == "third (kg)"
+
+
+def test_full_and_wide_maps_have_their_published_line(folder):
+    values = ", ".join(f"{value:.3f}" for value in np.linspace(0.8, 1.2, 51))
+    grid = f"frequency_factor = [{values}]\namplitude_factor = [1.0, 1.1]"
+    text = study("ok", grid=grid, keep="metrics").replace("0.01", "1e-4")
+    (folder / "wide.toml").write_text(text)
+    figure = checked(vm.plot(vm.run_study(folder / "wide.toml", results=folder), "errors"))
+    assert len(figure.axes[0].collections) == 2

@@ -121,8 +121,8 @@ def plot(
     kind
         What is drawn.
     select
-        dimension=value: a point of the study's grid; may be given several times.  Else factors are
-        1 and the others first, and errors are over the whole grid; all methods are drawn.
+        dimension=value of the study's grid; may be given several times.  Where none is given,
+        factors are 1, other values are the first, errors are over all and methods all drawn.
     out
         Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
     """

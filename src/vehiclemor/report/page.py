@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vehiclemor.arguments import count, file_path, quoted
+from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.files import write_text
 from vehiclemor.registry import names
@@ -96,7 +96,8 @@ def write_report(
     sections: list[Section] = []
     if studies:
         chosen = [name for study in studies for name in _studies_of(study, folder)]
-        every = [d for n in chosen for d in run_studies(n, folder, count("jobs", jobs)).values()]
+        jobs = count("jobs", jobs, most=MOST_JOBS)
+        every = [d for n in chosen for d in run_studies(n, folder, jobs).values()]
         # Two studies may have one name, but not one file.
         found = {Path(d.encoding.get("source", d.attrs["study"])).stem: d for d in every}
     else:

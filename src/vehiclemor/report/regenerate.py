@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vehiclemor.arguments import count, file_path, quoted
+from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
 from vehiclemor.errors import InputError
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.study.failure import attempt_apart
@@ -83,7 +83,7 @@ def regenerate_figures(
 
     # What is wrong is named before anything is computed.
     styled(style, dpi)
-    jobs = count("jobs", jobs)
+    jobs = count("jobs", jobs, most=MOST_JOBS)
     missing = left_out(results)
     wanted = only or [name for name in FIGURES if name not in missing]
     chosen = {entry.name: entry for name in wanted for entry in find(name, results)}

@@ -52,8 +52,7 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
 def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple[xr.Dataset, str]:
     """What of a result is drawn: one point of a study's grid with all methods, told in words.
 
-    A dimension that is not chosen is at its nominal or first value; errors are drawn over the
-    whole grid where nothing is chosen.
+    A dimension that is not chosen is at its nominal or first value, but errors are drawn over it.
 
     Raises
     ------
@@ -70,9 +69,9 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
             raise unknown("dimension of the result", key, grid)
     words = []
     # A grid has methods; what has none, such as a timing, is refused where it is drawn.
-    for dimension in grid if "label" in grid and (chosen or kind != "errors") else ():
+    for dimension in grid if "label" in grid else ():
         values = dataset[dimension].values.tolist()
-        if dimension == "label" and dimension not in chosen:
+        if dimension not in chosen and (dimension == "label" or kind == "errors"):
             continue
         default = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
         value: Any = chosen.get(dimension, default)

@@ -17,9 +17,7 @@ from vehiclemor.toml_files import FileSchema, read_toml
 
 # What `draw` of an entry names.
 DRAWINGS: dict[str, Callable[..., Figure]] = {
-    "suspension schematic": schematics.figure_suspension,
-    "vehicle schematic": schematics.figure_vehicle,
-    "high-fidelity schematic": schematics.figure_high_fidelity,
+    "schematic": schematics.figure_schematic,
     "histories": runs.figure_histories,
     "paths": runs.figure_paths,
     "errors": errors.figure_errors,
@@ -115,27 +113,21 @@ def find(name: str, results: Path) -> list[Entry]:
 
 def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
     """What a study lets be drawn: of a protocol the errors over the times."""
-    # Name -> drawing, what is shown, options.
-    found: dict[str, tuple[str, str, dict[str, object]]] = {}
-    file = path.stem if data_folder() in path.parents else str(path)
-    if study.bounds:
-        words = "worst error on unseen inputs over the time of a call"
-        found[f"{name}-pareto"] = "pareto", words, {"titled": True}
-    kinds = {} if study.bounds else {"errors": "errors over what is varied"}
-    if kinds and study.keep == "trajectories":
+    kinds = {"errors": "errors over what is varied"}
+    if study.keep == "trajectories":
         kinds["histories"] = "outputs and errors over the time"
         if {output.name for output in component("model", study.model).outputs} >= set(runs.PATH):
             kinds["paths"] = "paths in the plane"
-    for kind, words in kinds.items():
-        found[f"{name}-{kind}"] = "result", words, {"kind": kind}
+    if study.bounds:
+        kinds = {"pareto": "worst error on unseen inputs over the time of a call"}
     return [
         Entry(
-            name=figure,
-            draw=drawing,
-            studies=[file],
+            name=f"{name}-{kind}",
+            draw="pareto" if study.bounds else "result",
+            studies=[path.stem if data_folder() in path.parents else str(path)],
             datasets=[name],
             caption=f"{study.title}: {words}.",
-            options=options,
+            options={} if study.bounds else {"kind": kind},
         )
-        for figure, (drawing, words, options) in found.items()
+        for kind, words in kinds.items()
     ]

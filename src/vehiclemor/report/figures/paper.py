@@ -1,24 +1,24 @@
 """Figures that one question asks for: unseen inputs, rounding, order of equations, spectrum."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from vehiclemor.report.figures.error_map import two_digits
-from vehiclemor.report.figures.errors import draw_band, figure_errors
-from vehiclemor.report.figures.runs import END, Runs, draw_history, draw_paths, runs_of
-from vehiclemor.report.figures.theme import (
-    THIN,
-    Results,
-    Style,
-    legend_below,
-    letter,
-    panels,
-    styles,
+from vehiclemor.report.figures import theme
+from vehiclemor.report.figures.errors import figure_errors, two_digits
+from vehiclemor.report.figures.runs import (
+    END,
+    Curve,
+    Runs,
+    draw_history,
+    draw_paths,
+    legend_of,
+    runs_of,
 )
+from vehiclemor.report.figures.theme import THIN, Results, Style, letter, panels, styles
 from vehiclemor.report.labels import readable_unit
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.report.spectrum import spectrum
@@ -56,42 +56,40 @@ def figure_unseen(
     """
     heights = {"height_ratios": [2.0, 1.0]}
     figure, axes = panels(2, len(inputs), (8.0, 4.4), sharey="row", gridspec_kw=heights)
+    looks = styles(methods)
     for (upper, lower), (title, amplitude) in zip(axes.T, inputs.items(), strict=True):
-        found: list[Runs] = []
-        for dataset in results.values():
-            held = {m: t for m, t in methods.items() if m in dataset["label"].values}
-            found.append(runs_of(dataset.sel(amplitude_factor=amplitude), held))
+        points = [dataset.sel(amplitude_factor=amplitude) for dataset in results.values()]
+        found = [runs_of(point, legend_of(point, methods)) for point in points]
         curves = {curve.label: curve for runs in found for curve in runs.curves}
-        looks = styles(methods)
         ordered = [curves[label]._replace(style=looks[label]) for label in methods]
-        runs = Runs(found[0].full, ordered)
-        draw_paths(upper, runs)
-        _draw_bars(lower, runs)
+        draw_paths(upper, Runs(found[0].full, ordered))
+        _draw_bars(lower, ordered)
         upper.set_title(title)
         upper.set_xlim(0.0, shown)
         upper.set_xlabel("X (m)")
         lower.set_xlabel("largest error of Y (m)")
     axes[0, 0].set_ylabel("Y (m), not to scale")
-    legend_below(figure, [axes[0, 0]])
+    theme.legend_below(figure, [axes[0, 0]])
     return figure
 
 
-def _draw_bars(axis: Axes, runs: Runs) -> None:
+def _draw_bars(axis: Axes, curves: Sequence[Curve]) -> None:
     """Largest lateral error of each reduced model, in numbers too, on a logarithmic axis."""
-    for place, curve in enumerate(runs.curves):
-        error = curve.run["max_error"].sel(output="lateral_position").item()
-        end = max(error, SHORTEST)
-        axis.barh(place, end - SHORTEST, left=SHORTEST, height=0.6, color=curve.style["color"])
-        factor, unit = readable_unit(error, "m")
-        words = f"{two_digits(factor * error)} {unit}" if error >= MEASURABLE else "< 0.1 mm"
-        axis.annotate(words, (end, place), (4, 0), textcoords="offset points", va="center")
-    axis.set_yticks(range(len(runs.curves)), [curve.text for curve in runs.curves])
-    axis.set_ylim(len(runs.curves) - 0.5, -0.5)
+    errors = [c.run["max_error"].sel(output="lateral_position").item() for c in curves]
+    colors = [curve.style["color"] for curve in curves]
+    bars = axis.barh([c.text for c in curves], np.maximum(errors, SHORTEST), 0.6, color=colors)
+    axis.bar_label(bars, [*map(_length, errors)], padding=4)
+    axis.set_ylim(len(curves) - 0.5, -0.5)
     axis.set_xscale("log")
     axis.set_xlim(SHORTEST, LONGEST)
     axis.set_xticks([1e-3, 1e-1, 1e1], ["0.001", "0.1", "10"])
     axis.minorticks_off()
     axis.grid(visible=False, axis="y")
+
+
+def _length(error: float) -> str:
+    factor, unit = readable_unit(error, "m")
+    return f"{two_digits(factor * error)} {unit}" if error >= MEASURABLE else "< 0.1 mm"
 
 
 def figure_spread(results: Results) -> Figure:
@@ -105,28 +103,21 @@ def figure_spread(results: Results) -> Figure:
     looks = styles(["pod_state", "pod", "pod_literal"]).values()
     lines = [c._replace(style=look) for c, look in zip([*four, *six], looks, strict=True)]
     figure, axes = panels(2, 1, (6.7, 5.4), sharex=True)
-    scale = float(abs(three.full["reference_outputs"].sel(output=ANGLE)).max())
-    factor, _ = readable_unit(scale, "rad")
     titles = ("three states", "four and six states")
     for number, (axis, curves) in enumerate(zip(axes.flat, (three.curves, lines), strict=True)):
-        draw_history(axis, Runs(three.full, curves), ANGLE, scale)
+        draw_history(axis, Runs(three.full, curves), ANGLE)
         axis.axvline(5.0, **END)
         axis.set_title(letter(number, titles[number]))
     lower = axes[1, 0]
-    low, high = lower.get_ylim()
-    for label, line in zip(below, lines[1:], strict=True):
-        found = spread["outputs"].sel(label=label, rank=6, output=ANGLE).squeeze(drop=True)
-        values = factor * found.transpose("rounding_seed", "time").values
-        band: Style = {"color": line.style["color"], "alpha": 0.3, "linewidth": 0.0}
-        text = f"{line.text}, 21 roundings"
-        lower.fill_between(
-            found["time"], *(f(values, axis=0) for f in (np.nanmin, np.nanmax)), label=text, **band
-        )
-    margin = 0.35 * (high - low)
-    lower.set_ylim(low - margin, high + margin)
+    # Of least squares it is no wider than the line.
+    found = spread["outputs"].sel(label="pod_literal", rank=6, output=ANGLE).squeeze(drop=True)
+    ends = (1e3 * f("rounding_seed") for f in (found.min, found.max))
+    band: Style = {"color": lines[-1].style["color"], "alpha": 0.3, "linewidth": 0.0}
+    lower.fill_between(found["time"], *ends, label="r = 6 (literal), 21 roundings", **band)
+    lower.set_ylim(*(1.6 * limit for limit in lower.get_ylim()))
     lower.set_xlabel("time (s)")
     lower.set_xlim(0.0, float(dataset["time"][-1]))
-    legend_below(figure, axes.flat)
+    theme.legend_below(figure, axes.flat)
     return figure
 
 
@@ -144,7 +135,7 @@ def figure_equation_order(results: Results) -> Figure:
         least = nominal["rms_error"].sel(label="pod", rank=3, output=output).item()
         axis.axhline(least, color="#009E73", linestyle="--", label="least squares")
         axis.axhline(numbers[output].value, label="published", **THIN)
-    legend_below(figure, figure.axes)
+    theme.legend_below(figure, figure.axes)
     return figure
 
 
@@ -161,8 +152,10 @@ def figure_spectrum(*, models: Mapping[str, str]) -> Figure:
             values = found[variable].sel(preset=preset).transpose("mode", "window")
             values = values.where(values > 0.1 * rounding).dropna("mode", how="all")
             look: Style = {"marker": "o", "markersize": 3, **styles([method])[method]}
-            words = f"{text}: median, all periods"
-            draw_band(axis, values["mode"].values, values.values, look, words)
+            modes, words = values["mode"], f"{text}: median, all periods"
+            axis.plot(modes, values.median("window"), label=words, **look)
+            band: Style = {"color": look["color"], "alpha": 0.15, "linewidth": 0.0}
+            axis.fill_between(modes, values.min("window"), values.max("window"), **band)
         axis.set_yscale("log")
         axis.set_ylim(bottom=rounding)
         axis.axvline(int(found["rank"]), label="states that the paper keeps", **THIN)
@@ -170,5 +163,5 @@ def figure_spectrum(*, models: Mapping[str, str]) -> Figure:
         axis.set_title(letter(number, title))
         axis.set_ylabel("" if column else label)
         axis.set_xlabel("number of modes" if row else "")
-    legend_below(figure, [axes[0, 0]])
+    theme.legend_below(figure, [axes[0, 0]])
     return figure

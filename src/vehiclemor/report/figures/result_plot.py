@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # At most so many outputs have panels.
-PANELS = 4
+PANELS = 3
 DRAWINGS: dict[str, Callable[[xr.Dataset], Figure]] = {
     "histories": lambda dataset: figure_histories(
         {"": dataset}, outputs=shown_outputs(dataset), beside=True
@@ -91,11 +91,10 @@ def _model(dataset: xr.Dataset) -> str:
 def _title(dataset: xr.Dataset) -> str:
     """Title of the result; of one run with its input."""
     title = str(dataset.attrs.get("title", _model(dataset)))
-    test, *_ = _configuration(dataset).get("test") or [None]
-    if test:
+    for test in _configuration(dataset).get("test") or []:
         changed = [k for k in ("frequency", "amplitude") if test[k] != 1.0]
         factors = "".join(f", {key} {test[key]:g}" for key in changed)
-        title += f": {test['maneuver']}{factors}, from {test['start']}"
+        return f"{title}: {test['maneuver']}{factors}, from {test['start']}"
     return title
 
 

@@ -1,6 +1,7 @@
 """Runs of any model: histories and paths of full order and reduced models, and their errors."""
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,14 +13,13 @@ from vehiclemor.errors import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures import theme
-from vehiclemor.report.figures.scales import hide_rounding, tick_decades
-from vehiclemor.report.figures.theme import CROSS, FULL, Results, Style
+from vehiclemor.report.figures.theme import CROSS, FULL, Results, Style, hide_rounding, tick_decades
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 
 # Outputs that make a path in the plane.
 PATH = ("longitudinal_position", "lateral_position")
-DIVERGED, DISTANCE = "has diverged", "distance from full order at the same time"
+DISTANCE = "distance from full order at the same time"
 RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
 END: Style = {"color": "#777777", "linewidth": 0.8, "label": "end of a control period"}
 # How far around the full-order signal the others are shown, as a multiple of its range; share of
@@ -27,8 +27,6 @@ END: Style = {"color": "#777777", "linewidth": 0.8, "label": "end of a control p
 REACH, STILL = 0.6, 1e-4
 # Height of a panel in inches; letters of a label beside it in one line.
 HISTORY, ERROR, LINE = 2.0, 1.7, 26
-# Panels beside each other.
-MOST_BESIDE = 3
 
 
 class Curve(NamedTuple):
@@ -120,7 +118,7 @@ def figure_histories(
     rows
         What each output has: `history`, `error` (beside the RMS error of the best approximation),
         `largest error` (in each control period, with the RMS error over the run beside the
-        published one), `difference from replay`.  By default histories and errors.
+        published one).  By default histories and errors.
     beside
         Outputs stand beside each other, not below each other.
     place
@@ -132,32 +130,22 @@ def figure_histories(
     dataset = dataset.sel(place or {})
     texts = legend_of(dataset, methods)
     starts = list(dataset["start"].values) if "start" in dataset.dims and not beside else [None]
-    each = [dataset if start is None else dataset.sel(start=start) for start in starts]
-    runs = [runs_of(point, texts) for point in each]
+    runs = [runs_of(dataset if s is None else dataset.sel(start=s), texts) for s in starts]
     if not rows:
-        error = "largest error" if len(runs[0].curves) > 1 else "error"
+        error = "largest error" if len(texts) > 1 else "error"
         rows = ["history", error] if runs[0].compared else ["history"]
-    wide = len(outputs) if len(outputs) <= MOST_BESIDE else 2
-    columns = wide if beside else len(starts)
-    block = columns if beside else 1
-    heights = [HISTORY if content == "history" else ERROR for content in rows]
-    heights *= -(-len(outputs) // block)
-    size = (6.7 if columns < MOST_BESIDE else 9.5, sum(heights) + 1.2)
+    columns = len(outputs) if beside else len(runs)
+    cells = [(runs[0], output, content) for content in rows for output in outputs]
+    if not beside:
+        cells = [(run, output, content) for output in outputs for content in rows for run in runs]
+    heights = [HISTORY if content == "history" else ERROR for *_, content in cells[::columns]]
+    size = (6.7 if columns < 3 else 9.5, sum(heights) + 1.2)
     ratios = {"height_ratios": heights}
     figure, axes = theme.panels(len(heights), columns, size, sharex=True, gridspec_kw=ratios)
-    ended: dict[str, str] = {}
-    for number, axis in enumerate(axes.flat):
-        row, column = divmod(number, columns)
-        row, content = divmod(row, len(rows))
-        output = outputs[row * block + column * beside]
-        found = runs[0 if beside else column]
-        start = f"{starts[column]} start" if len(starts) > 1 else ""
-        axis.set_title(theme.letter(number, start))
-        if rows[content] == "history":
-            scale = _scale(dataset, output)
-            ended |= draw_history(axis, found, output, scale)
-        else:
-            ended |= _draw_errors(axis, found, output, rows[content])
+    for number, (axis, (run, output, content)) in enumerate(zip(axes.flat, cells, strict=True)):
+        start = starts[number % len(starts)]
+        axis.set_title(theme.letter(number, f"{start} start" if len(starts) > 1 else ""))
+        DRAWN[content](axis, run, output)
         for moment in marks:
             axis.axvline(moment, **END)
     time = dataset["time"].values
@@ -165,113 +153,66 @@ def figure_histories(
         part = f", first {shown:g} s of {time[-1]:g} s" if shown else ""
         axis.set_xlabel(f"time (s){part}")
         axis.set_xlim(float(time[0]), shown or float(time[-1]))
-    for text, color in ended.items():
-        axes[0, 0].plot([], [], color=color, label=text, **CROSS)
     theme.legend_below(figure, axes.flat)
     return figure
 
 
-def _scale(dataset: xr.Dataset, output: str) -> float:
-    """Largest value, which decides the prefix of the unit: the full order's, unless it is still."""
-    runs = dataset["outputs"].sel(output=output).where(dataset["status"].isin(FINISHED))
-    reduced = float(abs(runs).fillna(0.0).max())
-    full = dataset.get("reference_outputs", np.nan * dataset["outputs"]).sel(output=output)
-    largest = float(abs(full).max())
-    return largest if largest > STILL * reduced else reduced
-
-
-def draw_history(axis: Axes, runs: Runs, output: str, scale: float) -> dict[str, str]:
-    """One output of all runs, in a unit for values up to `scale`; what crosses mean -> colour.
-
-    Lines end where they leave the surroundings of the full-order signal.
-    """
-    factor, unit = labels.readable_unit(scale, labels.unit_of(runs.full, output))
-    full = factor * runs.full["reference_outputs"].sel(output=output)
-    histories = [factor * curve.run["outputs"].sel(output=output) for curve in runs.curves]
-    axis.set_ylabel(labels.axis_label(runs.full, output, unit))
-    if bool(full.notnull().any()):
-        axis.plot(full["time"], full, label="full order", **FULL)
-    limits = _surroundings(full, histories, factor * scale)
-    if limits:
-        axis.set_ylim(*limits)
-    left: dict[str, str] = {}
-    for curve, history in zip(runs.curves, histories, strict=True):
-        if not limits:
-            axis.plot(history["time"], history, label=curve.text, **curve.style)
-        elif ended := _plot_until_it_leaves(axis, history, curve):
-            left[ended] = curve.style["color"]
-    axis.ticklabel_format(style="plain")
-    axis.locator_params(axis="y", nbins=6)
-    return left
-
-
-def _surroundings(
-    full: xr.DataArray, histories: Sequence[xr.DataArray], scale: float
-) -> tuple[float, float] | None:
-    """Limits that hold the full-order signal and of the others what is near it.
-
-    None where the full order is not known, or stands still.
-    """
+def draw_history(axis: Axes, runs: Runs, output: str) -> None:
+    """One output of all runs, of which is seen what is near the full-order signal."""
+    full = runs.full["reference_outputs"].sel(output=output)
+    histories = [curve.run["outputs"].sel(output=output) for curve in runs.curves]
     low, high = float(full.min()), float(full.max())
     span = high - low
-    if not span > STILL * scale:
-        return None
-    near = [v for h in histories for v in (float(h.min()), float(h.max())) if np.isfinite(v)]
-    lowest = max(min([low, *near]), low - REACH * span)
-    highest = min(max([high, *near]), high + REACH * span)
-    return lowest - 0.05 * span, highest + 0.05 * span
+    kept = [curve.run["status"].item() in FINISHED for curve in runs.curves]
+    ended = [full, *itertools.compress(histories, kept)]
+    largest = max(0.0, *(float(abs(history).max()) for history in ended))
+    # Where the full order is not known, or stands still, all is seen.
+    moves = span > STILL * largest
+    scale = max(abs(low), abs(high)) if moves else largest
+    factor, unit = labels.readable_unit(scale, labels.unit_of(runs.full, output))
+    limits = -np.inf, np.inf
+    if np.isfinite(span):
+        axis.plot(full["time"], factor * full, label="full order", **FULL)
+    if moves:
+        every = np.array([full, *histories])
+        lowest = max(np.nanmin(every), low - REACH * span) - 0.05 * span
+        highest = min(np.nanmax(every), high + REACH * span) + 0.05 * span
+        limits = factor * lowest, factor * highest
+        axis.set_ylim(*limits)
+    for curve, history in zip(runs.curves, histories, strict=True):
+        _plot_until_it_leaves(axis, curve, factor * history, limits)
+    axis.set_ylabel(labels.axis_label(runs.full, output, unit))
+    axis.ticklabel_format(style="plain")
+    axis.locator_params(axis="y", nbins=6)
 
 
-def _plot_until_it_leaves(axis: Axes, history: xr.DataArray, curve: Curve) -> str:
-    """Draw a history up to the first point outside the axes; what the cross there means."""
-    low, high = axis.get_ylim()
-    time, values = history["time"].values, history.values.copy()
-    outside = np.flatnonzero(~((values >= low) & (values <= high)))
-    ended = ""
+def _plot_until_it_leaves(
+    axis: Axes, curve: Curve, history: xr.DataArray, limits: tuple[float, float]
+) -> None:
+    """Draw a history up to its end, or the first point outside the limits; a cross there."""
+    time, values = history["time"].values, history.values
+    outside = np.flatnonzero(~((values >= limits[0]) & (values <= limits[1])))
     # What has failed before its first value has no end.
     if outside.size and np.isfinite(values[0]):
         first = int(outside[0])
-        # A run that has diverged ends without a value.
-        diverged = not np.isfinite(values[first])
-        seen, ended = first - diverged, DIVERGED if diverged else "leaves the axes"
-        place = (time[seen], np.clip(values[seen], low, high))
-        axis.plot(*place, color=curve.style["color"], clip_on=False, **CROSS)
-        values[first + 1 :] = np.nan
+        diverged = bool(np.isnan(values[first]))
+        text = "has diverged" if diverged else "leaves the axes"
+        at = time[first - diverged], np.clip(values[first - diverged], *limits)
+        axis.plot(*at, color=curve.style["color"], label=text, clip_on=False, **CROSS)
+        values = np.where(np.arange(values.size) <= first, values, np.nan)
     axis.plot(time, values, label=curve.text, **curve.style)
-    return ended
 
 
-def _draw_errors(axis: Axes, runs: Runs, output: str, content: str) -> dict[str, str]:
-    """One output's errors over the time; what the crosses mean -> their colour."""
-    if content == "largest error":
-        return draw_largest_errors(axis, runs, output)
-    if content == "error":
-        draw_errors(axis, runs, output)
-        rms = runs.curves[0].run["rms_error"].sel(output=output).item()
-        if len(runs.curves) == 1 and np.isfinite(rms):
-            words = f" RMS error {rms:.2g} {labels.unit_of(runs.full, output)}"
-            axis.set_title(axis.get_title(loc="left") + words)
-        return {}
-    against = next(c.run["outputs"] for c in runs.curves if c.label == "replay")
-    others = [
-        curve._replace(run=curve.run.drop_vars("floor_rms_error").assign(reference_outputs=against))
-        for curve in runs.curves
-        if curve.label != "replay"
-    ]
-    words = content.replace(" ", "\n", 1)
-    draw_errors(axis, runs._replace(curves=others), output, words)
-    return {}
+def _errors(runs: Runs, output: str) -> list[xr.DataArray]:
+    found = [curve.run["outputs"] - curve.run["reference_outputs"] for curve in runs.curves]
+    return [error.sel(output=output) for error in found]
 
 
-def _error(curve: Curve, output: str) -> xr.DataArray:
-    return (curve.run["outputs"] - curve.run["reference_outputs"]).sel(output=output)
-
-
-def draw_errors(axis: Axes, runs: Runs, output: str, kind: str = "") -> None:
+def draw_errors(axis: Axes, runs: Runs, output: str) -> None:
     """Errors over the time, and the RMS error of the best approximation by the first method."""
-    found = [_error(curve, output) for curve in runs.curves]
+    found, own_unit = _errors(runs, output), labels.unit_of(runs.full, output)
     largest = np.fmax.reduce([float(abs(error).max()) for error in found])
-    factor, unit = labels.readable_unit(float(largest), labels.unit_of(runs.full, output))
+    factor, unit = labels.readable_unit(float(largest), own_unit)
     for curve, error in zip(runs.curves, found, strict=True):
         axis.plot(error["time"], factor * error, label=curve.text, **curve.style)
     held = [c.run["floor_rms_error"] for c in runs.curves if "floor_rms_error" in c.run]
@@ -280,53 +221,54 @@ def draw_errors(axis: Axes, runs: Runs, output: str, kind: str = "") -> None:
     if best is not None:
         shade = {"color": "#BBBBBB", "alpha": 0.5, "label": "RMS of the best approximation"}
         axis.axhspan(-best, best, **shade)
-    axis.set_ylabel(
-        f"{kind} ({unit})" if kind else labels.error_label(runs.full, "error", output, unit)
-    )
+    rms = runs.curves[0].run["rms_error"].sel(output=output).item()
+    if len(runs.curves) == 1 and np.isfinite(rms):
+        axis.set_title(f"{axis.get_title(loc='left')} RMS error {rms:.2g} {own_unit}")
+    axis.set_ylabel(labels.error_label(runs.full, "error", output, unit))
 
 
-def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> dict[str, str]:
+def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> None:
     """Largest error in each control period, the RMS error at the right edge."""
     published = rms_numbers(str(runs.full.attrs.get("model"))).get(output)
-    last = float(runs.full["time"][-1])
-    period = (published.control_period if published else None) or last / 50.0
-    ended: dict[str, str] = {}
+    time = runs.full["time"].values
+    period = (published.control_period if published else None) or time[-1] / 50.0
+    # A sample between two periods belongs to the one that ends there.
+    window = np.maximum(np.ceil(time / period - 1e-9).astype(int) - 1, 0)
+    numbers, first = np.unique(window, return_index=True)
+    edges = period * np.append(numbers, numbers[-1] + 1)
     marked: list[float] = []
-    for number, curve in enumerate(runs.curves):
-        edges, largest = _largest(abs(_error(curve, output)), period)
-        largest[largest == 0.0] = np.nan
-        axis.semilogy(edges, largest, label=curve.text, drawstyle="steps-post", **curve.style)
-        color, status = curve.style["color"], str(curve.run["status"].item())
-        if status in FINISHED:
-            rms = curve.run["rms_error"].sel(output=output).item()
-            at = 1.0 + min(0.03, 0.12 / len(runs.curves)) * number, rms or np.nan
-            marked += [rms] if rms else []
-            edge = axis.get_yaxis_transform()
-            axis.plot(*at, color=color, transform=edge, clip_on=False, **RMS_MARK)
-        elif status == "diverged" and np.isfinite(largest).any():
-            end = int(np.flatnonzero(np.isfinite(largest[:-1]))[-1])
-            ended[DIVERGED] = color
-            axis.plot(edges[end + 1], largest[end], color=color, **CROSS)
-    axis.plot([], [], color="black", label="RMS error over the run", **RMS_MARK)
+    for number, (curve, error) in enumerate(zip(runs.curves, _errors(runs, output), strict=True)):
+        largest = np.fmax.reduceat(abs(error.values), first)
+        largest = np.where(largest == 0.0, np.nan, largest)
+        known = np.flatnonzero(np.isfinite(largest))
+        if curve.run["status"].item() == "diverged" and known.size:
+            at = edges[known[-1] + 1], largest[known[-1]]
+            axis.plot(*at, color=curve.style["color"], label="has diverged", **CROSS)
+        steps = np.append(largest, largest[-1])
+        axis.semilogy(edges, steps, label=curve.text, drawstyle="steps-post", **curve.style)
+        rms = curve.run["rms_error"].sel(output=output).item()
+        if str(curve.run["status"].item()) in FINISHED and rms:
+            at = 1.0 + min(0.03, 0.12 / len(runs.curves)) * number
+            edge: Style = {"transform": axis.get_yaxis_transform(), "clip_on": False}
+            axis.plot(at, rms, color=curve.style["color"], **edge, **RMS_MARK)
+            marked.append(rms)
+    axis.plot([], [], color="black", label="RMS error over the run (right edge)", **RMS_MARK)
     if published:
         line: Style = {"color": "black", "linestyle": ":", "label": "published RMS error"}
         axis.axhline(published.value, **line)
     hide_rounding(axis)
     axis.set_ylim(bottom=min([axis.get_ylim()[0], *(0.5 * rms for rms in marked)]))
-    tick_decades(axis.yaxis, *axis.get_ylim(), subs=(1.0, 3.0))
+    tick_decades(axis.yaxis, *axis.get_ylim())
     words = f"largest error of {labels.label_of(output).symbol}"
     words = words if len(words) <= LINE else words.replace(" of ", "\nof ", 1)
     axis.set_ylabel(f"{words}\nin each {period:.2g} s ({labels.unit_of(runs.full, output)})")
-    return ended
 
 
-def _largest(error: xr.DataArray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (n + 1,) of the periods in s and the largest error in each, the last one repeated."""
-    # A sample between two periods belongs to the one that ends there.
-    window = np.maximum(np.ceil(error["time"].values / period - 1e-9).astype(int) - 1, 0)
-    numbers = np.arange(window[-1] + 1)
-    largest = np.array([np.fmax.reduce(error.values[window == k]) for k in numbers])
-    return period * np.arange(window[-1] + 2), np.append(largest, largest[-1])
+DRAWN: Mapping[str, Callable[[Axes, Runs, str], None]] = {
+    "history": draw_history,
+    "error": draw_errors,
+    "largest error": draw_largest_errors,
+}
 
 
 def figure_paths(
@@ -390,7 +332,6 @@ def _draw_distances(axis: Axes, curves: Sequence[Curve]) -> None:
         ahead, aside = positions(curve.run["outputs"])
         away = np.hypot(ahead - x, aside - y)
         away[away == 0.0] = np.nan
-        if np.isfinite(away).any():
-            axis.semilogy(x, away, label=curve.text, **curve.style)
+        axis.semilogy(x, away, label=curve.text, **curve.style)
     hide_rounding(axis)
     axis.set_ylabel("distance (m)")

@@ -1,22 +1,25 @@
-"""One look for all figures: lines, panels, legends, and the files that they are written to."""
+"""One look for all figures: lines, panels, axes, legends, and the files they are written to."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib.style
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
-from vehiclemor.arguments import quoted
+from vehiclemor.arguments import count, quoted
 from vehiclemor.errors import InputError
 from vehiclemor.files import write_whole
 from vehiclemor.report.labels import MARK, TRAINED
 from vehiclemor.report.printing import alphabetic
+from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
 Results = Mapping[str, "xr.Dataset"]
 Style = dict[str, Any]
@@ -52,6 +55,11 @@ STYLES: dict[str, Style] = {
 }
 # Of a legend in inches: what stands beside a text, and a letter of it.
 HANDLE, LETTER = 0.55, 0.068
+UNITS = {"control_period": "s"}
+# Ratio of the largest to the smallest number from which on an axis is logarithmic; letters of the
+# names that there is room for on an axis; decades up to which one has 1, 2 and 5; what is below is
+# written with a power of ten.
+WIDE, LETTERS, FEW_DECADES, SMALL = 30.0, 60, 2.5, 1e-4
 
 
 def styles(methods: Iterable[str]) -> dict[str, Style]:
@@ -81,8 +89,78 @@ def letter(number: int, title: str = "") -> str:
     return f"({alphabetic(number)}) {title}".rstrip()
 
 
+class Places(NamedTuple):
+    """Places of the values of a dimension.
+
+    Attributes
+    ----------
+    at
+        Perturbations in %, numbers, or 0, 1, 2 ... of what has `names` (values,).
+    label
+        Of the axis, with its unit.
+    names
+        Texts at the places, none where the axis is one of numbers.
+    """
+
+    at: np.ndarray
+    label: str
+    names: Sequence[str] = ()
+
+    def tick(self, axis: Axis) -> None:
+        """Label an axis."""
+        axis.set_label_text(self.label)
+        if self.names:
+            room = max(1, LETTERS // max(map(len, self.names)))
+            step = -(-len(self.names) // min(12, room))
+            axis.set_ticks(self.at[::step], list(self.names)[::step])
+        elif self.at.dtype.kind == "i":
+            axis.set_major_locator(MaxNLocator(nbins=8, integer=True))
+
+    def scale(self, panel: Axes) -> None:
+        """Label the lower axis of a panel, logarithmic where the numbers ask for it."""
+        if self.names:
+            panel.set_xlim(-0.5, len(self.names) - 0.5)
+        elif 0.0 < WIDE * self.at.min() <= self.at.max():
+            panel.set_xscale("log")
+        self.tick(panel.xaxis)
+
+    def even(self) -> "Places":
+        """Cells of one size: numbers at unequal distances become names."""
+        steps = np.diff(self.at)
+        if self.names or np.allclose(steps, steps.mean(), rtol=1e-6):
+            return self
+        names = [f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for value in self.at]
+        return Places(np.arange(len(names)), self.label, names)
+
+
+def places_of(dataset: xr.Dataset, name: str) -> Places:
+    """Places of a dimension of a grid, or of a coordinate on one."""
+    values, words = dataset[name].values, name.removeprefix(PARAMETER).replace("_", " ")
+    if name in FACTORS:
+        return Places(100.0 * (values - 1.0), f"{words.removesuffix(' factor')} perturbation (%)")
+    if not np.issubdtype(values.dtype, np.number):
+        return Places(np.arange(len(values)), words, [str(value) for value in values])
+    unit = str(dataset[name].attrs.get("units", UNITS.get(name, "1")))
+    return Places(values, words if unit == "1" else f"{words} ({unit})")
+
+
+def tick_decades(axis: Axis, low: float, high: float) -> None:
+    """Ticks of a logarithmic axis: some of each decade where there are few decades."""
+    if np.log10(high / low) < FEW_DECADES:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        powers = LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
+        axis.set_major_formatter("{x:g}" if low >= SMALL else powers)
+        axis.set_minor_formatter(NullFormatter())
+
+
+def hide_rounding(axis: Axes) -> None:
+    """A logarithmic axis ends six decades below its largest value."""
+    low, high = axis.get_ylim()
+    axis.set_ylim(max(low, 1e-6 * high), high)
+
+
 def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
-    """The one legend, below all panels, of the lines in some of them, in all columns with room."""
+    """The one legend, below all panels, of the lines in some of them."""
     shown = {text: h for a in axes for h, text in zip(*a.get_legend_handles_labels(), strict=True)}
     for legend in list(figure.legends):
         legend.remove()
@@ -92,13 +170,13 @@ def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
 
     def width(columns: int) -> float:
         parts = np.array_split(lengths, columns)
-        return sum(HANDLE + LETTER * max(part, default=0) for part in parts)
+        return sum(HANDLE + LETTER * max(part) for part in parts)
 
     fitting = (n for n in range(len(shown), 1, -1) if width(n) <= figure.get_figwidth())
-    title = f"{MARK} {TRAINED}" if any(MARK in text for text in shown) else None
-    where, columns = "outside lower center", next(fitting, 1)
     # As few columns as the rows need, so that none stands almost empty.
-    columns = -(-len(shown) // -(-len(shown) // columns))
+    columns = -(-len(shown) // -(-len(shown) // next(fitting, 1)))
+    title = f"{MARK} {TRAINED}" if any(MARK in text for text in shown) else None
+    where = "outside lower center"
     figure.legend(shown.values(), shown, loc=where, ncols=columns, title=title)
 
 
@@ -120,9 +198,8 @@ def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[No
     InputError
         If there is no such style, or the resolution makes no sense.
     """
-    if dpi is not None and not (isinstance(dpi, int | np.integer) and 10 <= dpi <= 2400):
-        raise InputError(f"dpi is {quoted(dpi)}; it is a whole number from 10 to 2400 dots an inch")
-    changes = [OWN_STYLE, *([style] if style else []), {"savefig.dpi": dpi} if dpi else {}]
+    dots = {} if dpi is None else {"savefig.dpi": count("dpi", dpi, 10, 2400)}
+    changes = [OWN_STYLE, *([style] if style else []), dots]
     try:
         with matplotlib.style.context(changes):
             pass
