@@ -67,7 +67,7 @@ def protocol_results(small, name):
     found = small.isel({d: np.arange(n) % small.sizes[d] for d, n in places.items()})
     found = found.assign_coords(label=labels, output=outputs).copy(deep=True)
     by_row = {"method": methods, "role": roles, "settings": ["{}"] * len(rows)}
-    by_row["contestant"] = [label.rsplit(" ", 1)[0] for label in labels]
+    by_row["series"] = [label.rsplit(" ", 1)[0] for label in labels]
     by_row["winner"] = np.arange(len(rows)) == roles.index("contender")
     found = found.assign({name: ("label", values) for name, values in by_row.items()})
     rng = np.random.default_rng(2)

@@ -13,8 +13,7 @@ from scipy.stats import binom
 
 import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.report.predictive.equal_error import at_error
-from vehiclemor.report.predictive.targets import upper_bound
+from vehiclemor.report.unseen import at_error, upper_bound
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.drawn_runs import drawn, drawn_sets
 from vehiclemor.study.plans.protocol import load_protocol

@@ -3,7 +3,7 @@
 
 def cite() -> int:
     """Print how to cite this suite, the paper, and the methods with a reference of their own."""
-    from vehiclemor.report.citation import citations
+    from vehiclemor.report.published import citations
 
     print(citations())
     return 0

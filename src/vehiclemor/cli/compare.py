@@ -41,10 +41,10 @@ def compare(
     seed
         Draws fresh test runs for an audit: of predictive, or of a protocol.
     """
-    from vehiclemor.report.comparison import kinds, screens
+    from vehiclemor.report import comparison, screens
     from vehiclemor.report.printing import json_text
 
     with shown_progress():
-        rows = kinds.compare(what, out, jobs, seed)
+        rows = comparison.compare(what, out, jobs, seed)
     print(json_text(rows) if json_output else screens.comparison_text(what, rows, out, every))
     return MISSED if check and "verdict" in rows and "missed" in set(rows["verdict"]) else 0

@@ -91,8 +91,8 @@ def simulate(
         training=training,
         **chosen,
     )
+    from vehiclemor.report.printing import simulation_text
     from vehiclemor.report.shown import tabled_outputs
-    from vehiclemor.report.simulation import simulation_text
 
     shown = ready.outputs if all_outputs else tabled_outputs(ready.definition)
     print(simulation_text(dataset, shown, ready.counts))

@@ -59,7 +59,6 @@ class TablesFile(FileSchema):
     algebraic: OfKind
     dynamic: OfKind
     reduced: dict[str, list[Case]]
-    settings: dict[str, list[str]]
 
 
 @cache

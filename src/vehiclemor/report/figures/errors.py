@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 
 from vehiclemor.errors import InputError
 from vehiclemor.report import labels
-from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.error_map import figure_map
 from vehiclemor.report.figures.runs import legend_of
 from vehiclemor.report.figures.scales import FEW_DECADES, Places, places_of, tick_decades
 from vehiclemor.report.figures.theme import CROSS, MARKERS, THIN, ZERO, Results, Style
+from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER

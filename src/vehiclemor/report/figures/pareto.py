@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from vehiclemor.report.figures.scales import tick_decades
 from vehiclemor.report.figures.theme import COLORS, MARKERS, THIN, Results, Style, panels
-from vehiclemor.report.predictive.rows import method_rows, protocol_of
+from vehiclemor.report.unseen import method_rows, protocol_of
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 # Letters of a title in a line.
@@ -37,7 +37,7 @@ def figure_pareto(results: Results, *, titled: bool = False) -> Figure:
     lines: dict[str, list[tuple[float, float, float]]] = {}
     for row in sorted(rows, key=lambda row: json.loads(row["settings"]).get("tolerance", 0.0)):
         if row["role"] == FULL_ORDER:
-            name = str(row["contestant"]).removeprefix("full order")
+            name = str(row["series"]).removeprefix("full order")
             points = lines.setdefault(f"full order, {name}".removesuffix(", "), [])
             if np.isfinite(row["score"]) and row["score"] > 0.0:
                 points.append((row["seconds"] * 1e6, row["score"], row["spread"]))

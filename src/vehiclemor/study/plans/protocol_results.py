@@ -57,7 +57,7 @@ def protocol_dataset(
     dataset = dataset.assign_coords(label=labels)
     per_row: dict[str, list[Any]] = {
         "role": [row.entry.role for row in rows],
-        "contestant": [row.entry.label for row in rows],
+        "series": [row.entry.label for row in rows],
         "winner": [row.winner for row in rows],
         "method": [row.entry.method for row in rows],
         "settings": [_settings(row) for row in rows],
