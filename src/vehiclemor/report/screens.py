@@ -55,10 +55,6 @@ def comparison_text(what: str, rows: pd.DataFrame, folder: Path, every: bool = F
     return "\n\n".join(map(str, parts))
 
 
-def _records(rows: pd.DataFrame) -> list[Row]:
-    return [{str(key): value for key, value in row.items()} for row in rows.to_dict("records")]
-
-
 def _by(rows: Sequence[Row], key: str) -> dict[Any, list[Row]]:
     """Rows by the value of a column."""
     found: dict[Any, list[Row]] = {}
@@ -72,7 +68,7 @@ def _by(rows: Sequence[Row], key: str) -> dict[Any, list[Row]]:
 
 def paper_parts(rows: pd.DataFrame) -> list[Part]:
     """One screen: the printed errors and times, counts of the verdicts, what is missed."""
-    records = _records(rows)
+    records: list[Row] = rows.to_dict("records")
     errors = [row for row in records if "_rms_" in row["id"]]
     times = [row for row in records if "_time_reduction" in row["id"]]
     claims = [row for row in records if row not in errors and row not in times]
@@ -95,9 +91,8 @@ def _printed(rows: list[Row], text: Callable[[Row], str]) -> list[Row]:
     """A line of each printed number: default and literal settings side by side."""
     lines = []
     for own in _by(rows, "id").values():
-        found = {row["variant"]: f"{text(row)} {VERDICTS[row['verdict']]}" for row in own}
-        line = own[0] | {name: found.get(name) for name in ("default", "literal")}
-        lines.append(line | {"of": own[0]["model"].replace("_", " ")})
+        found = {f"pod_{r['variant']}": f"{text(r)} {VERDICTS[r['verdict']]}" for r in own}
+        lines.append(own[0] | found | {"of": own[0]["model"].replace("_", " ")})
     return lines
 
 
@@ -109,7 +104,7 @@ def _errors(rows: list[Row]) -> Table:
     empty = [f"{r['paper_error']} ({r['of']})" for r in lines if r["signal_rms"] <= r["published"]]
     note = f"signal: {column('signal_rms').meaning}; literal: settings by the paper's words"
     note += f".  Empty bounds, which zero would meet: {', '.join(empty)}" if empty else ""
-    columns = ("paper_error", "published", "signal_rms", "default", "literal", "unit")
+    columns = ("paper_error", "published", "signal_rms", "pod_default", "pod_literal", "unit")
     return Table(lines, columns, group="of", explain=False, below=f"({note}.)")
 
 
@@ -120,7 +115,7 @@ def _times(rows: list[Row]) -> Table:
         line["published_time"] = 1.0 - line["published"]
         states = line["item"].removeprefix("simulation time saved").partition(" (figure")[0]
         line["paper_time"] = f"{line['of']}{states.replace(' with ', ', ')}"
-    columns = ("paper_time", "published_time", "default", "literal", "strongest")
+    columns = ("paper_time", "published_time", "pod_default", "pod_literal", "strongest")
     return Table(lines, columns)
 
 
@@ -151,7 +146,7 @@ def claim_parts(rows: pd.DataFrame) -> list[Part]:
     )
     columns = ("variant", "limit", "reproduced", "best", "replay", "word")
     parts: list[Part] = [wrapped(note)]
-    for model, own in _by(_records(rows), "model").items():
+    for model, own in _by(rows.to_dict("records"), "model").items():
         lines = []
         for row in own:
             unit = "" if row["unit"] in ("1", "-") else f", {row['unit']}"
@@ -173,7 +168,7 @@ def _judged(row: Row) -> Row:
 
 def _model_parts(name: str, rows: pd.DataFrame, folder: Path) -> list[Part]:
     """Errors of every method in nominal and perturbed runs, costs, modes, unseen inputs."""
-    kinds = _by(_records(rows), "kind")
+    kinds = _by(rows.to_dict("records"), "kind")
     nominal, perturbed = _by(kinds[ERRORS], "study").values()
     key = ("start", "label", "output")
     largest = {tuple(row[k] for k in key): row for row in perturbed}
@@ -206,7 +201,7 @@ def _ended(row: Row | None) -> float | str:
 
 def study_parts(rows: pd.DataFrame) -> list[Part]:
     """Grids, then protocols."""
-    records = _records(rows)
+    records: list[Row] = rows.to_dict("records")
     grids = [row for row in records if row["kind"] == ERRORS]
     parts = [part for own in _by(grids, "study").values() for part in _grid_parts(own)]
     judged = [row for row in records if row["kind"] != ERRORS]

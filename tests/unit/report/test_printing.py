@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import vehiclemor as vm
+from vehiclemor.report.labels import Column, column
 from vehiclemor.report.printing import simulation_text, table, width
 
 ROWS = pd.DataFrame(
