@@ -1,6 +1,7 @@
 """The paper's claims as criteria that can fail: figures 3, 6, 10 to 14, and statements."""
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -107,7 +108,7 @@ def angle_diverges_at_end(results: Results, label: str) -> Finding:
 def shorter_period_reduces_deviation(results: Results, label: str) -> Finding:
     """Figure 11: a shorter control period reduces the angle's deviation."""
     data = at_point(results["figure-11-control-period"], label).sel(output=ANGLE)
-    errors = (data["rms_error"] / data["rms_error"].sel(control_period=5.0)).to_series()
+    errors: Any = (data["rms_error"] / data["rms_error"].sel(control_period=5.0)).to_series()
     shorter, counts = errors[errors.index < 5.0], data["iterations"].to_series()
     listed = ", ".join(f"{ratio:.3g} at {period:g} s" for period, ratio in shorter.items())
     iterations = ", ".join(f"{count:.0f} at {period:g} s" for period, count in counts.items())

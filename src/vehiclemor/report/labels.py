@@ -60,8 +60,8 @@ class Column(NamedTuple):
     scale: float = 1.0
 
 
-# Formats of counts, and of errors: of these an exact zero is a dash.
-COUNT, ERROR = ".0f", ".1e"
+# Format of errors: an exact zero is a dash, since orders of magnitude are compared.
+ERROR = ".1e"
 
 
 class LabelFile(FileSchema):

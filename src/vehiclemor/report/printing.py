@@ -49,8 +49,9 @@ class Table:
         return "\n".join(filter(None, parts))
 
     def __html__(self) -> str:
-        words = [f"<p>{escape(text)}</p>" if text else "" for text in (self.title, self.below)]
-        return words[0] + self._table("html") + words[1]
+        caption = f"<h3>{escape(self.title)}</h3>" if self.title else ""
+        below = f"<p>{escape(self.below)}</p>" if self.below else ""
+        return caption + self._table("html") + below
 
     def _table(self, to: Format) -> str:
         own = {"group": self.group, "note": self.note}
