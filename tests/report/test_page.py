@@ -11,7 +11,7 @@ import pytest
 import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.report import page
-from vehiclemor.report.unseen import method_rows, protocol_of
+from vehiclemor.report.unseen import method_rows, protocol_of, target_rows
 from vehiclemor.study.netcdf_file import read_dataset
 
 HOSTILE = "</title></script><script>alert(1)</script> & \"x\" 'y' --> <!-- ${z} {{ 1 + 1 }}"
@@ -121,6 +121,18 @@ def test_a_protocol_shows_its_methods_and_targets(made, read):
     assert costs["call, us"] == row["seconds"]
     targets = table(read, "target for fixed basis")
     assert {own["verdict"] for own in targets} <= {"met", "missed", "not comparable"}
+
+
+def test_targets_tell_detected_misses_and_full_order_within_the_bounds(made):
+    dataset = dataset_of(made[0], "unseen")
+    protocol, (full, won) = protocol_of(dataset), method_rows(dataset, protocol_of(dataset))
+    assert won["within"] == full["label"]
+    targets = target_rows(dataset, protocol, [full, won | {"misses": 3, "silent": 1}])
+    found = {row["item"]: row["measured"] for row in targets}
+    assert (found["silent misses"], found["flagged misses"]) == (1, 2)
+    wrong = dataset.copy(deep=True)
+    wrong["rms_error"].loc[{"label": full["label"]}] = 1.0
+    assert [row["within"] for row in method_rows(wrong, protocol)] == ["", ""]
 
 
 def test_a_large_grid_is_summed_up(made, monkeypatch):

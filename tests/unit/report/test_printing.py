@@ -66,6 +66,7 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
     found = [line.split()[-3:] for line in lines if line.startswith(("a|b", "plain"))]
     # An exact zero is no order of magnitude.
     assert found == [["1.2e-05", "-", "3"], ["-", "12.3", "0"]]
+    assert table([{"score": 0.0}], explain=False).split()[-1] == "0"
     plain = " ".join(text.split())
     for name in ("floor", "score", "misses"):
         assert plain.count(column(name).meaning) == 1
