@@ -98,6 +98,8 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: S
     }
     for name, (output, measure) in error_columns(protocol).items():
         errors: Any = part[f"{measure}_error"].sel(output=output).to_series()
+        # Of the runs that have come to their end.
+        errors = errors[np.isfinite(errors)]
         row |= {f"worst_{name}": float(errors.max()), f"most_{name}": float(errors.quantile(0.99))}
     # Means over the runs that were timed; the spread of all of them together.
     clocks = [name for name in (*CLOCKS, "seconds_lower", "seconds_upper") if name in part]
