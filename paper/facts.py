@@ -97,11 +97,11 @@ def selected(dataset: xr.Dataset, query: str) -> xr.DataArray:
 def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     """A study, or a table of the report; what the folder lacks is run first."""
     import pandas as pd
+    from regenerate import operation_table
 
-    from vehiclemor.report.comparison.kinds import study_comparison
+    from vehiclemor.report.comparison import study_comparison
     from vehiclemor.report.costs import cost_table
     from vehiclemor.report.published import load_published
-    from vehiclemor.report.tables import operation_table
     from vehiclemor.study.run import run_studies
 
     kind, _, model = source.partition(" ")

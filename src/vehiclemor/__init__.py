@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from vehiclemor.online.model_file import load as load
     from vehiclemor.online.model_file import rom as rom
     from vehiclemor.online.rom import reduce as reduce
-    from vehiclemor.report.comparison.kinds import compare as compare
+    from vehiclemor.report.comparison import compare as compare
     from vehiclemor.report.page import write_report as write_report
     from vehiclemor.report.regenerate import figures as figures
     from vehiclemor.report.study_formats import convert as convert
@@ -44,7 +44,7 @@ _DEFINED_IN = {
     "VehiclemorError": "vehiclemor.errors",
     "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
-    "compare": "vehiclemor.report.comparison.kinds",
+    "compare": "vehiclemor.report.comparison",
     "figures": "vehiclemor.report.regenerate",
     "maneuver": "vehiclemor.inputs.maneuver",
     "many_signals": "vehiclemor.inputs.signal",

@@ -14,7 +14,7 @@ from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.theme import styled
 from vehiclemor.report.frames import frame, grid_rows
-from vehiclemor.report.page import error_tables
+from vehiclemor.report.page import error_table
 from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
 
@@ -120,7 +120,7 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     now = {(r["label"], r["start"], r["output"]): r["warned"] for r in grid_rows(data)}
     more = {key[:2] for key, count in now.items() if count != before[key]["warned"]}
     assert more == {("mine", "dropped")}
-    (table,) = error_tables(data).values()
+    table = error_table(data)
     told = [status for status in table["status"] if status.endswith("Mars")]
     assert told == ["ok (trained on this run): not driven; not to be trusted on Mars"]
     data["status"][:] = "diverged"

@@ -5,13 +5,13 @@ import re
 import shutil
 from xml.etree import ElementTree
 
+import pandas as pd
 import pytest
 
 import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.report import page
-from vehiclemor.report.comparison.rows import COLUMNS
-from vehiclemor.report.predictive.rows import method_rows, protocol_of
+from vehiclemor.report.unseen import method_rows, protocol_of, target_rows
 from vehiclemor.study.netcdf_file import read_dataset
 
 HOSTILE = "</title></script><script>alert(1)</script> & \"x\" 'y' --> <!-- ${z} {{ 1 + 1 }}"
@@ -42,7 +42,7 @@ def table(page, heading):
     for element in page.iter("table"):
         heads, *rows = ([value(cell) for cell in row] for row in element.iter("tr"))
         if heading in heads:
-            return [dict(zip(heads, row, strict=True)) for row in rows]
+            return [dict(zip(heads, row, strict=True)) for row in rows if len(row) == len(heads)]
     raise AssertionError(heading)
 
 
@@ -110,39 +110,61 @@ def test_provenance_and_settings_stand_there(made, read):
         assert str(dataset.attrs[name]) in texts(read, "dd")
 
 
-def test_a_protocol_shows_its_contestants_and_targets(made, read):
+def test_a_protocol_shows_its_methods_and_targets(made, read):
     dataset = dataset_of(made[0], "unseen")
     expected = {row["label"]: row for row in method_rows(dataset, protocol_of(dataset))}
-    rows = {row["label"]: row for row in table(read, "ratio equal")}
-    for name in ("misses", "score", "seconds"):
-        assert float(rows["fixed basis"][name]) == expected["fixed basis"][name]
-    targets = table(read, "threshold source")
-    assert {row["verdict"] for row in targets} <= {"met", "missed", "not comparable"}
-    assert {row["threshold source"] for row in targets} == {"ours"}
+    row = expected["fixed basis"]
+    label = "fixed basis (chosen)"
+    (errors,) = (own for own in table(read, "worst error") if own["method"] == label)
+    (costs,) = (own for own in table(read, "times faster") if own["method"] == label)
+    assert (float(errors["missed"]), errors["worst error"]) == (row["misses"], row["score"])
+    assert costs["call, us"] == row["seconds"]
+    targets = table(read, "target for fixed basis")
+    assert {own["verdict"] for own in targets} <= {"met", "missed", "not comparable"}
+
+
+def test_targets_tell_detected_misses_and_full_order_within_the_bounds(made):
+    dataset = dataset_of(made[0], "unseen")
+    protocol, (full, won) = protocol_of(dataset), method_rows(dataset, protocol_of(dataset))
+    assert won["within"] == full["label"]
+    targets = target_rows(dataset, protocol, [full, won | {"misses": 3, "silent": 1}])
+    found = {row["item"]: row["measured"] for row in targets}
+    assert (found["silent misses"], found["flagged misses"]) == (1, 2)
+    wrong = dataset.copy(deep=True)
+    wrong["rms_error"].loc[{"label": full["label"]}] = 1.0
+    assert [row["within"] for row in method_rows(wrong, protocol)] == ["", ""]
 
 
 def test_a_large_grid_is_summed_up(made, monkeypatch):
     monkeypatch.setattr(page, "MOST_ROWS", 5)
-    dataset = dataset_of(made[0], "hostile")
-    (table,) = page.error_tables(dataset).values()
-    errors = dataset["rms_error"].sel({"label": "pod", "output": "spindle_y"})
-    row = table.set_index("label").loc["pod"]
-    found = [row[f"RMS error of spindle_y (m): {w}"] for w in ("count", "min", "median", "max")]
-    assert found == [3, errors.min(), errors.median(), errors.max()]
+    out = vm.write_report(str(made[0] / "hostile.toml"), made[0] / "b.html", made[0])
+    read = parsed(out.read_text(encoding="utf-8"))
+    assert "cell" not in texts(read, "th")
+    errors = dataset_of(made[0], "hostile")["rms_error"].sel(
+        label="pod", output="second_euler_angle"
+    )
+    row = next(r for r in table(read, "largest") if r["largest"] == float(errors.max()))
+    assert row["median"] == float(errors.median())
 
 
 def test_the_paper_is_judged(made, monkeypatch):
-    row = dict.fromkeys(COLUMNS, "") | {"model": "m", "verdict": "missed", "reproduced": 0.5}
-    rows = page.pd.DataFrame([row, row | {"verdict": "not_comparable"}])
+    rows = pd.DataFrame(
+        {
+            "id": ["a", "b"],
+            "model": "m",
+            "item": ["that it holds", "that it does not"],
+            **dict.fromkeys(("variant", "measure", "reason", "threshold_source"), "x"),
+            **dict.fromkeys(("published", "bound", "reproduced", "floor", "replay"), 0.5),
+            "unit": "1",
+            "verdict": ["missed", "not_comparable"],
+        }
+    )
     monkeypatch.setattr(page, "paper_comparison", lambda *_: rows)
     monkeypatch.setattr(page, "run_studies", lambda *_: {})
     out = vm.write_report("paper", made[0] / "paper.html", made[0])
-    text = out.read_text(encoding="utf-8")
-    assert [row["verdict"] for row in table(parsed(text), "variant")] == [
-        "missed",
-        "not comparable",
-    ]
-    assert "2 rows: 1 missed, 1 not comparable" in text
+    read = parsed(out.read_text(encoding="utf-8"))
+    verdicts = [row["verdict"] for row in table(read, "settings") if "verdict" in row]
+    assert verdicts == ["missed", "not comparable"]
 
 
 def test_a_damaged_file_is_named_and_left_out(made, tmp_path):

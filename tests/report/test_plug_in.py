@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from regenerate import model_tables
 
 from vehiclemor import registry
 from vehiclemor.cli import main
 from vehiclemor.registry import component
+from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.default_studies import nominal, unseen
 from vehiclemor.report.figures import theme
-from vehiclemor.report.frames import study_tables
 from vehiclemor.report.shown import tabled_outputs, timing_cases
-from vehiclemor.report.tables import model_tables
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
 CAR = "quarter_car"
@@ -41,19 +41,17 @@ def test_costs_have_a_row_for_every_case_and_start(tables):
 
 
 def test_errors_have_every_method_and_output(tables):
-    errors = tables["errors"]
-    assert set(errors["label"]) >= METHODS
-    replayed = errors[(errors["label"] == "replay") & (errors["study"] == f"{CAR}-perturbed")]
-    full = errors[errors["label"] == "full_order"]
+    assert set(tables) == {"costs", "errors", "operations", "spectrum"}
+    errors = tables["errors"].set_index(["study", "label", "start", "output"])["largest"]
+    assert set(tables["errors"]["label"]) >= METHODS
     for output in tabled_outputs(component("model", CAR)):
+        full, replayed = (
+            errors.loc[f"{CAR}-perturbed", label, "equilibrium", output]
+            for label in ("full_order", "replay")
+        )
         # The reference is more accurate than the integrator that is compared.
-        assert 0.0 < full[f"rms_{output}"].max() < 1e-3 * replayed[f"rms_{output}"].max()
-    nominal = (replayed["frequency_factor"] == 1.0) & (replayed["amplitude_factor"] == 1.0)
-    assert ((replayed["rms_tire_force"] == 0.0) == nominal).all()
-
-
-def test_it_has_every_table(tables):
-    assert set(tables) == {"costs", "errors", "operations", "quantities", "spectrum"}
+        assert 0.0 < full < 1e-3 * replayed
+        assert errors.loc[f"{CAR}-nominal", "replay", "equilibrium", output] == 0.0
 
 
 def test_comparison_names_every_method(folder, capsys):
@@ -88,8 +86,6 @@ def test_a_plug_ins_method_stands_beside_the_others(tmp_path, monkeypatch):
     mine = EntryPoint("mine", known["fixed_basis"].value, registry.GROUPS["method"])
     entries = {"method": {**known, "mine": mine}}
     monkeypatch.setattr(registry, "_entries", lambda kind: entries.get(kind) or real(kind))
-    table = study_tables(CAR, [nominal(CAR, tmp_path)], tmp_path).set_index("label")
-    for output in tabled_outputs(component("model", CAR)):
-        errors = table[f"rms_{output}"]
-        assert list(errors.loc["mine"]) == list(errors.loc["fixed_basis"])
+    table = study_comparison(nominal(CAR, tmp_path), tmp_path).set_index("label")
+    assert list(table.loc["mine", "largest"]) == list(table.loc["fixed_basis", "largest"])
     assert 'method = "mine"' in Path(unseen(CAR, tmp_path)).read_text()

@@ -10,10 +10,9 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.reduction.methods import fixed_basis
-from vehiclemor.report.comparison.kinds import study_comparison
-from vehiclemor.report.comparison.screens import comparison_text
-from vehiclemor.report.predictive.rows import method_rows, protocol_of
-from vehiclemor.report.predictive.targets import target_rows
+from vehiclemor.report.comparison import study_comparison
+from vehiclemor.report.screens import comparison_text
+from vehiclemor.report.unseen import method_rows, protocol_of, target_rows
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study import evaluate, timing
 from vehiclemor.study.plans.choice import choose

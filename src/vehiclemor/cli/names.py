@@ -99,6 +99,6 @@ def _by_source(key: str, rows: list[dict[str, Any]]) -> dict[str, list[dict[str,
 
 def cite() -> None:
     """Print how to cite this suite, the paper, and the methods with a reference of their own."""
-    from vehiclemor.report.citation import citations
+    from vehiclemor.report.published import citations
 
     print(citations())

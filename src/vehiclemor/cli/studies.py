@@ -109,8 +109,8 @@ def compare(
     check
         Exit with status 1 if a bound of the paper or a target of a protocol is missed.
     """
-    from vehiclemor.report.comparison.screens import comparison_text
     from vehiclemor.report.printing import json_text
+    from vehiclemor.report.screens import comparison_text
 
     with shown_progress():
         rows = vm.compare(what, results, jobs, seed)
@@ -146,15 +146,18 @@ def figures(
     chosen = [name.strip() for name in (only or "").split(",") if name.strip()]
     if only is not None and not chosen:
         raise InputError(f"--only {only!r} names no figure")
-    from vehiclemor.report.regenerate import left_out, regenerate_figures
+    from vehiclemor.report import regenerate
 
+    failed: dict[str, str] = {}
     with shown_progress():
-        written, failed = regenerate_figures(results, out, chosen, jobs, style=style, dpi=dpi)
+        written = regenerate.figures(
+            chosen, out, results, jobs, style=style, dpi=dpi, failed=failed
+        )
     for path in written:
         print(path)
     for name, why in failed.items():
         print(f"figure {name} can't be drawn: {why}", file=sys.stderr)
-    missing = {} if chosen else left_out(results)
+    missing = {} if chosen else regenerate.left_out(results)
     if missing:
         made = "vehiclemor run predictive makes their studies"
         print(f"left out: {', '.join(missing)} ({made})")

@@ -58,11 +58,10 @@ def description(
         **dict.fromkeys(data_names("studies"), _study),
         **dict.fromkeys(SCHEMAS, schema_description),
     }
-    if name.endswith(".toml"):
-        return _study(name)
-    if name not in known:
+    describe = _study if name.endswith(".toml") else known.get(name)
+    if describe is None:
         raise unknown("name", name, {*known, *names("model")})
-    return known[name](name)
+    return describe(name)
 
 
 def _model(
@@ -92,15 +91,9 @@ def _model(
         **{kind: _quantities(getattr(definition, kind)) for kind in quantities},
         "parameter file": str(path),
         "parameters": [
-            {
-                "name": parameter,
-                "value": entry.value,
-                "unit": entry.unit,
-                "bounds": _bounds(declared.above, declared.at_least, declared.at_most),
-                "meaning": entry.description,
-                "status": entry.status,
-                "source": entry.source,
-            }
+            {"name": parameter, "value": entry.value, "unit": entry.unit}
+            | {"bounds": _bounds(declared.above, declared.at_least, declared.at_most)}
+            | {"meaning": entry.description, "status": entry.status, "source": entry.source}
             for (parameter, declared), entry in zip(
                 definition.parameters.items(), parameters.entries.values(), strict=True
             )
@@ -178,7 +171,7 @@ def _maneuver(name: str) -> Description:
 
 
 def _study(name: str) -> Description:
-    """Grid and methods of a study, its members if it is a collection, or its protocols."""
+    """Grid and methods of a study, its members if it is a collection, or its sets of runs."""
     path = study_path(name)
     study = read_toml(path, StudyFile)
     head: Description = {"study": path.stem, "summary": study.title, "file": str(path)}
@@ -188,58 +181,57 @@ def _study(name: str) -> Description:
             for member, content in load_studies(name).items()
         ]
         return {**head, "runs": sum(row["runs"] for row in rows), "studies": rows}
-    if study.bounds:
-        return head | _protocol(study)
-    plan = study.sampling
-    how = f"{plan.plan}, {plan.count} points, seed {plan.seed}" if plan else ""
-    ranges = plan.ranges.items() if plan else ()
-    grid = {key: values(entry) for key, entry in study.grid.items()}
+    methods = [
+        {"label": label, "method": entry.method, "preset": entry.preset}
+        | {"settings": _listed(entry.settings)}
+        | ({"role": entry.role, "candidates": len(entry.candidates)} if study.bounds else {})
+        for label, entry in study.labelled.items()
+    ]
+    own = _sets(study) if study.bounds else _grid(study)
+    return {**head, "model": study.model, **own, "methods": methods}
+
+
+def _grid(study: StudyFile) -> Description:
+    """What a study varies; of a long axis both ends."""
+    axes = {key: [str(value) for value in values(entry)] for key, entry in study.grid.items()}
+    grid = [
+        {
+            "dimension": key,
+            "values": ", ".join(axis)
+            if len(axis) <= SHOWN
+            else f"{axis[0]}, {axis[1]}, ..., {axis[-1]} ({len(axis)} values)",
+        }
+        for key, axis in axes.items()
+    ]
+    if plan := study.sampling:
+        how = f"{plan.plan}, {plan.count} points, seed {plan.seed}"
+        sampled = plan.ranges.items()
+        grid += [
+            {"dimension": n, "values": f"{low} to {high} ({how})"} for n, (low, high) in sampled
+        ]
     return {
-        **head,
-        "model": study.model,
         "maneuver": study.maneuver or component("model", study.model).maneuver,
         "starts": study.start or ["the model's first"],
         "training": study.training_words,
         "parameters": _listed(study.parameters),
         "grid points": study.points,
         "keeps": study.keep,
-        "grid": [{"dimension": key, "values": _axis(entry)} for key, entry in grid.items()],
-        "sampling": [
-            {"name": key, "from": low, "to": high, "plan": how} for key, (low, high) in ranges
-        ],
-        "methods": [
-            {"label": label, "method": entry.method, "preset": entry.preset}
-            | {"settings": _listed(entry.settings)}
-            for label, entry in study.labelled.items()
-        ],
+        "grid": grid,
     }
 
 
-def _axis(axis: list[int | float | str]) -> str:
-    """Values of an axis; of a long one both ends."""
-    if len(axis) <= SHOWN:
-        return ", ".join(map(str, axis))
-    return f"{axis[0]}, {axis[1]}, ..., {axis[-1]} ({len(axis)} values)"
-
-
-def _protocol(study: StudyFile) -> Description:
+def _sets(study: StudyFile) -> Description:
     """What a study with bounds trains, chooses by and tests; scenarios are counted."""
     counted = {s: sum(g.scenarios for g in getattr(study, s)) for s in SETS}
     draws = {"drawn": study.drawn, "drawn outside": study.drawn_outside}
     counted |= {name: draw.runs for name, draw in draws.items() if draw}
     return {
-        "model": study.model,
         "runs": [f"{count} {purpose}" for purpose, count in counted.items() if count],
         "seed": study.seed,
         "version": study.version,
         "bounds": [
             {"output": output, "measure": b.measure, "bound": b.bound, "reason": b.reason}
             for output, b in study.bounds.items()
-        ],
-        "methods": [
-            {"label": label, "method": entry.method, "role": entry.role}
-            | {"candidates": len(entry.candidates)}
-            for label, entry in study.labelled.items()
         ],
     }
 

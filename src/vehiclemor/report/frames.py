@@ -4,33 +4,23 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from pathlib import Path
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from vehiclemor.registry import component
-from vehiclemor.report.default_studies import nominal, of_paper, perturbed
 from vehiclemor.report.labels import trained_runs
 from vehiclemor.report.printing import ends_text
-from vehiclemor.report.published import rms_numbers
-from vehiclemor.report.shown import tabled_outputs
-from vehiclemor.simulation.trajectory import (
-    ALGEBRAIC_COUNTS,
-    DYNAMIC_COUNTS,
-    EVALUATIONS,
-    FINISHED,
-)
-from vehiclemor.study.run import run_studies
+from vehiclemor.simulation.trajectory import EVALUATIONS, FINISHED
 
 if TYPE_CHECKING:
     import xarray as xr
 
-COUNTS = ("effective_rank", *(DYNAMIC_COUNTS | ALGEBRAIC_COUNTS), "growth_rate", "in_training")
-# Kind of the rows of a grid in a comparison.
+# Kind of the rows of a grid in a comparison, and of what they have the median.
 ERRORS = "errors"
+MEDIANS = ("seconds", "offline_seconds", "evaluations")
 
 
 def frame(dataset: xr.Dataset, variables: Iterable[str] = ()) -> pd.DataFrame:
@@ -90,133 +80,66 @@ def column_meanings(dataset: xr.Dataset) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def flat(dataset: xr.Dataset, outputs: Sequence[str]) -> pd.DataFrame:
-    """Frame of a study with its place in the grid, errors of some outputs, counts and status."""
-    short = {"rms_error": "rms", "floor_rms_error": "floor"}
-    errors = {f"{name}.{o}": f"{word}_{o}" for o in outputs for name, word in short.items()}
-    counts = [name for name in COUNTS if name in dataset]
-    rows: Any = frame(dataset, [*short, *counts, "status", "message"]).rename(columns=errors)
-    return rows[[*map(str, dataset["status"].dims), *errors.values(), *counts, "status", "message"]]
-
-
-def error_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
-    """Every run of a model in the paper's studies; of another model, of every method.
-
-    Those are its nominal and its perturbed runs.
-    """
-    own = nominal(model, results), perturbed(model, results)
-    return study_tables(model, ["paper"] if rms_numbers(model) else own, results, jobs)
-
-
-def study_tables(model: str, studies: Sequence[str], results: Path, jobs: int = 1) -> pd.DataFrame:
-    """RMS errors, floors, counts and status of every cell of studies of a model."""
-    outputs = tabled_outputs(component("model", model))
-    datasets = {k: v for study in studies for k, v in run_studies(study, results, jobs).items()}
-    own = {name: d for name, d in datasets.items() if d.attrs["model"] == model}
-    rows = pd.concat(
-        [flat(d, outputs).assign(study=name) for name, d in own.items()], ignore_index=True
-    )
-    first = ["study", "label", "start"]
-    return rows.reindex(columns=[*first, *(c for c in rows.columns if c not in first)])
-
-
-def settings_table(
-    study: str, outputs: Sequence[str], results: Path, jobs: int = 1
-) -> pd.DataFrame:
-    """Control-period POD on a vehicle with every combination of its settings, as of `flat`."""
-    return flat(next(iter(run_studies(study, results, jobs).values())), outputs)
-
-
-def quantity_table(model: str, results: Path, jobs: int = 1) -> pd.DataFrame:
-    """Largest RMS errors of a vehicle's nominal runs: positions, speeds, outputs, constraints.
-
-    Returns
-    -------
-    pandas.DataFrame
-        For each method, start, group of quantities and unit: the largest RMS error, and of which
-        quantity it is.  For constraints it is the RMS of the violation itself.
-    """
-    study = of_paper(model) or nominal(model, results)
-    dataset = next(iter(run_studies(study, results, jobs).values()))
-    rows: list[dict[str, object]] = []
-    for label, start in itertools.product(dataset["label"].values, dataset["start"].values):
-        point = dataset.sel({"label": label, "start": start}).squeeze(drop=True)
-        groups = {
-            "coordinate": point["rms_coordinate_error"].to_series(),
-            "speed": point["rms_speed_error"].to_series(),
-            "output": point["rms_error"].to_series(),
-        }
-        units = {key: point[f"{key}_unit"].to_series() for key in groups}
-        drifts = [str(o) for o in point["output"].values if str(o).endswith("_drift")]
-        if drifts:
-            squares = point["outputs"].sel(output=drifts) ** 2
-            groups["constraint"] = (squares.mean("time", skipna=False) ** 0.5).to_series()
-            units["constraint"] = units["output"].loc[drifts]
-            groups["output"] = groups["output"].drop(drifts)
-        place = {"label": label, "start": start, "status": str(point["status"].item())}
-        for group, errors in groups.items():
-            for unit, part in errors.groupby(units[group].loc[errors.index]):
-                worst = part.idxmax() if part.notna().all() else ""
-                entry = {"group": group, "unit": unit, "quantity": worst, "rms": part.max()}
-                rows.append(place | entry)
-    return pd.DataFrame(rows)
-
-
 def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """A row for each method, start and output of a combined dataset.
+    """A row for each start, method and output of a combined dataset.
 
-    `runs` are different ones, `failures` says how those that have `failed` ended, `warned` counts
-    those that aren't trusted (`warned_runs`), `trained` those that the method was trained on; of
-    those that have ended `median` and `largest` are RMS errors over the grid, `largest_deviation`
-    is at one time; `largest_at` is the place of the largest RMS error, `floor` that of the best
-    approximation there.  `seconds` (of the compiled loop), `offline_seconds` and `evaluations` are
-    medians.
+    `runs` are different ones, `failures` says how those that have `failed` ended, `reason` why,
+    `warned` counts those that aren't trusted (`warned_runs`), `trained` those that the method was
+    trained on; of those that have ended `median` and `largest` are RMS errors over the grid,
+    `largest_at` is the place of the largest, `floor` that of the best approximation there.
+    `seconds` (of the compiled loop), `offline_seconds` and `evaluations` are medians.
     """
     attributes = {key: str(dataset.attrs[key]) for key in ("study", "title", "model", "training")}
     head = {"kind": ERRORS, **attributes, "grid": _grid_words(dataset)}
     count = EVALUATIONS[component("model", head["model"]).kind]
-    kept = ["rms_error", "max_error", "floor_rms_error", "cell_key", "status", "seconds"]
-    kept += ["offline_seconds", count, "warned", "trained"]
-    told = dataset.assign(warned=warned_runs(dataset), trained=trained_runs(dataset))
-    runs: Any = frame(told, kept)  # pandas has no types that a checker could follow
+    told = dataset.assign(
+        warned=warned_runs(dataset), trained=trained_runs(dataset), evaluations=dataset[count]
+    )
+    kept = ["rms_error", "floor_rms_error", "cell_key", "status", "message"]
+    runs: Any = frame(told, [*kept, *MEDIANS, "effective_rank", "warned", "trained"])
     rows: list[dict[str, Any]] = []
     for start, label in itertools.product(dataset["start"].values, dataset["label"].values):
         own = runs[(runs["start"] == start) & (runs["label"] == label)]
         # Points of the grid that a method does not depend on are one run.
         own = own.drop_duplicates("cell_key")
-        place = {**head, "start": str(start), "label": str(label)}
-        rows += [place | row for row in _rows_of_method(own, dataset, count)]
+        place = {**head, "start": str(start), "label": str(label), **_counts(own)}
+        varied = [str(d) for d in dataset["status"].dims if len(set(own[d])) > 1]
+        ended = own[own["status"].isin(FINISHED)]
+        for output, unit in dataset["output_unit"].to_series().items():
+            errors = {"output": str(output), "unit": unit, **_errors(ended, str(output), varied)}
+            rows.append(place | errors)
     return rows
 
 
-def _rows_of_method(runs: Any, dataset: xr.Dataset, count: str) -> list[dict[str, Any]]:
-    """One method from one start: a row for each output."""
-    ended = runs[runs["status"].isin(FINISHED)]
-    failures = Counter(map(str, runs["status"].drop(ended.index)))
-    common = {
+def _counts(runs: Any) -> dict[str, Any]:
+    """How runs have ended, and what they took."""
+    failed = runs[~runs["status"].isin(FINISHED)]
+    ends = Counter(map(str, failed["status"])).most_common()
+    return {
+        "effective_rank": int(runs["effective_rank"].max()),
         "runs": len(runs),
-        "failed": failures.total(),
-        "failures": ", ".join(f"{n} {name}" for name, n in failures.most_common()),
+        "failed": len(failed),
+        "failures": ", ".join(f"{n} {status}" for status, n in ends),
+        "reason": next(iter(failed["message"]), ""),
         **{name: int(runs[name].sum()) for name in ("warned", "trained")},
-        **{name: _median(ended[name]) for name in ("seconds", "offline_seconds")},
-        "evaluations": _median(ended[count]),
+        **{name: _median(runs.drop(failed.index)[name]) for name in MEDIANS},
     }
-    varied = [str(d) for d in dataset["status"].dims if len(set(runs[d])) > 1]
-    rows = []
-    for output, unit in zip(dataset["output"].values, dataset["output_unit"].values, strict=True):
-        errors = ended[f"rms_error.{output}"].astype(float)
-        errors = errors[np.isfinite(errors)]
-        row = {"output": str(output), "unit": str(unit), **common, "median": _median(errors)}
-        row |= {"largest": np.nan, "largest_deviation": np.nan, "largest_at": "", "floor": np.nan}
-        if len(errors):
-            worst = ended.loc[errors.idxmax()]
-            at = ", ".join(f"{d} {_value(worst[d])}" for d in varied)
-            row["largest"] = float(errors.max())
-            row["largest_deviation"] = float(ended[f"max_error.{output}"].max(skipna=False))
-            row["largest_at"] = at if row["largest"] > 0.0 else ""
-            row["floor"] = float(worst[f"floor_rms_error.{output}"])
-        rows.append(row)
-    return rows
+
+
+def _errors(ended: Any, output: str, varied: list[str]) -> dict[str, Any]:
+    """Errors of an output in the runs that have ended."""
+    errors = ended[f"rms_error.{output}"].astype(float)
+    errors = errors[np.isfinite(errors)]
+    if errors.empty:
+        return {"median": np.nan, "largest": np.nan, "largest_at": "", "floor": np.nan}
+    worst, largest = ended.loc[errors.idxmax()], float(errors.max())
+    at = ", ".join(f"{d} {_value(worst[d])}" for d in varied)
+    return {
+        "median": float(errors.median()),
+        "largest": largest,
+        "largest_at": at if largest > 0.0 else "",
+        "floor": float(worst[f"floor_rms_error.{output}"]),
+    }
 
 
 def _value(value: object) -> str:
@@ -228,13 +151,14 @@ def _median(values: Any) -> float:
 
 
 def _grid_words(dataset: xr.Dataset) -> str:
-    """The grid's dimensions with their values."""
+    """The grid's dimensions with their values, and the ranges of a sample."""
     words = []
-    for name in map(str, dataset["status"].dims):
+    for name in (d for d in map(str, dataset["status"].dims) if d not in ("label", "start")):
         values = [f"{v:g}" if isinstance(v, float) else str(v) for v in dataset[name].values]
-        if name not in ("label", "start") and (len(values) > 1 or values != ["1"]):
-            every = ", ".join(values) if len(values) <= 8 else f"{values[0]} to {values[-1]}"
-            words.append(f"{name} {every}" + (f" ({len(values)})" if len(values) > 8 else ""))
+        if len(values) > 8:
+            words.append(f"{name} {values[0]} to {values[-1]} ({len(values)})")
+        elif values != ["1"]:
+            words.append(f"{name} {', '.join(values)}")
     for name, values in dataset.coords.items():
         if values.dims == ("sample",) and name != "sample":
             words.append(f"{name} {float(values.min()):.4g} to {float(values.max()):.4g}")

@@ -1,8 +1,12 @@
-"""Words, symbols and short headings of outputs, for figures and printed tables."""
+"""Words, symbols and units of outputs; headings, number formats and meanings of columns."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vehiclemor.resources import data_folder
+from vehiclemor.toml_files import FileSchema, read_toml
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,17 +30,6 @@ class Label(NamedTuple):
     short: str
 
 
-LABELS = {
-    "spindle_x": Label("spindle displacement", "x", "x"),
-    "spindle_y": Label("spindle displacement", "y", "y"),
-    "second_euler_angle": Label("second Euler angle", r"$\eta$", "angle"),
-    "pitch": Label("pitch", r"$\theta$", "pitch"),
-    "yaw": Label("yaw", r"$\psi$", "yaw"),
-    "lateral_position": Label("lateral position", "Y", "Y"),
-    "lateral_speed": Label("lateral speed", "$v_y$", "v_y"),
-    "vertical_speed": Label("vertical speed", "$v_z$", "v_z"),
-}
-
 # What is said of a run that was in its own training, and the mark of it in a legend.
 TRAINED, MARK = "trained on this run", "*"
 # Words of an axis that leave no room for more beside them.
@@ -46,10 +39,62 @@ LONGEST = 26
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
 
 
+class Column(NamedTuple):
+    """How a column is printed.
+
+    Attributes
+    ----------
+    heading
+        Above it.
+    form
+        Format of its numbers.
+    meaning
+        What stands below the table.
+    scale
+        Factor from the SI unit to the one that is shown.
+    """
+
+    heading: str
+    form: str = ".6g"
+    meaning: str = ""
+    scale: float = 1.0
+
+
+# Format of errors: an exact zero is a dash, since orders of magnitude are compared.
+ERROR = ".1e"
+
+
+class LabelFile(FileSchema):
+    """Schema of `data/figures/labels.toml`."""
+
+    outputs: dict[str, list[str]]
+    columns: dict[str, list[str | float]]
+
+
+@cache
+def declared() -> tuple[dict[str, Label], dict[str, Column]]:
+    """Labels of outputs, and how columns are printed."""
+    file = read_toml(data_folder() / "figures" / "labels.toml", LabelFile)
+    columns: Any = file.columns
+    return (
+        {name: Label(*entry) for name, entry in file.outputs.items()},
+        {name: Column(*entry) for name, entry in columns.items()},
+    )
+
+
+def column(name: str) -> Column:
+    """How a column is printed; one without an entry has its name as heading."""
+    if found := declared()[1].get(name):
+        return found
+    if name.startswith("rms_"):
+        return Column(f"{label_of(name.removeprefix('rms_')).short} error", ERROR)
+    return Column(name.replace("_", " "))
+
+
 def label_of(output: str) -> Label:
     """The label of an output; of one that has no symbol its name in words."""
     words = output.replace("_", " ")
-    return LABELS.get(output, Label(words, words, words))
+    return declared()[0].get(output, Label(words, words, words))
 
 
 def full_label(output: str, between: str = " ") -> str:

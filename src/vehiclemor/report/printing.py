@@ -1,4 +1,4 @@
-"""Tables and texts: one printer, with the headings, formats and meanings of all columns."""
+"""Tables and texts: rows in the terminal, CSV, Markdown, LaTeX and HTML, by one place."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ import string
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any, Literal
 
-from vehiclemor.report.labels import label_of
+from vehiclemor.report.labels import ERROR, TRAINED, Column, column, trained_runs
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
 Format = Literal["terminal", "csv", "markdown", "latex", "html"]
 Rows = Sequence[Mapping[str, Any]]
@@ -25,112 +28,34 @@ WIDTH, WIDEST = 80, 120
 NARROWEST = 12
 # Indent of a note.
 NOTE = 4
+# What is printed of each output of a simulation.
+ERRORS = ("rms_error", "floor_rms_error", "max_error", "signal_range")
 
 
-class Column(NamedTuple):
-    """How a column is printed.
+@dataclass(frozen=True)
+class Table:
+    """Rows as a table: text by `str`, HTML where a template asks for it; see `table`."""
 
-    Attributes
-    ----------
-    heading
-        Above it.
-    form
-        Format of its numbers.  An exact zero is a dash where orders of magnitude are compared.
-    meaning
-        What stands below the table.
-    scale
-        Factor from the SI unit to the one that is shown.
-    """
+    rows: pd.DataFrame | Rows
+    columns: Sequence[str] | Mapping[str, Column] = ()
+    title: str = ""
+    group: str = ""
+    note: str = ""
+    explain: bool = True
+    below: str = ""
 
-    heading: str
-    form: str = ".6g"
-    meaning: str = ""
-    scale: float = 1.0
+    def __str__(self) -> str:
+        parts = wrapped(self.title), self._table("terminal"), wrapped(self.below, 0, 1)
+        return "\n".join(filter(None, parts))
 
+    def __html__(self) -> str:
+        caption = f"<h3>{escape(self.title)}</h3>" if self.title else ""
+        below = f"<p>{escape(self.below)}</p>" if self.below else ""
+        return caption + self._table("html") + below
 
-COUNT, ERROR, NUMBER, MICRO = ".0f", ".1e", ".3g", 1e6
-COLUMNS = {
-    "label": Column("method"),
-    # Errors.
-    "median": Column("median", ERROR, "median RMS error of the completed runs, SI units"),
-    "largest": Column("largest", ERROR, "largest RMS error of the completed runs"),
-    "largest_at": Column("largest at"),
-    "rms_error": Column("RMS error", ERROR, "against the full-order solution; -: exactly zero"),
-    "max_error": Column("largest error", ERROR),
-    "signal_range": Column("signal range", ERROR, "largest minus smallest full-order value"),
-    "floor": Column(
-        "projection error",
-        ERROR,
-        "RMS error of the best approximation of the coordinates in the method's subspaces, a lower "
-        "bound for the coordinates, not for every output",
-    ),
-    "failed": Column("failed", COUNT),
-    "failures": Column("failed", COUNT, "of the different runs of the grid"),
-    "warned": Column("untrusted", COUNT, "runs that the method reports as unreliable"),
-    "trained": Column("training", COUNT, "tested runs that the method was trained on"),
-    "evaluations": Column("evaluations", COUNT, "of the equations of motion, or iterations"),
-    "seconds_in_loop": Column(
-        "time, us",
-        ".1f",
-        "median CPU time of the compiled loop, measured once beside other work; compare times with "
-        "vehiclemor compare MODEL",
-        MICRO,
-    ),
-    "offline_seconds": Column("offline, s", ".2g", "CPU time of training and fit"),
-    # Unseen inputs.
-    "misses": Column("missed", COUNT, "runs that violate an error bound"),
-    "silent": Column("undetected", COUNT, "missed runs although the method reports ok"),
-    "flagged": Column("warned", COUNT, "runs that the method reports as unreliable"),
-    "validation_score": Column("validation", NUMBER, "worst error in validation runs, which chose"),
-    "score": Column("worst error", NUMBER, "largest error as a multiple of its bound"),
-    "seconds": Column("call, us", COUNT, "CPU time of a whole call with all outputs", MICRO),
-    "loop_seconds": Column("loop, us", COUNT, "CPU time of its compiled loop", MICRO),
-    "ratio_equal": Column("times faster", ".1f", "than the full model at equal worst error"),
-    "ratio_equal_loop": Column("loop faster", ".1f", "the same for compiled loops alone"),
-    "most": Column("99 % of runs", NUMBER),
-    # Costs.
-    "us_per_run": Column("time, us", ".1f", "CPU time of a run, median of interleaved rounds"),
-    "spread": Column("+- %", COUNT, "half the interquartile range of the rounds, over the median"),
-    "speed_up": Column("faster, same", ".2f"),
-    "speed_up_strongest": Column("faster, best", ".2f"),
-    "offline_us": Column("offline, us", COUNT, "training and fit"),
-    "break_even": Column("pays, same", ".1f"),
-    "break_even_strongest": Column(
-        "pays, best", ".1f", "runs after which a reduced model has earned its training"
-    ),
-    "tolerance": Column("tolerance", ".0e"),
-    "effective_rank": Column("rank", COUNT),
-    "nominal": Column("trained run", ERROR, "RMS error in the nominal run, the training"),
-    "perturbed": Column(
-        "perturbed",
-        ERROR,
-        "largest RMS error over frequency and amplitude factors of 0.8 to 1.2, training unchanged",
-    ),
-    # Singular values.
-    "median_singular_value": Column(
-        "median", ERROR, "singular value over the first, of all control periods"
-    ),
-    "largest_singular_value": Column("largest", ERROR),
-    "largest_left_out": Column(
-        "energy left out", ERROR, "largest share of the later modes (equation 8)"
-    ),
-    # The paper.
-    "published": Column("paper", NUMBER),
-    "bound": Column("bound", NUMBER),
-    "measured": Column("measured", NUMBER),
-    "reproduced": Column("reproduced", NUMBER),
-    "signal_rms": Column("signal", ERROR, "RMS of the signal itself"),
-    "not_comparable": Column("not comparable", COUNT),
-    "reason": Column("why"),
-}
-
-
-def column(name: str) -> Column:
-    """How a column is printed; one without an entry has its name as heading."""
-    kind, _, output = name.partition("_")
-    if kind == "rms" and name not in COLUMNS:
-        return Column(f"{label_of(output).short} error", ERROR)
-    return COLUMNS.get(name) or Column(name.replace("_", " "))
+    def _table(self, to: Format) -> str:
+        own = {"group": self.group, "note": self.note}
+        return table(self.rows, self.columns, to, explain=self.explain, **own)
 
 
 def shown(value: object, form: str = ".6g", scale: float = 1.0) -> str:
@@ -161,9 +86,9 @@ def table(
     columns
         Names of those that are shown, or how each of them is printed; all by default.
     to
-        `terminal`: headings and formats of `COLUMNS`, within the width of the terminal, meanings
-        below.  `csv`: names and all digits.  `markdown`, `latex` (needs booktabs): names and four
-        digits.  `html`: names, three digits, all digits in the attribute `value`, meanings below.
+        `terminal`, `html`: headings and formats of `labels.column`, meanings below; within the
+        width of the terminal, or with all digits in the attribute `value`.  `csv`: names and all
+        digits.  `markdown`, `latex` (needs booktabs): names and four digits.
     group
         Column whose values stand in lines of their own above their rows.
     note
@@ -171,23 +96,20 @@ def table(
     explain
         Whether meanings stand below.
     """
-    if to == "terminal":
-        records = rows if isinstance(rows, Sequence) else rows.to_dict("records")
+    if to in ("terminal", "html"):
+        records: Rows = rows if isinstance(rows, Sequence) else rows.to_dict("records")  # type: ignore[assignment]
         names = columns or (records[0] if records else ())
         kinds = columns if isinstance(columns, Mapping) else {name: column(name) for name in names}
-        return _terminal(records, kinds, group, note) + (legend(kinds.values()) if explain else "")
+        if group:
+            places = list(dict.fromkeys(row[group] for row in records))
+            records = sorted(records, key=lambda row: places.index(row[group]))
+        return (_terminal if to == "terminal" else _html)(records, kinds, group, note, explain)
     import pandas as pd
 
     frame: Any = pd.DataFrame(rows)
     frame = frame[list(columns)] if columns else frame
     if to == "csv":
         return frame.to_csv(index=False, lineterminator="\n")
-    if to == "html":
-        cells = frame.rename(columns=lambda name: str(name).replace("_", " ")).map(_html_cell)
-        cells.columns = [escape(name) for name in cells.columns]
-        own = {name.replace("_", " "): column(name).meaning for name in map(str, frame.columns)}
-        meanings = "; ".join(f"{name}: {text}" for name, text in own.items() if text and explain)
-        return cells.to_html(index=False, escape=False, border=0) + f"<p>{escape(meanings)}</p>"
     cells = frame.map(_four_digits)
     if to == "latex":
         return cells.to_latex(index=False, escape=True)
@@ -203,55 +125,73 @@ def _four_digits(value: object) -> str:
     return "" if value is None else str(value)
 
 
-def _html_cell(value: object) -> str:
+def _meanings(kinds: Mapping[str, Column], explain: bool) -> str:
+    meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds.values() if kind.meaning]
+    return f"({'; '.join(meanings)}.)" if meanings and explain else ""
+
+
+def _html(records: Rows, kinds: Mapping[str, Column], group: str, note: str, explain: bool) -> str:
+    wide, last = f'<tr><td colspan="{len(kinds)}"><div>%s</div></td></tr>', None
+    lines = ["".join(f"<th>{escape(kind.heading)}</th>" for kind in kinds.values())]
+    lines = [f"<tr>{lines[0]}</tr>"]
+    for row in records:
+        if group and row[group] != last:
+            last = row[group]
+            lines.append(wide % f"<b>{escape(str(last))}</b>")
+        cells = (f"<td>{_cell(row.get(name), kind)}</td>" for name, kind in kinds.items())
+        lines.append(f"<tr>{''.join(cells)}</tr>")
+        if note and row[note]:
+            lines.append(wide % escape(str(row[note])))
+    below = escape(_meanings(kinds, explain))
+    return f"<table>{''.join(lines)}</table>" + (f"<p>{below}</p>" if below else "")
+
+
+def _cell(value: object, kind: Column) -> str:
+    text = escape(shown(value, kind.form, kind.scale))
     if isinstance(value, float) and value == value:
-        return f'<data value="{value}">{value:.3g}</data>'
-    text = escape(shown(value))
+        return f'<data value="{value}">{text}</data>'
     return (
         f'<div class="{text}">{text}</div>' if text in ("met", "missed") else f"<div>{text}</div>"
     )
 
 
-def _terminal(records: Rows, columns: Mapping[str, Column], group: str, note: str) -> str:
-    from rich.console import Console, Group
-    from rich.table import Table
-    from rich.text import Text
-
-    if group:
-        place = {value: i for i, value in enumerate(dict.fromkeys(row[group] for row in records))}
-        records = sorted(records, key=lambda row: place[row[group]])
+def _terminal(
+    records: Rows, kinds: Mapping[str, Column], group: str, note: str, explain: bool
+) -> str:
     cells = [
-        [shown(row.get(name), kind.form, kind.scale) for name, kind in columns.items()]
+        [shown(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
         for row in records
     ]
-    numbers = [all(isinstance(r.get(name), int | float) for r in records) for name in columns]
-    widths = _widths([kind.heading for kind in columns.values()], cells, numbers)
-    parts: list[Table | Text] = []
-
-    def start(header: bool) -> None:
-        # Tables of equal widths with lines between them look like one.
-        part = Table(box=None, show_header=header, pad_edge=False, padding=(0, 1, 0, 0))
-        for kind, wide, number in zip(columns.values(), widths, numbers, strict=True):
-            justify = "right" if number else "left"
-            part.add_column(Text(kind.heading), justify=justify, width=wide, overflow="fold")
-        parts.append(part)
-
-    start(header=True)
-    last = None
+    numbers = [all(isinstance(row.get(name), int | float) for row in records) for name in kinds]
+    heads = [kind.heading for kind in kinds.values()]
+    widths, last = _widths(heads, cells, numbers), None
+    lines = _in_columns(heads, widths, numbers, heading=True)
     for row, line in zip(records, cells, strict=True):
         if group and row[group] != last:
             last = row[group]
-            parts.append(Text(str(last)))
-        if not isinstance(parts[-1], Table):
-            start(header=False)
-        assert isinstance(parts[-1], Table)
-        parts[-1].add_row(*map(Text, line))
+            lines.append(wrapped(str(last), 0, 2))
+        lines += _in_columns(line, widths, numbers)
         if note and row[note]:
-            parts.append(Text(wrapped(str(row[note]), NOTE, NOTE)))
-    console = Console(width=width(), color_system=None, highlight=False)
-    with console.capture() as captured:
-        console.print(Group(*parts))
-    return "\n".join(line.rstrip() for line in captured.get().splitlines())
+            lines.append(wrapped(str(row[note]), NOTE, NOTE))
+    return "\n".join(filter(None, [*lines, wrapped(_meanings(kinds, explain), 0, 1)]))
+
+
+def _in_columns(
+    cells: Sequence[str], widths: list[int], numbers: list[bool], *, heading: bool = False
+) -> list[str]:
+    """Lines of a row whose texts are wrapped within their columns; headings stand at the bottom."""
+    texts = [
+        textwrap.wrap(text, width, break_on_hyphens=False)[:: -1 if heading else 1]
+        for text, width in zip(cells, widths, strict=True)
+    ]
+    lines = [
+        " ".join(
+            part.rjust(width) if number else part.ljust(width)
+            for part, width, number in zip(line, widths, numbers, strict=True)
+        ).rstrip()
+        for line in zip_longest(*texts, fillvalue="")
+    ]
+    return lines[:: -1 if heading else 1]
 
 
 def _widths(heads: list[str], cells: list[list[str]], numbers: list[bool]) -> list[int]:
@@ -271,10 +211,24 @@ def _widths(heads: list[str], cells: list[list[str]], numbers: list[bool]) -> li
     return whole if sum(whole) + len(whole) <= width() else widths
 
 
-def legend(kinds: Iterable[Column]) -> str:
-    """Meanings of columns, on new lines; nothing if none needs one."""
-    meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds if kind.meaning]
-    return "\n" + wrapped(f"({'; '.join(meanings)}.)", 0, 1) if meanings else ""
+def simulation_text(dataset: xr.Dataset, shown: Sequence[str], counts: Iterable[str]) -> str:
+    """Status, a table of the errors of some outputs, solver counts and seconds of a simulation."""
+    told = f" ({TRAINED})" if trained_runs(dataset) else ""
+    ended = f"{dataset['status'].item()} {dataset['message'].item()}"
+    parts = [wrapped(f"{dataset.attrs['title']}{told}: {ended}")]
+    parts.append(wrapped(str(dataset["remark"].item())))
+    rows = []
+    for output in shown:
+        own = dataset.sel(output=output)
+        errors = {name.replace("floor_rms_error", "floor"): own[name].item() for name in ERRORS}
+        rows.append({"output": str(output), **errors, "unit": str(own["output_unit"].item())})
+    parts.append(table(rows))
+    if further := dataset.sizes["output"] - len(shown):
+        parts.append(f"{further} more outputs: --all-outputs")
+    parts.append(wrapped(", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in counts)))
+    seconds, clock = float(dataset["seconds"]), dataset["seconds"].attrs["clock"]
+    parts.append(f"seconds in the compiled loop {seconds:.3e} ({clock})")
+    return "\n".join(part for part in parts if part)
 
 
 def json_text(rows: pd.DataFrame) -> str:
@@ -310,14 +264,12 @@ def width() -> int:
 
 def wrapped(text: str, first: int = 0, rest: int = 0) -> str:
     """A paragraph in lines of the width of a table, indented."""
-    return "\n".join(
-        textwrap.wrap(
-            text,
-            width(),
-            initial_indent=" " * first,
-            subsequent_indent=" " * rest,
-            # A path stays whole.
-            break_long_words=False,
-            break_on_hyphens=False,
-        )
+    return textwrap.fill(
+        text,
+        width(),
+        initial_indent=" " * first,
+        subsequent_indent=" " * rest,
+        # A path stays whole.
+        break_long_words=False,
+        break_on_hyphens=False,
     )

@@ -1,35 +1,21 @@
-"""What the paper prints: its numbers and claims, each with the place where it stands."""
+"""What the paper prints: its numbers and claims, each with its place; and how to cite."""
 
-from dataclasses import dataclass
+from collections import Counter
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from vehiclemor.errors import FileError
+from vehiclemor.registry import component, names
 from vehiclemor.resources import data_folder
-from vehiclemor.toml_files import FileSchema, read_toml
+from vehiclemor.toml_files import FileSchema, Line, read_toml
 
 # The paper's own models: the registry may hold others, about which it says nothing.
 Model = Literal["independent_suspension_vehicle", "double_wishbone", "high_fidelity_vehicle"]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1)]
-# Text goes into one-line messages and table cells.
-Line = Annotated[str, Field(pattern=r"^\S(.*\S)?$")]
-
-
-class Paper(FileSchema):
-    """Bibliographic record of the paper, and how far its numbers can be compared."""
-
-    authors: list[Line]
-    title: Line
-    journal: Line
-    volume: Count
-    number: Count
-    article: Line
-    year: Count
-    doi: Line
-    note: Line
 
 
 class Printed(FileSchema):
@@ -84,6 +70,16 @@ class Number(Printed):
         return self
 
 
+class Measured(FileSchema):
+    """A number on a claim by a study that the package no longer has: met up to its bound."""
+
+    value: Finite
+    bound: Finite
+    variant: Line
+    measure: Line
+    seen: Line
+
+
 class Claim(Printed):
     """A printed statement in our words.
 
@@ -94,33 +90,41 @@ class Claim(Printed):
     kind
         `setup`: how something was made; `result`: what the paper says it saw; `expectation`: what
         it expects or explains without showing it.
+    measured
+        Of a claim that no criterion is for.
     """
 
     model: Model | None = None
     kind: Literal["setup", "result", "expectation"]
     statement: Line
+    measured: Measured | None = None
 
 
-class PublishedFile(FileSchema):
-    """Schema of `data/published/*.toml`."""
+class Published(FileSchema):
+    """Schema of `data/published/*.toml`: the paper's numbers and claims."""
 
-    paper: Paper
     number: list[Number]
     claim: list[Claim]
 
+    @property
+    def numbers(self) -> dict[str, Number]:
+        """Id -> number, in the order of the file."""
+        return {number.id: number for number in self.number}
 
-@dataclass(frozen=True)
-class Published:
-    """The paper's numbers and claims by id, in the order of the file."""
+    @property
+    def claims(self) -> dict[str, Claim]:
+        """Id -> claim, in the order of the file."""
+        return {claim.id: claim for claim in self.claim}
 
-    paper: Paper
-    numbers: dict[str, Number]
-    claims: dict[str, Claim]
+    @model_validator(mode="after")
+    def _ids_once(self) -> "Published":
+        ids = Counter(entry.id for entry in (*self.number, *self.claim))
+        if twice := [key for key, times in ids.items() if times > 1]:
+            raise ValueError(f"id {twice[0]!r} occurs twice")
+        return self
 
 
-Entry = TypeVar("Entry", bound=Printed)
-
-
+@cache
 def load_published(path: Path | None = None) -> Published:
     """Load and validate what the paper prints, by default from the package's own file.
 
@@ -129,22 +133,18 @@ def load_published(path: Path | None = None) -> Published:
     FileError
         If the file is unreadable, does not fit the schema, or has an id twice.
     """
-    path = path or data_folder() / "published" / "masoudi2015.toml"
-    content = read_toml(path, PublishedFile)
-    numbers = _by_id(content.number, "number", path)
-    return Published(content.paper, numbers, _by_id(content.claim, "claim", path))
+    return read_toml(path or data_folder() / "published" / "masoudi2015.toml", Published)
 
 
 def rms_numbers(model: str) -> dict[str, Number]:
     """Published RMS errors of a model by the output that they are about; none for a plug-in's."""
-    numbers = load_published().numbers.values()
+    numbers = load_published().number
     return {n.quantity: n for n in numbers if n.model == model and n.kind == "rms_error"}
 
 
-def _by_id(entries: list[Entry], kind: str, path: Path) -> dict[str, Entry]:
-    found: dict[str, Entry] = {}
-    for entry in entries:
-        if entry.id in found:
-            raise FileError(f"{path}: {kind}: id {entry.id!r} occurs twice")
-        found[entry.id] = entry
-    return found
+def citations() -> str:
+    """BibTeX entries for the suite and the paper, and the references of the methods."""
+    text = (data_folder() / "published" / "citations.bib").read_text(encoding="utf-8")
+    references = {name: component("method", name).reference for name in names("method")}
+    lines = [f"method {name}: doi:{doi}" for name, doi in references.items() if doi]
+    return "\n".join([text.replace("VERSION", version("vehiclemor")), *lines])

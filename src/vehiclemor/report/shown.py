@@ -54,7 +54,6 @@ class TablesFile(FileSchema):
     algebraic: OfKind
     dynamic: OfKind
     reduced: dict[str, list[Case]]
-    settings: dict[str, list[str]]
 
 
 @cache

@@ -28,12 +28,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PRESETS = ("literal", "recommended")
-# Name -> unit, meaning.
-VARIABLES = {
-    "singular_value": ("1", "singular value over the first one"),
-    "energy": ("1", "share of the eigenvalues' sum that the leading modes hold"),
-    "left_out": ("1", "share that they leave out (equation 8)"),
-}
 
 
 def spectrum(models: Sequence[str]) -> xr.Dataset:
@@ -107,11 +101,7 @@ def _shares(values: np.ndarray) -> xr.Dataset:
     with np.errstate(invalid="ignore"):
         tails = np.cumsum(squares[:, ::-1], axis=1)[:, ::-1] / squares.sum(axis=1, keepdims=True)
         left_out = np.hstack([tails[:, 1:], 0.0 * tails[:, :1]])
-        found = {"singular_value": values / values[:, :1], "energy": 1.0 - left_out}
-    found["left_out"] = left_out
-    described = {
-        name: (("window", "mode"), found[name], {"units": unit, "long_name": text})
-        for name, (unit, text) in VARIABLES.items()
-    }
+        found = {"singular_value": values / values[:, :1], "left_out": left_out}
+    found["energy"] = 1.0 - left_out
     places = {"window": np.arange(len(values)), "mode": np.arange(1, values.shape[1] + 1)}
-    return xr.Dataset(described, places)
+    return xr.Dataset({name: (tuple(places), array) for name, array in found.items()}, places)

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from vehiclemor.report.predictive.equal_error import at_error
-from vehiclemor.report.predictive.targets import upper_bound
+from vehiclemor.report.unseen import at_error, upper_bound
 
 
 @given(st.integers(0, 40), st.integers(1, 400))

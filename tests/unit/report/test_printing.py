@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.report.printing import COLUMNS, Column, column, table, width
-from vehiclemor.report.simulation import simulation_text
+from vehiclemor.report.labels import Column, column
+from vehiclemor.report.printing import simulation_text, table, width
 
 ROWS = pd.DataFrame(
     {
@@ -39,6 +39,12 @@ def test_numbers_keep_their_digits_where_they_are_read_again():
     values = [float(element.get("value")) for element in page.iter("data")]
     assert values == [1.23456e-5, 0.0, 12.3456]
     assert "a|b_c & <d>" in ["".join(cell.itertext()) for cell in page.iter("td")]
+    # Groups and notes have lines of their own, meanings stand below.
+    grouped = table(ROWS.assign(of="<g>", why="a & b"), ("score",), "html", group="of", note="why")
+    page = ElementTree.fromstring(f"<div>{grouped}</div>")  # noqa: S314 - our own
+    cells = ["".join(cell.itertext()) for cell in page.iter("td")]
+    assert cells == ["<g>", "-", "a & b", "12.3", "a & b"]
+    assert column("score").meaning in page.findtext("p")
 
 
 def test_formats_escape_what_would_break_them():
@@ -60,10 +66,11 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
     found = [line.split()[-3:] for line in lines if line.startswith(("a|b", "plain"))]
     # An exact zero is no order of magnitude.
     assert found == [["1.2e-05", "-", "3"], ["-", "12.3", "0"]]
+    assert table([{"score": 0.0}], explain=False).split()[-1] == "0"
     plain = " ".join(text.split())
     for name in ("floor", "score", "misses"):
-        assert plain.count(COLUMNS[name].meaning) == 1
-    assert COLUMNS["floor"].meaning not in " ".join(table(rows, explain=False).split())
+        assert plain.count(column(name).meaning) == 1
+    assert column("floor").meaning not in " ".join(table(rows, explain=False).split())
     lines = table([{"of": o, "n": n} for n, o in enumerate("abab")], ("n",), group="of").split()
     assert lines == ["n", "a", "0", "2", "b", "1", "3"]
     micro = {"t": Column("time, us", ".1f", scale=1e6)}

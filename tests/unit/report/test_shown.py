@@ -5,21 +5,19 @@ from dataclasses import replace
 import pytest
 
 from tests.unit import standard_problems
-from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.registry import component, names
 from vehiclemor.report.default_studies import of_paper, smaller_rank
 from vehiclemor.report.published import load_published
 from vehiclemor.report.shown import (
+    default_rank,
     main_outputs,
     of_kind,
     tabled_outputs,
     tables_file,
     timing_cases,
 )
-from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings
-from vehiclemor.study.plans.loading import load_studies
 
 PLAIN = standard_problems.DEFINITION
 BUILT_IN = ("double_wishbone", "independent_suspension_vehicle", "high_fidelity_vehicle")
@@ -35,6 +33,7 @@ def test_rows_of_the_papers_models_exist_and_are_named_once(name, nominal):
     assert {case.method for case in cases} <= set(names("method"))
     assert set(of_kind(model.kind).counts) <= set(model.counts)
     assert of_paper(name) == nominal
+    assert set(tables_file().reduced) == set(BUILT_IN)
     # Settings of the paper are the defaults of POD.
     printed = [n for n in load_published().numbers.values() if n.model == name]
     assert smaller_rank(model, "pod") == {}
@@ -45,24 +44,6 @@ def test_rows_of_the_papers_models_exist_and_are_named_once(name, nominal):
             assert settings["control_period"] == number.control_period
 
 
-def test_labels_tell_what_differs_from_the_recommended_settings():
-    labels = {c.id: c.label for c in timing_cases(component("model", BUILT_IN[0]))}
-    assert labels["pod_r3_1e-6"] == "pod r=3, 1e-6"
-    assert labels["pod_literal_r6"] == "pod literal r=6"
-    labels = {c.id: c.label for c in timing_cases(component("model", BUILT_IN[1]))}
-    assert labels["pod_state_r3"] == "pod state r=3"
-    assert labels["fixed_basis_r3"] == "fixed basis r=3"
-
-
-def test_listed_models_studies_and_outputs_exist():
-    assert set(tables_file().reduced) == set(BUILT_IN)
-    for study, outputs in tables_file().settings.items():
-        assert study in data_names("studies")
-        (definition,) = load_studies(study).values()
-        model = component("model", definition.model)
-        assert set(outputs) <= set(tabled_outputs(model))
-
-
 def test_defaults_follow_the_kind():
     speeds = {"ae": (), "ode": PLAIN.speeds, "dae": PLAIN.speeds}
     for kind, counted in (("ae", "iterations"), ("ode", "rhs_calls"), ("dae", "rhs_calls")):
@@ -71,6 +52,8 @@ def test_defaults_follow_the_kind():
         assert cases[:2] == ["baseline", "strongest"]
         assert cases[-4:] == ["replay", "pod_r1", "pod_literal_r1", "fixed_basis_r1"]
         assert counted in of_kind(kind).counts
+    for coordinates, rank in ((1, 1), (2, 1), (3, 2), (4, 3), (26, 3)):
+        assert default_rank(coordinates) == rank
     assert tabled_outputs(PLAIN) == tuple(output.name for output in PLAIN.outputs)
     assert main_outputs(PLAIN) == ("angle", "tracked", "angular_speed")
 
@@ -81,11 +64,3 @@ def test_outputs_are_those_that_a_model_declares():
     chosen = replace(PLAIN, main_outputs=("tracked",))
     assert main_outputs(chosen) == ("tracked",)
     assert tabled_outputs(chosen) == tabled_outputs(PLAIN)
-
-
-@pytest.mark.parametrize(("coordinates", "rank"), [(1, 1), (2, 1), (3, 2), (4, 3), (26, 3)])
-def test_the_default_rank_is_a_reduction_where_there_is_one(coordinates, rank):
-    made = tuple(Quantity(f"q{k}", "m", "a coordinate") for k in range(coordinates))
-    speeds = tuple(Quantity(f"v{k}", "m/s", "a speed") for k in range(coordinates))
-    cases = timing_cases(replace(PLAIN, coordinates=made, speeds=speeds))
-    assert {case.settings["rank"] for case in cases if "rank" in case.settings} == {rank}

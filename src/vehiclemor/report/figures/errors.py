@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 
 from vehiclemor.errors import InputError
 from vehiclemor.report import labels
-from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.runs import legend_of
 from vehiclemor.report.figures.theme import Places, Results, Style, places_of, tick_decades
+from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER

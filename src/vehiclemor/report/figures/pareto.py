@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.theme import Results, Style
-from vehiclemor.report.predictive.rows import method_rows, protocol_of
+from vehiclemor.report.unseen import method_rows, protocol_of
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 # Letters of a title in a line.
@@ -40,7 +40,7 @@ def figure_pareto(results: Results) -> Figure:
     figure, axes = theme.panels(1, 1, (6.7, 4.2))
     axis = axes[0, 0]
     full = known[known["role"] == FULL_ORDER].sort_values("tolerance")
-    for (name, line), look in zip(full.groupby("contestant", sort=False), cycle(GREYS)):
+    for (name, line), look in zip(full.groupby("series", sort=False), cycle(GREYS)):
         bars: Style = {"xerr": line["bar"], "elinewidth": 0.8, "capsize": 1.5, **look}
         label = f"full order, {str(name).removeprefix('full order')}".removesuffix(", ")
         axis.errorbar(line["time"], line["score"], label=label, **bars)

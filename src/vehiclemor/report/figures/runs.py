@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from vehiclemor.errors import InputError
 from vehiclemor.report import labels
-from vehiclemor.report.criteria.finding import at_point
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.theme import CROSS, FULL, Results, Style, hide_rounding, tick_decades
+from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 

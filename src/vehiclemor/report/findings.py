@@ -1,16 +1,23 @@
-"""What a criterion returns, and what counts as visible in a figure.
+"""What a criterion finds of a number or claim of the paper, and the verdict on it.
 
 The paper shows curves; a reader sees a deviation on them when it is a visible share of the
 signal's range.  Each criterion is evaluated for the default settings and for the paper's literal
-ones, and of a vehicle for each start.
+ones, from equilibrium: the paper says nothing of another start.
 """
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
+MET, MISSED, NOT_COMPARABLE = "met", "missed", "not_comparable"
+VERDICTS = {MET: "met", MISSED: "missed", NOT_COMPARABLE: "not comparable"}
+# Interquartile range of the rounds of a timing over their median, above which a time decides
+# nothing: half of the runs lie up to a fifth apart.
+LARGEST_SPREAD = 0.2
 # Share of a signal's range from which on a deviation counts as visible in a figure: 2 mm on a curve
 # that is 40 mm high.
 VISIBLE = 0.05
@@ -21,52 +28,56 @@ SMALLEST_CHANGE = 0.01
 # Whose the threshold of a criterion is: the paper prints it, the claim's words leave no other, or
 # it is ours.
 PRINTED, IN_WORDS, OWN = "published", "the claim's words", "ours"
-# Studies of one start of a model.
-Results = Mapping[str, "xr.Dataset"]
+# Label of a method in the paper's studies -> what its rows are called.
+VARIANTS = {"pod": "default", "pod_literal": "literal"}
+Results = Mapping[str, xr.Dataset]
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """Outcome of one criterion.
 
     Attributes
     ----------
-    measured
+    reproduced, unit
         The number that decides.
     bound
-        What it is compared with.
-    met
-        Whether the claim holds.
+        What it is compared with, and in `threshold_source` whose it is.
+    within
+        Whether the number or claim holds; None if that can't be told.
     measure
         What the number is.
-    seen
-        What else was seen.
-    threshold
-        Whose the bound is.
+    reason
+        Why not, and what else was seen.
+    floor
+        Of an error: the same of the best approximation in the subspaces.
+    signal_rms
+        Of an error: the RMS of the signal itself.  A bound above it is empty: zero would meet it.
+    strongest
+        Of a time: the time over that of the strongest full-order solver.
     """
 
-    measured: float
+    reproduced: float
     bound: float
-    met: bool
+    within: bool | None
     measure: str
-    seen: str = ""
-    threshold: str = OWN
-
-
-# Label of a method in the paper's studies -> what its rows are called.
-VARIANTS = {"pod": "default", "pod_literal": "literal"}
+    reason: str = ""
+    threshold_source: str = OWN
+    unit: str = "1"
+    floor: float = math.nan
+    signal_rms: float = math.nan
+    strongest: float = math.nan
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """A claim of the paper as a number that can miss its bound.
+    """A number or claim of the paper as a number that can miss its bound.
 
     Attributes
     ----------
     judge
         (results, label of a method) -> finding.
     studies
-        Names of the studies whose results it needs; it gets no others.
+        Names of the studies and timings whose results it needs; it gets no others.
     variants
         Label of a method in them -> what its row is called.
     of_replay
@@ -84,32 +95,16 @@ class Criterion:
 
 
 def at_point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
-    """One method at one place of the grid."""
-    return without_single(dataset.sel({"label": label, **place}))
-
-
-def without_single(dataset: xr.Dataset) -> xr.Dataset:
-    """Without dimensions of the grid that have one value; a model may have a single output."""
-    single = [d for d in dataset["status"].dims if dataset.sizes[d] == 1 and d != "label"]
-    return dataset.squeeze(single, drop=True)
-
-
-def deviation_history(point: xr.Dataset, output: str) -> xr.DataArray:
-    """Error history as a share of the full-order signal's range."""
-    error = point["outputs"].sel(output=output) - point["reference_outputs"].sel(output=output)
-    return error / point["signal_range"].sel(output=output)
+    """One method at one place of the grid, without dimensions that have one value."""
+    chosen = dataset.sel({"label": label, **place})
+    single = [d for d in chosen["status"].dims if chosen.sizes[d] == 1]
+    return chosen.squeeze(single, drop=True)
 
 
 def largest_deviation(point: xr.Dataset, output: str) -> float:
     """Largest error of an output as a share of the full-order signal's range."""
     chosen = point.sel(output=output)
     return float(chosen["max_error"] / chosen["signal_range"])
-
-
-def relative_rms(dataset: xr.Dataset, label: str, output: str) -> np.ndarray:
-    """RMS errors of a method over a grid as shares of the full-order signal's range."""
-    chosen = at_point(dataset, label, output=output)
-    return (chosen["rms_error"] / chosen["signal_range"]).values
 
 
 def not_visible(point: xr.Dataset, outputs: tuple[str, ...], bound: float = VISIBLE) -> Finding:
@@ -123,10 +118,7 @@ def not_visible(point: xr.Dataset, outputs: tuple[str, ...], bound: float = VISI
 
 def worst_of(values: Mapping[str, float]) -> tuple[float, str]:
     """Largest value and where it is; missing if any is missing."""
-    missing = [name for name, value in values.items() if value != value]
-    if missing:
-        return float("nan"), missing[0]
-    name = max(values, key=lambda key: values[key])
+    name = list(values)[int(np.argmax(list(values.values())))]
     return values[name], name
 
 
@@ -137,3 +129,31 @@ def agree(study: str, outputs: tuple[str, ...], bound: float = VISIBLE, rank: in
         return not_visible(at_point(results[study], label, rank=rank), outputs, bound)
 
     return Criterion(judge, (study,))
+
+
+def judged(within: bool | None) -> str:
+    """Verdict on a number that is within its bound or not, or can't be compared."""
+    return {True: MET, False: MISSED, None: NOT_COMPARABLE}[within]
+
+
+def scatter(spreads: Mapping[str, float]) -> str:
+    """Why times can't be compared, empty if they can.
+
+    Parameters
+    ----------
+    spreads
+        What was timed -> interquartile range of its rounds over their median.
+    """
+    wide = [f"{name} {100 * s:.0f} %" for name, s in spreads.items() if not s <= LARGEST_SPREAD]
+    if not wide:
+        return ""
+    return (
+        f"the rounds scatter by more than {100 * LARGEST_SPREAD:.0f} % (interquartile range over "
+        f"median): {', '.join(wide)}; run again on an idle machine"
+    )
+
+
+def counted(verdicts: Iterable[str]) -> str:
+    """How many rows there are of each verdict, in words."""
+    found = list(verdicts)
+    return ", ".join(f"{found.count(v)} {words}" for v, words in VERDICTS.items() if v in found)

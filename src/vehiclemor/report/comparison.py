@@ -1,0 +1,163 @@
+"""Comparisons: with the paper, on unseen inputs, of every model, of any study."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import xarray as xr
+
+from vehiclemor.arguments import count, file_path
+from vehiclemor.errors import InputError
+from vehiclemor.reduction.methods import pod
+from vehiclemor.registry import names, unknown
+from vehiclemor.report.costs import cost_table, timing_of
+from vehiclemor.report.criteria import CRITERIA
+from vehiclemor.report.default_studies import nominal, perturbed, unseen
+from vehiclemor.report.findings import Criterion, Finding, Results, judged
+from vehiclemor.report.frames import grid_rows
+from vehiclemor.report.printed_numbers import CLAIMS, TIMING, compared, number_criterion
+from vehiclemor.report.published import Claim, Number, load_published
+from vehiclemor.report.spectrum import spectrum_table
+from vehiclemor.report.unseen import protocol_rows
+from vehiclemor.resources import data_names
+from vehiclemor.simulation.build import build
+from vehiclemor.study.run import run_studies
+
+PAPER = "paper"
+ALL_MODELS = "all three models"
+NOTHING_MEASURED = "an explanation or a judgement; the paper prints nothing that could be measured"
+# The paper says nothing of another start.
+PUBLISHED_START = "equilibrium"
+Row = dict[str, Any]
+
+
+def compare(
+    what: str = PAPER, results: str | Path = "results", jobs: int = 1, seed: int | None = None
+) -> pd.DataFrame:
+    """A comparison as a table; studies and timings that are missing are run first.
+
+    Parameters
+    ----------
+    what
+        `paper`: published beside reproduced.  `predictive`: reduced models on inputs that they have
+        not seen, beside full-order integrators.  The name of a model: every method that fits it,
+        nominal, perturbed and on unseen inputs, with costs.  A study, collection or protocol, by
+        name or TOML file: errors of every method over the grid, or on the protocol's inputs.
+    results
+        Results folder.
+    jobs
+        Number of processes.
+    seed
+        Draws fresh test runs for an audit: of `predictive`, or of a protocol.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Of `paper` a row for each published number or claim and variant of the method (`default`,
+        `literal`: the paper's words, or what differs from them): its id, model, item, the published
+        number, a `verdict` (`met`, `missed`, `not_comparable`), the columns of `findings.Finding`,
+        and `replay`, the same number of replay.  The others are described at `model_comparison` and
+        `study_comparison` in `vehiclemor.report.comparison`.
+
+    Raises
+    ------
+    InputError
+        If there is no such comparison.
+    """
+    folder, jobs = file_path("results", results), count("jobs", jobs)
+    if seed is not None and (what == PAPER or what in names("model")):
+        raise InputError(f"seed: comparison {what!r} draws no test runs of its own")
+    if what == PAPER:
+        return paper_comparison(folder, jobs)
+    if what in names("model"):
+        return model_comparison(what, folder, jobs)
+    if isinstance(what, str) and (what in data_names("studies") or what.endswith(".toml")):
+        return study_comparison(what, folder, jobs, seed)
+    known = [PAPER, *names("model"), *data_names("studies"), "FILE.toml"]
+    raise unknown("comparison", what, known)
+
+
+def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
+    """Every number and claim of the paper, by model, with verdict and reason; see `compare`."""
+    results = dict(run_studies(PAPER, folder, jobs))
+    results |= {timing: timing_of(model, folder) for model, timing in TIMING.items()}
+    results = {name: of_published_start(dataset) for name, dataset in results.items()}
+    numbers, claims = compared(), load_published().claims.values()
+    rows = [row for n in numbers for row in rows_of(n, number_criterion(n), results)]
+    for claim in claims:
+        if claim.kind != "setup":
+            rows += rows_of(claim, claim_criterion(claim), results)
+    place = {model: index for index, model in enumerate(dict.fromkeys(n.model for n in numbers))}
+    return pd.DataFrame(sorted(rows, key=lambda row: place.get(row["model"], len(place))))
+
+
+def claim_criterion(claim: Claim) -> Criterion | None:
+    """The criterion of a claim, if there is one; a number that was measured once stands for one."""
+    if (old := claim.measured) is None:
+        return (CRITERIA | CLAIMS).get(claim.id)
+    finding = Finding(old.value, old.bound, old.value <= old.bound, old.measure, old.seen)
+    return Criterion(lambda *_: finding, variants={"": old.variant}, of_replay=False)
+
+
+def of_published_start(dataset: xr.Dataset) -> xr.Dataset:
+    """A study or timing from the start that what is published is judged by."""
+    several = PUBLISHED_START in dataset.indexes.get("start", ())
+    return dataset.sel(start=PUBLISHED_START) if several else dataset
+
+
+def rows_of(entry: Number | Claim, criterion: Criterion | None, results: Results) -> Iterator[Row]:
+    """A row for each variant of the method; one without a number for what can't be measured."""
+    head: Row = {"id": entry.id, "model": entry.model or ALL_MODELS}
+    if isinstance(entry, Number):
+        head["item"] = f"{entry.item} (figure {entry.figure})" if entry.figure else entry.item
+    else:
+        head["item"] = f"figure {entry.figure}: " * bool(entry.figure) + entry.statement
+    head["published"] = entry.value if isinstance(entry, Number) else math.nan
+    nothing = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-")
+    replay = (
+        criterion(results, "replay").reproduced if criterion and criterion.of_replay else math.nan
+    )
+    for label, variant in criterion.variants.items() if criterion else [("", "")]:
+        finding = criterion(results, label) if criterion else nothing
+        own = {"variant": variant, "verdict": judged(finding.within), "replay": replay}
+        yield head | own | finding._asdict()
+
+
+def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
+    """Every registered method that fits, on one model; what is missing is run first.
+
+    Returns
+    -------
+    pandas.DataFrame
+        `kind` tells what a row is: `cost`, `spectrum` as in `cost_table`, `spectrum_table`; the
+        others as in `study_comparison`, of the model's studies `<model>-nominal` and
+        `<model>-perturbed` and of its protocol.
+    """
+    studies = nominal(name, folder), perturbed(name, folder)
+    parts = [study_comparison(study, folder, jobs) for study in studies]
+    parts.append(cost_table(name, folder).assign(kind="cost"))
+    if pod.METHOD.accepts(build(name))[0]:
+        parts.append(spectrum_table(name).assign(kind="spectrum"))
+    parts.append(study_comparison(unseen(name, folder), folder, jobs))
+    return pd.concat(parts, ignore_index=True).assign(model=name)
+
+
+def study_comparison(
+    study: str, folder: Path, jobs: int = 1, seed: int | None = None
+) -> pd.DataFrame:
+    """A study, all members of a collection, or a protocol; what is missing is run first.
+
+    Returns
+    -------
+    pandas.DataFrame
+        `study` and `kind` tell what a row is.  `errors`: an output of one method from one start
+        over a study's grid, see `frames.grid_rows`.  `method`, `target`, `bound`: a method of a
+        protocol, and what the one that validation has chosen must and does reach, see `unseen`.
+        Errors are in SI units.
+    """
+    rows: list[Row] = []
+    for dataset in run_studies(study, folder, jobs, seed=seed).values():
+        rows += protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
+    return pd.DataFrame(rows)

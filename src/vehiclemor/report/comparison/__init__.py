@@ -1,1 +1,0 @@
-"""Published beside reproduced: numbers, times and claims of the paper."""

@@ -1,1 +1,0 @@
-"""Reduced models on inputs that they have not seen."""

@@ -1,0 +1,278 @@
+"""Methods on inputs that they were not trained on: errors, times beside full order, targets.
+
+Times of the full order at the error of a method are interpolated on ladders: a ladder is one
+integrator at several tolerances.  Its useful rows form a curve of time over error; between two of
+them it is taken as a power law, which is what an integrator of fixed order gives.  A ladder that
+ends just above the error is continued by the law of its last two rows: else a slower integrator
+would stand in for it.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby, pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from vehiclemor.report.findings import NOT_COMPARABLE, OWN, judged, scatter
+from vehiclemor.report.labels import unit_of
+from vehiclemor.simulation.trajectory import FINISHED
+from vehiclemor.study.plans.choice import outcomes
+from vehiclemor.study.plans.protocol import FULL_ORDER
+from vehiclemor.study.plans.results import judged_part, judged_set
+from vehiclemor.study.plans.study_file import SpeedTarget, StudyFile
+
+Row = dict[str, Any]
+OUTSIDE = ("outside", "drawn_outside")
+# Column of seconds -> its ratio to the full order at equal error.
+CLOCKS = {"seconds": "ratio_equal", "loop_seconds": "ratio_equal_loop"}
+# Of the bounds of rates.
+CONFIDENCE = 0.95
+# Smallest part of the error of its last row to which a ladder is continued.
+CONTINUED = 0.5
+
+
+def protocol_rows(dataset: xr.Dataset) -> list[Row]:
+    """Rows of one protocol, by `kind`: `method`, then `target` and `bound` of what was chosen."""
+    protocol = protocol_of(dataset)
+    methods = method_rows(dataset, protocol)
+    rows = methods + target_rows(dataset, protocol, methods)
+    rows += [row for method in methods if method["winner"] for row in bound_rows(protocol, method)]
+    head = {"study": str(dataset.attrs["study"]), "model": protocol.model}
+    return [head | row for row in rows]
+
+
+def protocol_of(dataset: xr.Dataset) -> StudyFile:
+    """The protocol of a combined dataset."""
+    return StudyFile.model_validate_json(dataset.attrs["configuration"])
+
+
+def method_rows(dataset: xr.Dataset, protocol: StudyFile) -> list[Row]:
+    """One row for each method, full-order integrators as measures.
+
+    `runs` of the `test_set` are judged, `apart` ones more are not: the full order is sensitive
+    there.  Of the runs `misses` miss a bound, `silent` ones with the status ok; `flagged` are those
+    of which the model says that it has left what it knows.  `score` is the largest error of a
+    bounded output as a multiple of its bound (infinite if a run has failed), `worst_MEASURE_OUTPUT`
+    and `most_...` the largest error and the 99 % quantile.  `seconds` is the mean of whole calls,
+    `loop_seconds` of their compiled loops, with the `spread` of the rounds (interquartile range
+    over median).  `ratio_equal` and `ratio_equal_loop` are against the full order interpolated at
+    the row's own score on the rows `equal_rows`, `ratio_within` against `within`, the fastest
+    full-order row within the bounds.
+    """
+    part = judged_part(dataset)
+    rows = [_method_row(dataset, part, str(label), protocol) for label in part["label"].values]
+    full = [row for row in rows if row["role"] == FULL_ORDER and math.isfinite(row["score"])]
+    ladders = [list(own) for _, own in groupby(full, key=lambda row: row["series"])]
+    return [row | _against(row, full, ladders) for row in rows]
+
+
+def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: StudyFile) -> Row:
+    part, every = judged.sel(label=label), dataset.sel(label=label)
+    sets = dataset["scenario_set"].values
+    outside = outcomes(every.isel(scenario=np.isin(sets, OUTSIDE)), protocol.bounds)
+    found = outcomes(part, protocol.bounds)
+    row: Row = {
+        "kind": "method",
+        "label": label,
+        **{name: str(part[name].item()) for name in ("series", "role", "method", "settings")},
+        "rank": int(part["effective_rank"]),
+        "winner": bool(part["winner"]),
+        "test_set": str(dataset.attrs["test_set"]),
+        "runs": part.sizes["scenario"],
+        "apart": int((sets == judged_set(set(sets))).sum()) - part.sizes["scenario"],
+        "misses": int(found.missed.sum()),
+        "silent": int(found.silent.sum()),
+        "flagged": int(found.flagged.sum()),
+        "score": float(found.scores.max()),
+        # What has come to its end, trusted or not.
+        "stable_share": float(np.isfinite(found.scores).mean()),
+        "failure": _failure(part),
+        "outside_runs": len(outside.scores),
+        "outside_misses": int(outside.missed.sum()),
+        "outside_silent": int(outside.silent.sum()),
+        "outside_flagged": int(outside.flagged.sum()),
+        "validation_score": float(part["validation_score"]),
+        "offline_seconds": float(part["offline_seconds"]),
+    }
+    for name, (output, measure) in error_columns(protocol).items():
+        errors: Any = part[f"{measure}_error"].sel(output=output).to_series()
+        # Of the runs that have come to their end.
+        errors = errors[np.isfinite(errors)]
+        row |= {f"worst_{name}": float(errors.max()), f"most_{name}": float(errors.quantile(0.99))}
+    # Means over the runs that were timed; the spread of all of them together.
+    clocks = [name for name in (*CLOCKS, "seconds_lower", "seconds_upper") if name in part]
+    times = {name: float(part[name].mean()) for name in clocks}
+    spread = times.pop("seconds_upper") - times.pop("seconds_lower")
+    return row | times | {"spread": spread / times["seconds"] if times["seconds"] > 0.0 else 0.0}
+
+
+def error_columns(protocol: StudyFile) -> dict[str, tuple[str, str]]:
+    """Name of a column of errors -> (output, measure): the bounded outputs, then the reported."""
+    bounded = {f"{b.measure}_{o}": (o, b.measure) for o, b in protocol.bounds.items()}
+    return bounded | {f"rms_{output}": (output, "rms") for output in protocol.reported}
+
+
+def _failure(part: xr.Dataset) -> str:
+    """The first failure of a row, empty if there is none."""
+    failed = ~np.isin(part["status"].values, FINISHED)
+    if not failed.any():
+        return ""
+    run = part.isel(scenario=int(failed.argmax()))
+    return f"{run['status'].item()} in ({run['scenario'].item()}): {run['message'].item()}"
+
+
+def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
+    """Ratios of a row to the full order."""
+    within = (other for other in full if other["misses"] == 0)
+    best = min(within, key=lambda other: other["seconds"], default=None)
+    equal = {clock: at_error(ladders, row["score"], clock) for clock in CLOCKS if clock in row}
+    # A recording that is played again is no solution of anything.
+    solves = row["method"] != "replay"
+    ratios = {
+        CLOCKS[clock]: found.seconds / row[clock] if solves and row[clock] else math.nan
+        for clock, found in equal.items()
+    }
+    return {
+        "equal_rows": ", ".join(equal["seconds"].rows),
+        "within": best["label"] if best else "",
+        "ratio_within": ratio(best, row),
+        **dict.fromkeys(CLOCKS.values(), math.nan),
+        **ratios,
+    }
+
+
+def ratio(other: Row | None, row: Row) -> float:
+    """How many times the other's time a row's is; none for a row that computes nothing."""
+    return other["seconds"] / row["seconds"] if other and row["seconds"] > 0.0 else math.nan
+
+
+class Equal(NamedTuple):
+    """The fastest full order at an error.
+
+    Attributes
+    ----------
+    seconds
+        Of a run; NaN if no ladder reaches the error.
+    rows
+        The rows between which it lies or which are continued, or the one that is used.
+    """
+
+    seconds: float
+    rows: tuple[str, ...] = ()
+
+
+def at_error(ladders: Iterable[Sequence[Row]], error: float, clock: str) -> Equal:
+    """The fastest of all ladders at an error (a score), by a column of seconds."""
+    found = [_on(_useful(ladder, clock), error, clock) for ladder in ladders]
+    reached = [equal for equal in found if not math.isnan(equal.seconds)]
+    return min(reached, key=lambda equal: equal.seconds, default=Equal(math.nan))
+
+
+def _useful(ladder: Sequence[Row], clock: str) -> list[Row]:
+    """Rows of which none of the ladder is both faster and more accurate, least accurate first."""
+    kept: list[Row] = []
+    for row in sorted(ladder, key=lambda row: (row[clock], row["score"])):
+        if row[clock] > 0.0 and (not kept or row["score"] < kept[-1]["score"]):
+            kept.append(row)
+    return kept
+
+
+def _on(curve: Sequence[Row], error: float, clock: str) -> Equal:
+    if not curve or not error >= curve[-1]["score"] * (CONTINUED if len(curve) > 1 else 1.0):
+        return Equal(math.nan)
+    if error >= curve[0]["score"]:
+        return Equal(curve[0][clock], (curve[0]["label"],))
+    further = (pair for pair in pairwise(curve) if error >= pair[1]["score"])
+    loose, tight = next(further, (curve[-2], curve[-1]))
+    if tight["score"] <= 0.0:
+        return Equal(tight[clock], (tight["label"],))
+    part = math.log(error / loose["score"]) / math.log(tight["score"] / loose["score"])
+    seconds = loose[clock] * (tight[clock] / loose[clock]) ** part
+    return Equal(seconds, (loose["label"], tight["label"]))
+
+
+def upper_bound(misses: int, runs: int) -> float:
+    """Rate of misses that so many in so many runs exclude at 95 % (C. Clopper, E. Pearson, 1934).
+
+    The one-sided exact bound: without a miss in 299 runs it is below 1 %.
+    """
+    from scipy.stats import binomtest
+
+    if runs == 0:
+        return 1.0
+    test = binomtest(misses, runs, alternative="less")
+    return float(test.proportion_ci(CONFIDENCE, method="exact").high)
+
+
+def bound_rows(protocol: StudyFile, winner: Row) -> Iterator[Row]:
+    """Errors of what was chosen, each beside its bound and the bound's reason."""
+    for name, (output, measure) in error_columns(protocol).items():
+        bound = protocol.bounds.get(output)
+        row = {"kind": "bound", "label": winner["label"], "item": output, "measure": measure}
+        row |= {"worst": winner[f"worst_{name}"], "most": winner[f"most_{name}"]}
+        row |= {"bound": bound.bound, "reason": bound.reason} if bound else {"reason": ""}
+        yield row
+
+
+def target_rows(dataset: xr.Dataset, protocol: StudyFile, methods: list[Row]) -> list[Row]:
+    """What the chosen one must reach: misses, warnings, ratios, the straight line."""
+    winner = next((row for row in methods if row["winner"]), None)
+    if winner is None:
+        return []
+    runs, misses = f"of {winner['runs']} runs", winner["misses"]
+    flagged = f"{winner['flagged']} flagged {runs}"
+    rows = [
+        _target("silent misses", 0, winner["silent"], runs),
+        _target("flagged misses", protocol.flagged_misses, misses - winner["silent"], flagged),
+    ]
+    if protocol.failure_rate is not None:
+        rate, reason = upper_bound(misses, winner["runs"]), "Clopper-Pearson, 95 %"
+        reason = f"{misses} misses {runs}, {reason}"
+        rows.append(_target("failure rate below", protocol.failure_rate, rate, reason))
+    if winner["outside_runs"]:
+        reason = (
+            f"of {winner['outside_runs']} runs, {winner['outside_flagged']} flagged, "
+            f"{winner['outside_misses']} outside of the bounds"
+        )
+        rows.append(_target("silent misses outside", 0, winner["outside_silent"], reason))
+    if straight := protocol.straight:
+        here = [str(s).startswith(f"{straight.maneuver},") for s in dataset["scenario"].values]
+        part = dataset["largest_output"].isel(scenario=here)
+        part = part.sel(label=winner["label"], output=straight.output)
+        largest = float(part.max(skipna=False)) if any(here) else math.nan
+        item = f"largest {straight.output} without steering"
+        reason = f"first 10 s of {straight.maneuver}, {sum(here)} runs"
+        row = _target(item, straight.bound, largest, reason)
+        rows.append(row | {"unit": unit_of(dataset, straight.output)})
+    rows += [_speed_target(target, winner, methods) for target in protocol.targets]
+    head = {"kind": "target", "label": winner["label"]}
+    return [head | {"id": row["item"].replace(" ", "_")} | row for row in rows]
+
+
+def _target(item: str, bound: float, measured: float, reason: str, sign: float = 1.0) -> Row:
+    """What is at most a bound, or at least with the sign -1."""
+    row = {"item": item, "bound": bound, "measured": measured, "unit": "1", "reason": reason}
+    verdict = judged(sign * measured <= sign * bound)
+    return row | {"verdict": verdict, "threshold_source": OWN}
+
+
+def _speed_target(target: SpeedTarget, winner: Row, methods: list[Row]) -> Row:
+    """Speed-up of whole calls against the full order, unless one of the times scatters."""
+    if target.against == "equal accuracy":
+        names, factor = winner["equal_rows"].split(", "), winner["ratio_equal"]
+        beside = f"; compiled loops alone {winner['ratio_equal_loop']:.2g}"
+    else:
+        name = winner["within"] if target.against == "within bounds" else target.against
+        names, beside = [name], ""
+        factor = ratio(next((row for row in methods if row["label"] == name), None), winner)
+    found = " and ".join(filter(None, names))
+    reason = f"against {found}" if found else "no full-order row is as accurate"
+    reason += beside + (f"; the aim is {target.aim:g}" if target.aim else "")
+    row = _target(f"speed-up, {target.against}", target.ratio, factor, reason, -1.0)
+    timed = [r for r in methods if r["label"] in {winner["label"], *names}]
+    scattered = scatter({r["label"]: r["spread"] for r in timed})
+    if scattered:
+        row |= {"verdict": NOT_COMPARABLE, "reason": f"{scattered}; {reason}"}
+    return row
