@@ -21,8 +21,8 @@ from vehiclemor import VehiclemorError
 from vehiclemor.api import RESULTS
 from vehiclemor.errors import FileError
 from vehiclemor.files import make_folder
-from vehiclemor.online.model_file import content, load, shipped_folder
-from vehiclemor.online.rom import ReducedOrderModel, reduce
+from vehiclemor.online.model_file import content
+from vehiclemor.online.rom import ReducedOrderModel, load, reduce, shipped_folder
 from vehiclemor.resources import data_folder
 from vehiclemor.study.experiment import Settings
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from vehiclemor.inputs.signal import Signal as Signal
     from vehiclemor.inputs.signal import many_signals as many_signals
     from vehiclemor.online.batches import simulate_many as simulate_many
-    from vehiclemor.online.model_file import load as load
-    from vehiclemor.online.model_file import rom as rom
+    from vehiclemor.online.rom import load as load
     from vehiclemor.online.rom import reduce as reduce
+    from vehiclemor.online.rom import rom as rom
     from vehiclemor.report.comparison import compare as compare
     from vehiclemor.report.page import write_report as write_report
     from vehiclemor.report.regenerate import figures as figures
@@ -50,7 +50,7 @@ _DEFINED_IN = {
     "many_signals": "vehiclemor.inputs.signal",
     "write_report": "vehiclemor.report.page",
     "reduce": "vehiclemor.online.rom",
-    **dict.fromkeys(("load", "rom"), "vehiclemor.online.model_file"),
+    **dict.fromkeys(("load", "rom"), "vehiclemor.online.rom"),
     "simulate_many": "vehiclemor.online.batches",
 }
 __all__ = [

@@ -16,8 +16,7 @@ from vehiclemor.exporting.exported import exported_system
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import KINDS
-from vehiclemor.online.model_file import load
-from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.online.rom import ReducedOrderModel, load
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.validation import validated

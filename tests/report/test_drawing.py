@@ -160,7 +160,7 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeyp
     assert [row.rpartition("-")[2] for row in printed.out.split()] == ["errors.png", "1.png"]
     page = vm.write_report([str(folder / "late.toml")], folder / "page.html", folder)
     head, _, rest = page.read_text(encoding="utf-8").partition("<ol")
-    assert "Left out: histories of late (IndexError: index 51" in head
+    assert "late (IndexError: index 51" in head
     assert "RMS errors" in rest
 
 

@@ -8,8 +8,8 @@ import pytest
 import vehiclemor as vm
 from vehiclemor.codegen import cache
 from vehiclemor.errors import InputError
-from vehiclemor.inputs.maneuver import sine_travel
 from vehiclemor.inputs.signal import Signal
+from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods import pod, slow_manifold
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build

@@ -7,7 +7,7 @@ import ast
 from collections.abc import Collection
 from keyword import iskeyword
 
-from vehiclemor.codegen.operations import FUNCTIONS, Reader
+from vehiclemor.codegen.operations import COMPARISONS, FUNCTIONS, Reader
 
 # The largest kernel of this package has 131,000 characters and 22,000 operations, and compiles in
 # 9 s.  A file may have four times as much.
@@ -39,7 +39,8 @@ def check_line(name: str, text: str, known: Collection[str]) -> tuple[int, int]:
     if not (text.isascii() and text.isprintable()) or "#" in text:
         raise ValueError(f"{text[:40]!r} is no line of arithmetic")
     # Arrays of kernels begin with an underscore; there is one of each.
-    if not name.isidentifier() or iskeyword(name) or name.startswith("_") or name == "p":
+    own = name.isascii() and name.isidentifier() and not iskeyword(name)
+    if not own or name.startswith("_") or name == "p":
         raise ValueError(f"{name[:40]!r} is no name")
     try:
         expression = ast.parse(text, mode="eval").body
@@ -47,5 +48,9 @@ def check_line(name: str, text: str, known: Collection[str]) -> tuple[int, int]:
         raise ValueError(f"{text[:40]!r} is no arithmetic") from None
     reader = Reader(("p",), dict.fromkeys(known, 0.0))
     reader.value(expression)
+    tests = {op.arguments[0] for op in reader.operations if op.kind == "select"}
+    compared = {n for n, op in enumerate(reader.operations) if op.kind in COMPARISONS.values()}
+    if tests != compared:
+        raise ValueError(f"{text[:40]!r} takes a comparison for a number, or a number for one")
     kinds = [operation.kind for operation in reader.operations[len(known) :]]
     return len(kinds) + CALL * sum(kind in FUNCTIONS.values() for kind in kinds), reader.sizes["p"]

@@ -19,11 +19,9 @@ import numpy as np
 from vehiclemor.arguments import file_path, quoted
 from vehiclemor.errors import FileError, InputError, VehiclemorError, one_line
 from vehiclemor.online.parts import Reader, Writer
-from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.validation import checked_fit, checked_settings
-from vehiclemor.registry import choice, component
-from vehiclemor.resources import data_folder
+from vehiclemor.registry import component
 from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -50,7 +48,7 @@ SAME, ROUNDING = 1e-8, 1e-12
 STEP = 0.01
 
 
-def write(rom: ReducedOrderModel, path: Any, overwrite: bool = False) -> Path:
+def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
     """Write a reduced model into a file, see `ReducedOrderModel.save`."""
     import xarray as xr
 
@@ -86,14 +84,8 @@ def write(rom: ReducedOrderModel, path: Any, overwrite: bool = False) -> Path:
     return path
 
 
-def load(path: Any) -> ReducedOrderModel:
-    """A reduced model from the file that its `save` has written; nothing is fitted.
-
-    Raises
-    ------
-    FileError
-        If the file is missing, damaged or something else, or does not fit what is installed.
-    """
+def read(path: Any) -> dict[str, Any]:
+    """What a `ReducedOrderModel` is made of, by name, from its file; see `rom.load`."""
     path = file_path("path", path)
     stored, attrs = content(path)
     try:
@@ -113,26 +105,12 @@ def load(path: Any) -> ReducedOrderModel:
         require(made["known"].largest.shape == (kinds, len(model.inputs)), "largest")
         if not _alike(stored["response"], response(model, made["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")
-        return ReducedOrderModel(model, method, settings, tuple(training), **made)
+        own = {"model": model, "method": method, "settings": settings, "training": tuple(training)}
+        return own | made
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
         raise _unfit(path, one_line(error)) from None
     except (SyntaxError, ValueError, VehiclemorError) as error:
         raise _unfit(path, " ".join(str(error).split())) from None
-
-
-def rom(model: str) -> ReducedOrderModel:
-    """The reduced model of a car or a suspension that ships with the package.
-
-    It is the one that the model's protocol has chosen for unseen inputs, see `compare()`;
-    `InputError` if none ships for a model of this name.
-    """
-    known = {path.stem: path for path in shipped_folder().glob("*.nc")}
-    return load(known[choice("model with a reduced one that ships", model, known)])
-
-
-def shipped_folder() -> Path:
-    """Folder of the models that ship, each under the name of the full model."""
-    return data_folder() / "reduced"
 
 
 def _parsed(text: str) -> Any:

@@ -13,9 +13,11 @@ import numpy as np
 from vehiclemor.arguments import number
 from vehiclemor.errors import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.online import model_file
 from vehiclemor.reduction.interface import Method, ReducedModel
 from vehiclemor.reduction.reduced_system import StateSpace
-from vehiclemor.registry import component
+from vehiclemor.registry import choice, component
+from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, checked_array, checked_path
 from vehiclemor.simulation.model import Model
@@ -285,9 +287,7 @@ class ReducedOrderModel(ShortRepr):
         VehiclemorError
             If the file can't be written; then there is none, or the old one.
         """
-        from vehiclemor.online.model_file import write
-
-        return write(self, path, overwrite)
+        return model_file.write(self, path, overwrite)
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy takes along: of the training what a file keeps, a maneuver may be local."""
@@ -364,3 +364,29 @@ def reduce(
         runs = [training_run(ready, scenario) for scenario in scenarios]
         reduced = fitted(definition, ready, runs, complete)
     return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, reduced)
+
+
+def load(path: Any) -> ReducedOrderModel:
+    """A reduced model from the file that its `save` has written; nothing is fitted.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, damaged or something else, or does not fit what is installed.
+    """
+    return ReducedOrderModel(**model_file.read(path))
+
+
+def rom(model: str) -> ReducedOrderModel:
+    """The reduced model of a car or a suspension that ships with the package.
+
+    It is the one that the model's protocol has chosen for unseen inputs, see `compare()`;
+    `InputError` if none ships for a model of this name.
+    """
+    known = {path.stem: path for path in shipped_folder().glob("*.nc")}
+    return load(known[choice("model with a reduced one that ships", model, known)])
+
+
+def shipped_folder() -> Path:
+    """Folder of the models that ship, each under the name of the full model."""
+    return data_folder() / "reduced"

@@ -9,7 +9,7 @@ from scipy.linalg import subspace_angles
 
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection, fit_windows
-from vehiclemor.reduction.projection.windows import by_window, window_edges
+from vehiclemor.reduction.projection.bases import by_window, window_edges
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component

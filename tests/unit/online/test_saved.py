@@ -20,8 +20,8 @@ import vehiclemor as vm
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.online import parts
-from vehiclemor.online.model_file import shipped_folder
 from vehiclemor.online.parts import Reader, Writer
+from vehiclemor.online.rom import shipped_folder
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.build import build
 from vehiclemor.study import netcdf_file
