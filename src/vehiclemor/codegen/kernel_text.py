@@ -61,7 +61,8 @@ class _Printer(PythonCodePrinter):
     def _print_Pi(self, expr: sp.Expr) -> str:
         return repr(float(expr))
 
-    _print_Exp1 = _print_Pi
+    def _print_Exp1(self, expr: sp.Expr) -> str:
+        return repr(float(expr))
 
     def _print_Half(self, expr: sp.Rational) -> str:
         del expr

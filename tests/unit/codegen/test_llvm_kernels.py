@@ -85,7 +85,8 @@ def test_functions_and_powers_of_both_printers_keep_their_values():
     expressions = [
         sp.sqrt(x), sp.exp(-x), sp.Abs(x - y), sp.tan(x), sp.asin(x / 7), sp.acos(x / 7),
         sp.atan2(x - 2, y), sp.sinh(x), sp.cosh(x), sp.tanh(x), sp.log(x), x**7, -x, 1 / x**3,
-        x ** sp.Rational(3, 2), x + p, sp.Float(2.5), sp.Integer(-3), sp.pi * y / x + sp.E, -y / (x + y),
+        x ** sp.Rational(3, 2), x + p, sp.Float(2.5), sp.Integer(-3),
+        sp.pi * y / x + sp.E, -y / (x + y),
         y / sp.sqrt(x), (x * y) ** -2, -(x**2) + y, x**3 - x**4 * y, 3 * x - 3 * y,
         sp.Rational(1, 3) * x - sp.Rational(1, 2) * y, sp.Float(0.12345678901234567) * x,
         sp.atan2(-x, y) + sp.asin(x / 7), sp.exp(-x) * y, -3 * x / (x + y) ** 2, x**2 / y**3,
