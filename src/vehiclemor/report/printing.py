@@ -181,7 +181,10 @@ def _in_columns(
 ) -> list[str]:
     """Lines of a row whose texts are wrapped within their columns; headings stand at the bottom."""
     texts = [
-        textwrap.wrap(text, width, break_on_hyphens=False)[:: -1 if heading else 1]
+        # The rest of a point in a list stands below its text.
+        textwrap.wrap(
+            text, width, break_on_hyphens=False, subsequent_indent="  " * text.startswith("- ")
+        )[:: -1 if heading else 1]
         for text, width in zip(cells, widths, strict=True)
     ]
     lines = [
