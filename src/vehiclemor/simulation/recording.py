@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
+from weakref import ref
 
 import numpy as np
 
@@ -51,33 +54,39 @@ class Recording(NamedTuple):
         """At the samples (samples, width)."""
         if not len(self.places):
             return self.points
-        return self._sampled(ALL, cache_lines(len(self.places), self.points.shape[1])[0])
+        result, address = cache_lines(len(self.places), self.points.shape[1])
+        self._sample(ALL, 0, (address, *result.shape))
+        return result
 
     def columns(self, numbers: np.ndarray) -> np.ndarray:
         """Some of them at the samples (samples, columns)."""
         if not len(self.places):
             return self.points[:, numbers]
-        return self._sampled(numbers, np.empty((len(self.places), len(numbers))))
+        result = np.empty((len(self.places), len(numbers)))
+        self._sample(numbers, address_of_array(numbers), (address_of_array(result), *result.shape))
+        return result
 
-    def _sampled(self, numbers: np.ndarray, result: np.ndarray) -> np.ndarray:
-        arrays = self.points, self.places, numbers, result
-        call = _SAMPLED.taken(None, lambda: path_loops()["sampled"].prepared(*arrays))
-        place = 0
-        for array in arrays:
-            # Named columns may be none.
-            call.words[place] = address_of_array(array) if array.size else 0
-            for length in array.shape:
-                call.words[place := place + 1] = length
-            place += 1
+    def _sample(self, numbers: np.ndarray, address: int, result: tuple[int, ...]) -> None:
+        """Write columns of these numbers, which stand at an address, into a matrix."""
+        points, places = self.points, self.places
+        call = _SAMPLED.taken(
+            None, lambda: path_loops()["sampled"].prepared(points, places, ALL, np.empty((0, 0)))
+        )
+        call.words[0:11] = (
+            *(address_of_array(points), *points.shape),
+            *(address_of_array(places), *places.shape),
+            *(address, len(numbers)),
+            *result,
+        )
         call()
         _SAMPLED.give_back(None, call)
-        return result
 
 
 _SAMPLED: Spare[Prepared] = Spare()
 
 
-class _Packed(NamedTuple):
+@dataclass
+class _Packed:
     """The loop that records runs in the same workspace, packed once.
 
     Attributes
@@ -88,6 +97,10 @@ class _Packed(NamedTuple):
         Where the loop writes when each limited output is first out of its limits.
     rows, space
         Words of the number of points and of the address of the table.
+    table, address
+        Of the last run.
+    last
+        Its points, if anybody still has them: then the next run needs a table of its own.
     """
 
     states: np.ndarray
@@ -96,6 +109,9 @@ class _Packed(NamedTuple):
     call: Prepared
     rows: int
     space: int
+    table: np.ndarray
+    address: int = 0
+    last: Callable[[], np.ndarray | None] = lambda: None
 
 
 class Recorder:
@@ -132,22 +148,24 @@ class Recorder:
         held = run.kept.get("recorded")
         if held is None or held.states is not states or held.inputs is not at:
             held = run.kept["recorded"] = self._packed(run, at, states)
-        # A row more: outputs are written as rows that begin behind the states.
-        table, address = cache_lines(run.rows + 1, self._width)
-        words = held.call.words
-        words[held.rows], words[held.space] = run.rows, address
+        rows, places = run.rows, run.places
+        if len(held.table) <= rows or held.last() is not None:
+            # A row more: outputs are written as rows that begin behind the states.
+            held.table, held.address = cache_lines(rows + 1, self._width)
+        words, points = held.call.words, held.table[:rows]
+        words[held.rows], words[held.space] = rows, held.address
         held.call()
-        places = run.places.copy() if len(run.places) else run.places
-        return Recording(table[:-1], places, self._sizes), held.first.tolist()
+        # Without places the points themselves are what is read, in parts that don't keep the whole.
+        held.last = ref(points) if len(places) else lambda: points
+        return Recording(points, places.copy(), self._sizes), held.first.tolist()
 
     def _packed(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> _Packed:
         first = np.empty(len(self._limited), dtype=np.int64)
         observer = self._observer(LANES if run.rows >= LANES else 1)
         loop = path_loops()["observed"]
         call = loop.prepared(states, inputs, run.places, observer, np.empty(0), first)
-        return _Packed(
-            states, inputs, first, call, call.address("states") + 1, call.address("space")
-        )
+        rows, space = call.address("states") + 1, call.address("space")
+        return _Packed(states, inputs, first, call, rows, space, np.empty((0, self._width)))
 
     def _observer(self, lanes: int) -> Ready:
         """How outputs follow from states, so many points at once."""

@@ -21,7 +21,7 @@ from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.rate_derivatives import Along, rate_derivatives
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import NO_POINTS, Drive, Solver, Spare, Workspace
+from vehiclemor.simulation.workspaces import NO_POINTS, Drive, Solver, Workspace
 
 # Shortest step in s: the time loop takes times that differ by less for one.
 SHORTEST = 1e-9
@@ -77,7 +77,7 @@ class Stepper:
     ) -> None:
         self.system, self.windows, self.moved = system, windows, moved
         self.solver = Solver(solver, tolerance)
-        self._spare: Spare[StepSpace] = Spare()
+        self._spare: list[StepSpace] = []
 
     def step(
         self,
@@ -94,9 +94,13 @@ class Stepper:
         ConvergenceError
             If the integration fails.
         """
-        held = self._spare.taken(None, self._packed)
+        try:
+            held = self._spare.pop()
+        except IndexError:
+            held = self._packed()
         space, coefficients = held.space, held.coefficients
-        space.start[:] = state
+        start, output = space.start, space.output
+        start[:] = state
         slope = None if next_inputs is None else (next_inputs - inputs) / dt
         for begin, length, window in self._parts(time, dt):
             coefficients[0, :, 0] = inputs
@@ -109,15 +113,15 @@ class Stepper:
             held.first.value = length
             held.window[0] = window
             if self.moved:
-                held.means[window] = space.start
-            space.output.counts.fill(0)
+                held.means[window] = start
+            output.counts.fill(0)
             status = space.call()
             if status:
                 reached = time + begin + space.buffer[0]
                 raise ConvergenceError(f"{REASONS[status]} at t = {reached:.6g} s")
-            space.start[:] = space.output.path[0]
-        found = space.start.copy()
-        self._spare.give_back(None, held)
+            start[:] = output.path[0]
+        found = start.copy()
+        self._spare.append(held)
         return found
 
     def _parts(self, time: float, dt: float) -> Iterator[tuple[float, float, int]]:
