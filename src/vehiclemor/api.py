@@ -343,5 +343,8 @@ def plot(
     if isinstance(result, str | Path):
         result = stored_result(str(result), file_path("results", results))
     if not isinstance(result, xr.Dataset):
-        raise InputError(f"result is {quoted(result)}, neither a dataset nor a file or study")
+        raise InputError(
+            f"result is {quoted(result)}; it must be a dataset (of a run: `dataset(run)` of its "
+            "reduced model), a file or a study"
+        )
     return ResultAccessor(result).plot(kind, out, **at)

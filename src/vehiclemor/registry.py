@@ -66,7 +66,7 @@ def choice(kind: str, name: Any, known: Collection[str]) -> str:
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
     """Error for an unknown name, with the nearest known ones."""
-    known = sorted(known)
+    known = sorted(set(known))
     hint = did_you_mean(name, known) or f"known: {', '.join(known)}"
     return InputError(f"unknown {kind} {quoted(name)}; {hint}")
 

@@ -176,3 +176,5 @@ def test_figures_of_a_study_and_a_protocol(place, capsys):
         f"figure-road-pareto.{suffix}" for suffix in ("pdf", "svg", "png")
     ]
     assert all(path.stat().st_size > 10_000 for path in written)
+    assert main(["plot", str(place / "road.toml"), *map(str, folders[:2])]) == 2
+    assert "figures --only" in capsys.readouterr().err

@@ -259,6 +259,12 @@ def test_protocols_of_one_name_stand_side_by_side(tmp_path, protocol_text):
     runs = [int((rows["study"] == name).sum()) for name in (one, other)]
     # Two tests that are listed, two drawn outside, and two rows of each.
     assert runs == [2 * (2 + 2 + 5), 2 * (2 + 2 + 4)]
+    # Each is followed by the same name, and has its own result.
+    told_of = vm.status(study, tmp_path)
+    assert {name: status.result.stem for name, status in told_of.items()} == {
+        one: one,
+        other: other,
+    }
     # Progress never goes back, that of the times neither.
     assert sum("rounds" in work for work in {work for work, _, _ in told}) == 2
     for work in {work for work, _, _ in told}:

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from cyclopts import CycloptsError
+from cyclopts import CycloptsError, UnknownOptionError
 
 from vehiclemor.errors import MachineError, PlugInError, VehiclemorError, machine_reason
 
@@ -35,13 +35,21 @@ def ended(run: Callable[[], int | None]) -> int:
     except (MachineError, PlugInError) as error:
         return _said(str(error), FAILED)
     except (CycloptsError, VehiclemorError) as error:
-        return _said(str(error), WRONG_INPUT)
+        return _said(str(error) + _known_options(error), WRONG_INPUT)
     except (MemoryError, OSError) as error:
         reason = machine_reason(error)
         return _said(reason or str(error), FAILED if reason else WRONG_INPUT)
     except KeyboardInterrupt as stop:
         text = "stopped; finished cells of a study are stored, run again to resume"
         return _said(text, STOPPED + (stop.args[0] if stop.args else signal.SIGINT))
+
+
+def _known_options(error: Exception) -> str:
+    """Options of the command, where it has none that is like the one that was given."""
+    if not isinstance(error, UnknownOptionError) or "Did you mean" in str(error):
+        return ""
+    names = sorted({argument.name for argument in error.argument_collection})
+    return f" Known: {', '.join(names)}" if names else ""
 
 
 def _said(text: str, status: int) -> int:

@@ -384,7 +384,7 @@ def rom(model: str) -> ReducedOrderModel:
     `InputError` if none ships for a model of this name.
     """
     known = {path.stem: path for path in shipped_folder().glob("*.nc")}
-    return load(known[choice("model with a reduced one that ships", model, known)])
+    return load(known[choice("reduced model that ships", model, known)])
 
 
 def shipped_folder() -> Path:

@@ -65,6 +65,8 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
         raise InputError("neither a run nor a study that can be drawn")
     grid = [str(d) for d in dataset["status"].dims]
     for key in chosen:
+        if not grid:
+            raise InputError(f"a single run has no dimension to choose, such as {quoted(key)}")
         if key not in grid:
             raise unknown("dimension of the result", key, grid)
     words = []

@@ -99,6 +99,9 @@ class Trajectory(ShortRepr):
     trust: Trust | None = None
     names: tuple[str, ...] = ()
 
+    # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
+    __iter__ = None
+
     def check_sizes(self) -> None:
         """Raise `ValueError` if histories are of other samples than the times."""
         samples = max(len(self.time), 1)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vehiclemor.arguments import count
-from vehiclemor.errors import FileError
+from vehiclemor.errors import FileError, InputError
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
@@ -83,16 +83,21 @@ def status_of(study: str, folder: Path, seed: int | None = None) -> dict[str, St
     ------
     FileError
         If the results folder is a file.
+    InputError
+        If there is a seed and no test runs are drawn.
     """
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder}: not a folder")
     if seed is not None:
         count("seed", seed, least=0, most=MOST_SEED)
+    files = studies_and_files(study)
+    if seed is not None and not any(definition.drawn for _, definition in files.values()):
+        raise InputError(f"seed: {study} draws no test runs")
     found: dict[str, StudyStatus] = {}
-    for name, (path, definition) in studies_and_files(study).items():
+    for name, (path, definition) in files.items():
         later = LATER if definition.bounds else ""
         if definition.bounds:
-            protocol = load_protocol(str(path), seed if definition.drawn else None)
+            protocol = load_protocol(str(path), seed if definition.drawn else None, name)
             name = protocol.study  # noqa: PLW2901  (an audit has a name of its own)
             validation = protocol.sets["validation"]
             groups = [e.experiments(protocol.model, validation) for e in protocol.entries]

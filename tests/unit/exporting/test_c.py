@@ -58,6 +58,11 @@ def test_rates_outputs_and_steps_are_the_models(drivers, name, kind):
     own = len(model.output_names)
     # Slips are differences of speeds that are nearly equal: they lose four digits.
     assert relative(outputs[:, :own], model.outputs(states, inputs)) < 1e-11
+    # What it is to be given it tells.
+    for text, word in ("", "standard input"), (f"2 {STEP}" + len(inputs[0]) * " 0", "step 1"):
+        said = subprocess.run([driver], input=text, capture_output=True, text=True, check=False)
+        assert said.returncode == 1
+        assert word in said.stderr
     if kind == "reduced":
         assert outputs[:, own].max() == pytest.approx(model.trust(states, inputs).indicator)
 

@@ -505,7 +505,7 @@ def test_a_shipped_model_keeps_its_bounds_on_runs_of_the_validation(name):
 
 
 def test_a_model_without_a_shipped_one_is_named():
-    with pytest.raises(InputError, match="unknown model with a reduced one that ships 'tricycle'"):
+    with pytest.raises(InputError, match="unknown reduced model that ships 'tricycle'"):
         vm.rom("tricycle")
 
 

@@ -51,6 +51,11 @@ def test_an_unknown_output_is_refused():
             run(name, "newton" if name == "double_wishbone" else "ros34pw2")["steer_angle"]
 
 
+def test_a_run_is_no_sequence():
+    with pytest.raises(TypeError):
+        list(run("independent_suspension_vehicle"))
+
+
 def test_from_where_a_run_has_left_the_model_on_there_are_no_numbers():
     model = vm.model("independent_suspension_vehicle")
     wild = component("maneuver", "lane_change").perturbed(1.0, 8.0)

@@ -49,8 +49,10 @@ int main(void)
     double c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)], h, total = 0.0, *taken;
     long steps, n;
     int i;
-    if (scanf("%ld %lf", &steps, &h) != 2 || steps < 1 || !inputs(u[0]))
+    if (scanf("%ld %lf", &steps, &h) != 2 || steps < 1 || !inputs(u[0])) {
+        fprintf(stderr, "standard input: steps, their length in s, inputs at each end of a step\n");
         return EXIT_FAILURE;
+    }
     taken = malloc((size_t)steps * sizeof *taken);
     if (!taken)
         return EXIT_FAILURE;
@@ -67,8 +69,10 @@ int main(void)
         printf("\n");
         if (n == steps)
             break;
-        if (!inputs(u[(n + 1) % 2]))
+        if (!inputs(u[(n + 1) % 2])) {
+            fprintf(stderr, "no inputs for the end of step %ld\n", n + 1);
             return EXIT_FAILURE;
+        }
         taken[n] = seconds();
         vehiclemor_step(x, u[n % 2], u[(n + 1) % 2], c, h);
         vehiclemor_outputs(x, u[(n + 1) % 2], c, y);

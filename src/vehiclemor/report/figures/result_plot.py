@@ -66,7 +66,9 @@ def figure_result(results: Results, *, kind: str) -> Figure:
 
 
 def _drawn(dataset: xr.Dataset, kind: str) -> Figure:
-    if not dataset.sizes.get("output") or "scenario_set" in dataset.coords:
+    if "scenario_set" in dataset.coords:
+        raise InputError("a protocol has no grid to draw over; vehiclemor figures --only draws it")
+    if not dataset.sizes.get("output"):
         raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     if "label" not in dataset.coords:
         dataset = dataset.assign_coords(label=_configuration(dataset).get("method", "run"))
