@@ -121,7 +121,7 @@ def compare(
 def figures(
     *,
     only: str | None = None,
-    out: Path = RESULTS / "figures",
+    out: Path | None = None,
     results: Results = RESULTS,
     jobs: Jobs = 1,
     style: str = "",
@@ -137,7 +137,7 @@ def figures(
         or TOML file, of which is drawn what its dimensions ask for.  The paper's by default, but
         Pareto figures only where their study is stored.
     out
-        Folder of the figures.
+        Folder of the figures; by default `figures` in the results folder.
     style
         Name or file of a Matplotlib style on top of the package's.
     dpi

@@ -17,7 +17,7 @@ from vehiclemor.study.run import run_studies
 
 def figures(
     only: Sequence[str] = (),
-    out: str | Path = "results/figures",
+    out: str | Path | None = None,
     results: str | Path = "results",
     jobs: int = 1,
     *,
@@ -34,7 +34,7 @@ def figures(
         model, or studies and protocols by name or TOML file; by default the paper's but those
         `left_out`, and an index of captions.
     out
-        Folder of the figures.
+        Folder of the figures; `figures` in the results folder by default.
     results
         Results folder.
     jobs
@@ -54,7 +54,8 @@ def figures(
     VehiclemorError
         If a name or file is wrong; at last if a figure can't be drawn, when all others are written.
     """
-    folder, target = file_path("results", results), file_path("out", out)
+    folder = file_path("results", results)
+    target = folder / "figures" if out is None else file_path("out", out)
     only = [only] if isinstance(only, str) else only
     if not (isinstance(only, Sequence) and all(isinstance(name, str) for name in only)):
         raise InputError(f"only is {quoted(only)}, not a list of names of figures")
@@ -74,10 +75,11 @@ def figures(
     wrong: dict[str, str] = {}
     index = ["# Figures", "", catalogue.PARAMETERS, ""]
     for name, entry in chosen.items():
-        files = [target / f"figure-{name}.{suffix}" for suffix in theme.FORMATS]
+        stem = name if name.startswith("figure") else f"figure-{name}"
+        files = [target / f"{stem}.{suffix}" for suffix in theme.FORMATS]
         with theme.styled(style, dpi):
             caption = attempt_apart(name, wrong, partial(_draw, entry, data, folder, files))
-        index += [f"- figure-{name}: {text}" for text in caption]
+        index += [f"- {stem}: {text}" for text in caption]
         written += files if caption else []
         if not (caption or only or entry.default):
             # Perhaps by other source.
