@@ -68,31 +68,25 @@ def emit(kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int = 1)
         writer.value(number)
 
 
-class Values:
-    """Values of operations, each written when it is first needed: registers are few."""
+class _Writer:
+    """Writes the operations of a kernel, each when it is first needed: registers are few."""
 
-    def __init__(self, operations: Sequence[Operation], builder: Any) -> None:
-        self.builder, self._operations = builder, operations
+    def __init__(self, kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int) -> None:
+        self._operations, self._builder = kernel.operations, builder
+        self._rows, self._lanes = rows, lanes
         self._values: dict[int, Any] = {}
+        laned = kernel.laned
+        self._single = [name for name in kernel.arguments if name not in laned]
+        # In other kernels than tangents every value has lanes.
+        self._mixed = any(name.startswith(SEED) for name in laned)
 
     def value(self, number: int) -> Any:
         """The value of an operation; of several results, or none, what there is."""
         if number not in self._values:
-            self._values[number] = self.written(self._operations[number])
+            self._values[number] = self._written(self._operations[number])
         return self._values[number]
 
-    def written(self, operation: Operation) -> Any:
-        """Write the instructions of an operation whose arguments are floats or vectors."""
-        kind, arguments = operation.kind, [self.value(n) for n in operation.arguments]
-        if kind == "part":
-            return arguments[0][operation.detail]
-        if kind == "sincos":
-            return elementary(self.builder, kind, *arguments)
-        if kind in ELEMENTARY:
-            return elementary(self.builder, kind, *arguments)[0]
-        return arithmetic(self.builder, kind, self.alike(arguments))
-
-    def alike(self, values: Sequence[Any]) -> list[Any]:
+    def _alike(self, values: Sequence[Any]) -> list[Any]:
         """Values, floats among vectors in all lanes."""
         wide = next((v.type for v in values if isinstance(v.type, ir.VectorType)), None)
         if wide is None:
@@ -101,21 +95,9 @@ class Values:
 
     def _spread(self, value: Any, width: int) -> Any:
         # The choice between vectors may be one for all lanes.
-        return weighted_sums.spread(self.builder, value, width) if value.type == DOUBLE else value
+        return weighted_sums.spread(self._builder, value, width) if value.type == DOUBLE else value
 
-
-class _Writer(Values):
-    """Writes the operations of a kernel, which reads and writes memory."""
-
-    def __init__(self, kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int) -> None:
-        super().__init__(kernel.operations, builder)
-        self._rows, self._lanes = rows, lanes
-        laned = kernel.laned
-        self._single = [name for name in kernel.arguments if name not in laned]
-        # In other kernels than tangents every value has lanes.
-        self._mixed = any(name.startswith(SEED) for name in laned)
-
-    def written(self, operation: Operation) -> Any:
+    def _written(self, operation: Operation) -> Any:
         kind, arguments, detail = operation
         match kind:
             case "number":
@@ -131,22 +113,28 @@ class _Writer(Values):
                 factors = (self.value(number) for number in arguments)
                 if self._lanes == 1:
                     address = self._address(array, first)
-                    return weighted_sums.weighted_sums(self.builder, address, factors, targets)
-                values = self.alike(list(factors))
+                    return weighted_sums.weighted_sums(self._builder, address, factors, targets)
+                values = self._alike(list(factors))
                 sums = weighted_sums.sums_of_lanes
                 if values[0].type == DOUBLE:
                     sums = weighted_sums.weighted_sums
-                return sums(self.builder, self._address(array, first), values, targets)
+                return sums(self._builder, self._address(array, first), values, targets)
             case "batch":
                 return self._batch(detail, [self.value(number) for number in arguments])
             case _ if kind in VECTOR_STATEMENTS:
                 pointers = [self._address(*d) if _is_entry(d) else d for d in detail]
                 factors = [self.value(number) for number in arguments]
-                return vector_statements.write(kind, self.builder, pointers, factors)
-        return super().written(operation)
+                return vector_statements.write(kind, self._builder, pointers, factors)
+        values = [self.value(number) for number in arguments]
+        if kind == "part":
+            return values[0][detail]
+        if kind in ELEMENTARY:
+            results = elementary(self._builder, kind, *values)
+            return results if kind == "sincos" else results[0]
+        return arithmetic(self._builder, kind, self._alike(values))
 
     def _load(self, name: str, place: int) -> Any:
-        builder = self.builder
+        builder = self._builder
         number = builder.load(self._address(name, place))
         if self._lanes == 1 or name in self._single:
             return number if self._mixed else self._spread_to_lanes(number)
@@ -165,19 +153,19 @@ class _Writer(Values):
         for lane in range(self._lanes):
             single = value
             if self._lanes > 1:
-                single = self.builder.extract_element(value, LANE(lane))
-            self.builder.store(single, self._address("_result", place, lane))
+                single = self._builder.extract_element(value, LANE(lane))
+            self._builder.store(single, self._address("_result", place, lane))
 
     def _address(self, name: str, place: int, lane: int = 0) -> Any:
         offset = ir.Constant(ir.IntType(64), place)
         if lane:
             stride = ir.Constant(ir.IntType(64), lane)
-            offset = self.builder.add(self.builder.mul(self._rows[name].stride, stride), offset)
-        return self.builder.gep(self._rows[name].first, [offset])
+            offset = self._builder.add(self._builder.mul(self._rows[name].stride, stride), offset)
+        return self._builder.gep(self._rows[name].first, [offset])
 
     def _batch(self, name: str, lanes: Sequence[Any]) -> list[Any]:
         """Results of an elementary function for a batch of arguments, lane by lane."""
-        builder, results, lanes = self.builder, len(RESULTS[name]), self.alike(lanes)
+        builder, results, lanes = self._builder, len(RESULTS[name]), self._alike(lanes)
         if lanes[0].type != DOUBLE:
             # Vectors already, of samples.
             found = [elementary(builder, name, lane) for lane in lanes]

@@ -81,6 +81,18 @@ class Operation(NamedTuple):
     detail: Any = None
 
 
+class Listing:
+    """Operations that are written one after the other."""
+
+    def __init__(self) -> None:
+        self.operations: list[Operation] = []
+
+    def new(self, kind: str, *arguments: int, detail: Any = None) -> int:
+        """Write an operation; its number."""
+        self.operations.append(Operation(kind, arguments, detail))
+        return len(self.operations) - 1
+
+
 class Kernel:
     """A kernel's text as operations.
 
@@ -135,7 +147,7 @@ class Kernel:
         return [name for name in self.arguments if name != "_work"]
 
 
-class Reader:
+class Reader(Listing):
     """Reads statements one after the other.
 
     Parameters
@@ -147,15 +159,11 @@ class Reader:
     """
 
     def __init__(self, arrays: Collection[str], known: Mapping[str, float] | None = None) -> None:
-        self.operations: list[Operation] = []
+        super().__init__()
         self.anchors: list[int] = []
         self.sizes = dict.fromkeys(arrays, 0)
-        self._names = {name: self._new("number", detail=v) for name, v in (known or {}).items()}
+        self._names = {name: self.new("number", detail=v) for name, v in (known or {}).items()}
         self._work: dict[int, int] = {}
-
-    def _new(self, kind: str, *arguments: int, detail: Any = None) -> int:
-        self.operations.append(Operation(kind, arguments, detail))
-        return len(self.operations) - 1
 
     def _anchored(self, number: int) -> int:
         self.anchors.append(number)
@@ -176,11 +184,11 @@ class Reader:
                 self._work[places(target)[0]] = self._anchored(self.value(expression))
             case ast.Assign([ast.Subscript(ast.Name("_result")) as target], expression):
                 value = self.value(expression)
-                self._anchored(self._new("store", value, detail=places(target)))
+                self._anchored(self.new("store", value, detail=places(target)))
             case ast.Assign(
                 [ast.Tuple(targets)], ast.Call(ast.Name("sincos_one"), [argument], [])
             ) if len(targets) == 2:
-                found = self._anchored(self._new("sincos", self.value(argument)))
+                found = self._anchored(self.new("sincos", self.value(argument)))
                 self._parts(found, targets)
             case ast.Assign(
                 [ast.Tuple(targets)],
@@ -194,7 +202,7 @@ class Reader:
                 reach = first + padded(len(targets)) * len(terms)
                 self.sizes[array] = max(self.sizes[array], reach)
                 detail = array, first, len(targets)
-                self._parts(self._anchored(self._new("sums", *factors, detail=detail)), targets)
+                self._parts(self._anchored(self.new("sums", *factors, detail=detail)), targets)
             case ast.Expr(
                 ast.Call(ast.Name(name), [ast.Name("_work"), ast.Constant(int() as first)], [])
             ) if name in BATCHES:
@@ -206,16 +214,16 @@ class Reader:
 
     def _parts(self, number: int, targets: Sequence[ast.expr]) -> None:
         for place, target in enumerate(targets):
-            self.name(ast.unparse(target), self._new("part", number, detail=place))
+            self.name(ast.unparse(target), self.new("part", number, detail=place))
 
     def _batch(self, name: str, first: int) -> None:
         lanes = range(first, first + LANES)
         if not all(place in self._work for place in lanes):
             raise ValueError(f"{name}_batch(_work, {first}): not straight-line")
         given = [self._work[place] for place in lanes]
-        found = self._anchored(self._new("batch", *given, detail=name))
+        found = self._anchored(self.new("batch", *given, detail=name))
         for place in range(LANES * len(RESULTS[name])):
-            part = self._anchored(self._new("part", found, detail=place))
+            part = self._anchored(self.new("part", found, detail=place))
             self._work[first + LANES + place] = part
 
     def _vectors(self, name: str, arguments: Sequence[ast.expr]) -> None:
@@ -228,7 +236,7 @@ class Reader:
                 detail.append(self._entry(argument))
             else:
                 detail.append(ast.literal_eval(argument))
-        self._anchored(self._new(name, *values, detail=tuple(detail)))
+        self._anchored(self.new(name, *values, detail=tuple(detail)))
 
     def _entry(self, node: ast.Subscript) -> tuple[str, int]:
         """Array and place of an entry."""
@@ -248,28 +256,28 @@ class Reader:
 
         match node:
             case ast.Constant(value=float() as number):
-                return self._new("number", detail=number)
+                return self.new("number", detail=number)
             case ast.UnaryOp(ast.USub(), ast.Constant(value=float() as number)):
-                return self._new("number", detail=-number)
+                return self.new("number", detail=-number)
             case ast.Name(name) if name in self._names:
                 return self._names[name]
             case ast.Subscript(ast.Name("_work")) if (place := places(node)[0]) in self._work:
                 return self._work[place]
             case ast.Subscript(ast.Name()):
                 if ast.unparse(node.value) != "_work":
-                    return self._new("entry", detail=self._entry(node))
+                    return self.new("entry", detail=self._entry(node))
             case ast.BinOp(left, operator, right) if type(operator) in ARITHMETIC:
-                return self._new(ARITHMETIC[type(operator)], *inner(left, right))
+                return self.new(ARITHMETIC[type(operator)], *inner(left, right))
             case ast.UnaryOp(ast.USub(), operand):
-                return self._new("negate", *inner(operand))
+                return self.new("negate", *inner(operand))
             case ast.IfExp(ast.Compare() | ast.Name() as test, then, other):
-                return self._new("select", *inner(test, then, other))
+                return self.new("select", *inner(test, then, other))
             case ast.Compare(left, [operator], [right]) if type(operator) in COMPARISONS:
-                return self._new(COMPARISONS[type(operator)], *inner(left, right))
+                return self.new(COMPARISONS[type(operator)], *inner(left, right))
             case ast.Call(ast.Name() | ast.Attribute(ast.Name()) as function, arguments, []):
                 kind = FUNCTIONS.get(ast.unparse(function), "")
                 if kind and len(arguments) == 1 + (kind == "atan2"):
-                    return self._new(kind, *inner(*arguments))
+                    return self.new(kind, *inner(*arguments))
         raise ValueError(f"{ast.unparse(node)[:80]}: unknown, or not straight-line")
 
 

@@ -15,13 +15,14 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from vehiclemor.codegen.operations import (
     COMPARISONS,
     SEED,
     VECTOR_STATEMENTS,
     Kernel,
+    Listing,
     Operation,
     Reader,
     kernel_text,
@@ -101,11 +102,11 @@ def tangent_text(text: str, arguments: Sequence[str]) -> str:
     return kernel_text(name, head, found.operations, columns)
 
 
-class _Tangents:
+class _Tangents(Listing):
     """Operations of a kernel and, beside them, of the tangents of their values."""
 
     def __init__(self, kernel: Kernel, seeded: Sequence[str]) -> None:
-        self.operations: list[Operation] = []
+        super().__init__()
         self._kernel, self._seeded = kernel, seeded
         self._numbers: list[int] = []
         self._tangents: list[Combination] = []
@@ -121,13 +122,13 @@ class _Tangents:
         given = [self._numbers[n] for n in arguments]
         along = [self._tangents[n] for n in arguments]
         if kind == "store":
-            self._new("store", self._total(along[0]), detail=detail)
+            self.new("store", self._total(along[0]), detail=detail)
             self._numbers.append(-1)
             self._tangents.append({})
             return
         if kind in VECTOR_STATEMENTS:
             raise ValueError(f"{kind} has no tangent")
-        own = self._new(kind, *given, detail=detail)
+        own = self.new(kind, *given, detail=detail)
         found = self._tangent(number, own, given, along)
         if len(found) > 1 and number in self._named:
             found = {self._total(found): Coefficient()}
@@ -142,7 +143,7 @@ class _Tangents:
             case "entry" if detail[0] in self._seeded:
                 if detail not in self._seeds:
                     array, place = detail
-                    self._seeds[detail] = self._new("entry", detail=(SEED + array, place))
+                    self._seeds[detail] = self.new("entry", detail=(SEED + array, place))
                 return {self._seeds[detail]: Coefficient()}
             case "part":
                 return self._of_part(arguments[0], detail)
@@ -150,7 +151,7 @@ class _Tangents:
                 raise ValueError("sums with weights have no tangent along the weights")
             case "sums" if any(along):
                 moved = [self._total(tangent) for tangent in along]
-                self._sums[number] = self._new("sums", *moved, detail=detail)
+                self._sums[number] = self.new("sums", *moved, detail=detail)
         if kind in WITHOUT or not any(along):
             return {}
         return self._of_value(kind, own, given, along)
@@ -161,7 +162,7 @@ class _Tangents:
         if kind == "sums":
             if whole not in self._sums:
                 return {}
-            return {self._new("part", self._sums[whole], detail=place): Coefficient()}
+            return {self.new("part", self._sums[whole], detail=place): Coefficient()}
         result, lane = divmod(place, LANES) if kind == "batch" else (place, 0)
         tangent, x = self._tangents[arguments[lane]], self._numbers[arguments[lane]]
         if not tangent:
@@ -169,7 +170,7 @@ class _Tangents:
 
         def value(k: int) -> int:
             other = lane + LANES * k if kind == "batch" else k
-            return self._new("part", self._numbers[whole], detail=other)
+            return self.new("part", self._numbers[whole], detail=other)
 
         if kind == "batch" and detail == "atan":
             return self._scaled(tangent, self._slope("atan", x, value(0)))
@@ -192,25 +193,25 @@ class _Tangents:
             case "multiply":
                 return self._added(self._scaled(of_a, b), self._scaled(of_b, a))
             case "divide":
-                inverse = self._new("divide", self._number(1.0), b)
+                inverse = self.new("divide", self._number(1.0), b)
                 found = self._scaled(of_a, inverse)
                 if not of_b:
                     return found
-                slope = self._new("multiply", own, inverse)
+                slope = self.new("multiply", own, inverse)
                 return self._added(found, _opposite(self._scaled(of_b, slope)))
             case "power":
                 if of_b:
                     raise ValueError("a varying exponent has no tangent: write exp(b log(a))")
-                less = self._new("subtract", b, self._number(1.0))
-                slope = self._new("multiply", b, self._new("power", a, less))
+                less = self.new("subtract", b, self._number(1.0))
+                slope = self.new("multiply", b, self.new("power", a, less))
                 return self._scaled(of_a, slope)
             case "select":
                 return self._chosen(given[0], along[1], along[2])
             case "atan2":
-                squares = [self._new("multiply", n, n) for n in (b, a)]
-                inverse = self._new("divide", self._number(1.0), self._new("add", *squares))
-                along_a = self._scaled(of_a, self._new("multiply", b, inverse))
-                along_b = self._scaled(of_b, self._new("multiply", a, inverse))
+                squares = [self.new("multiply", n, n) for n in (b, a)]
+                inverse = self.new("divide", self._number(1.0), self.new("add", *squares))
+                along_a = self._scaled(of_a, self.new("multiply", b, inverse))
+                along_b = self._scaled(of_b, self.new("multiply", a, inverse))
                 return self._added(along_a, _opposite(along_b))
         return self._scaled(of_a, self._slope(kind, a, own))
 
@@ -218,7 +219,7 @@ class _Tangents:
         found = {}
         for tangent in {**then, **other}:
             sides = [self._value(side.get(tangent)) for side in (then, other)]
-            found[tangent] = Coefficient(False, self._new("select", test, *sides))
+            found[tangent] = Coefficient(False, self.new("select", test, *sides))
         return found
 
     def _slope(self, function: str, x: int, value: int) -> int:
@@ -228,15 +229,11 @@ class _Tangents:
         operations, result = _derivative(function)
         numbers = [x, value]
         for kind, arguments, detail in operations[len(numbers) :]:
-            numbers.append(self._new(kind, *(numbers[n] for n in arguments), detail=detail))
+            numbers.append(self.new(kind, *(numbers[n] for n in arguments), detail=detail))
         return numbers[result]
 
-    def _new(self, kind: str, *arguments: int, detail: Any = None) -> int:
-        self.operations.append(Operation(kind, arguments, detail))
-        return len(self.operations) - 1
-
     def _number(self, value: float) -> int:
-        return self._new("number", detail=value)
+        return self.new("number", detail=value)
 
     def _value(self, coefficient: Coefficient | None) -> int:
         """Operation that gives a coefficient; zero where there is none."""
@@ -245,14 +242,14 @@ class _Tangents:
         if coefficient.number is None:
             return self._number(-1.0 if coefficient.negative else 1.0)
         return (
-            self._new("negate", coefficient.number) if coefficient.negative else coefficient.number
+            self.new("negate", coefficient.number) if coefficient.negative else coefficient.number
         )
 
     def _scaled(self, tangent: Combination, factor: int) -> Combination:
         """A tangent times the value of an operation."""
         return {
             own: Coefficient(
-                c.negative, factor if c.number is None else self._new("multiply", c.number, factor)
+                c.negative, factor if c.number is None else self.new("multiply", c.number, factor)
             )
             for own, c in tangent.items()
         }
@@ -266,7 +263,7 @@ class _Tangents:
                 del total[own]
             else:
                 both = self._value(total[own]), self._value(c)
-                total[own] = Coefficient(False, self._new("add", *both))
+                total[own] = Coefficient(False, self.new("add", *both))
         return total
 
     def _total(self, tangent: Combination) -> int:
@@ -274,11 +271,11 @@ class _Tangents:
         total: int | None = None
         # What is added comes first, so that nothing begins with a sign.
         for own, c in sorted(tangent.items(), key=lambda pair: pair[1].negative):
-            term = own if c.number is None else self._new("multiply", c.number, own)
+            term = own if c.number is None else self.new("multiply", c.number, own)
             if total is None:
-                total = self._new("negate", term) if c.negative else term
+                total = self.new("negate", term) if c.negative else term
             else:
-                total = self._new("subtract" if c.negative else "add", total, term)
+                total = self.new("subtract" if c.negative else "add", total, term)
         return self._number(0.0) if total is None else total
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from vehiclemor.codegen.kernels import KernelSource
-from vehiclemor.codegen.operations import SEED, Kernel, Operation, needed, uses
+from vehiclemor.codegen.operations import SEED, Kernel, Listing, Operation, needed, uses
 from vehiclemor.codegen.tangent import tangent_source
 from vehiclemor.codegen.vector_lanes import padded
 
@@ -58,16 +58,8 @@ class StraightLine(NamedTuple):
         return {op.detail[1] for op in found if op.kind == "entry" and op.detail[0] == array}
 
 
-class Lines:
+class Lines(Listing):
     """Operations that several functions share, written one after the other."""
-
-    def __init__(self) -> None:
-        self.operations: list[Operation] = []
-
-    def new(self, kind: str, *arguments: int, detail: Any = None) -> int:
-        """Write an operation; its number."""
-        self.operations.append(Operation(kind, arguments, detail))
-        return len(self.operations) - 1
 
     def entries(self, array: str, count: int) -> list[int]:
         """Entries of an array."""
@@ -119,21 +111,17 @@ class Lines:
     def _sums(
         self, given: Given, factors: Sequence[int], array: str, first: int, targets: int
     ) -> list[int]:
+        """Sums of factors times weights, of which zeros are left out."""
+        zero, one = (Operation("number", (), number) for number in (0.0, 1.0))
         rows, found = given[array][first:], []
         for column in range(targets):
-            weights = rows[column :: padded(targets)]
-            pairs = zip(weights, factors, strict=False)
-            terms = [p for weight, factor in pairs if (p := self._product(weight, factor)) >= 0]
+            terms = []
+            for weight, factor in zip(rows[column :: padded(targets)], factors, strict=False):
+                if self.operations[weight] != zero:
+                    alone = self.operations[factor] == one
+                    terms.append(weight if alone else self.new("multiply", weight, factor))
             found.append(self._total(terms))
         return found
-
-    def _product(self, weight: int, factor: int) -> int:
-        """A weight times a factor; -1 where it is zero, the weight alone where the other is one."""
-        if self.operations[weight] == Operation("number", (), 0.0):
-            return -1
-        if self.operations[factor] == Operation("number", (), 1.0):
-            return weight
-        return self.new("multiply", weight, factor)
 
     def _total(self, terms: Sequence[int]) -> int:
         """Sum of terms in pairs: shallow for whoever walks through it, and rounded less."""

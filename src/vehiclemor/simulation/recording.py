@@ -17,7 +17,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of, path_loops
 from vehiclemor.simulation.workspaces import Run, Spare
 
-ALL = np.zeros(0, dtype=np.int64)
+ALL, NOTHING = np.zeros(0, dtype=np.int64), np.empty((0, 0))
 
 
 class Recording(NamedTuple):
@@ -98,7 +98,7 @@ class _Packed:
     rows, space
         Words of the number of points and of the address of the table.
     table, address
-        Of the last run.
+        Of the last run, for the next one.
     last
         Its points, if anybody still has them: then the next run needs a table of its own.
     """
@@ -155,8 +155,11 @@ class Recorder:
         words, points = held.call.words, held.table[:rows]
         words[held.rows], words[held.space] = rows, held.address
         held.call()
-        # Without places the points themselves are what is read, in parts that don't keep the whole.
-        held.last = ref(points) if len(places) else lambda: points
+        if len(places):
+            held.last = ref(points)
+        else:
+            # The points themselves are what is read, in parts that outlive the whole.
+            held.table = NOTHING
         return Recording(points, places.copy(), self._sizes), held.first.tolist()
 
     def _packed(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> _Packed:
@@ -165,7 +168,7 @@ class Recorder:
         loop = path_loops()["observed"]
         call = loop.prepared(states, inputs, run.places, observer, np.empty(0), first)
         rows, space = call.address("states") + 1, call.address("space")
-        return _Packed(states, inputs, first, call, rows, space, np.empty((0, self._width)))
+        return _Packed(states, inputs, first, call, rows, space, NOTHING)
 
     def _observer(self, lanes: int) -> Ready:
         """How outputs follow from states, so many points at once."""

@@ -46,22 +46,6 @@ class Spare(Generic[Kept]):
         spare.append(held)
 
 
-class Points(NamedTuple):
-    """Points at which a run is recorded, see `structures.Output`.
-
-    Attributes
-    ----------
-    inputs, moments
-        Inputs (points, inputs) at the points, and their times (points,) in s.
-    places
-        How the samples follow from them (samples, 2).
-    """
-
-    inputs: np.ndarray
-    moments: np.ndarray
-    places: np.ndarray
-
-
 class Solver(NamedTuple):
     """How a run is integrated.
 
@@ -188,21 +172,13 @@ class Run:
 
     @property
     def path(self) -> np.ndarray:
-        """States (samples, dim) at the output times, or at `points`."""
+        """States (samples, dim) at the output times, or at points, see `structures.Output`."""
         return self.whole[: self.rows]
 
     @property
     def places(self) -> np.ndarray:
         """How the samples follow from points (samples, 2); empty (0, 2) if they are these."""
         return NO_POINTS[-1] if self.space is None else self.space.output.places
-
-    @property
-    def points(self) -> Points | None:
-        """Where it is recorded, if not at the output times."""
-        if not len(self.places):
-            return None
-        moments, inputs = self.recorded_at(self.whole)
-        return Points(inputs[: self.rows], moments[: self.rows], self.places)
 
     def recorded_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Times (s) and inputs of its rows, or of more; those at the samples are given.

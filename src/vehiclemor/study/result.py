@@ -169,9 +169,11 @@ def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
     """What is known of any run, by names of variables; no errors without a reference."""
     run, full, trust = outcome.trajectory, outcome.reference, outcome.trajectory.trust
     outputs, times = run.outputs, run.time
+    early = np.searchsorted(times, FIRST_SECONDS, side="right")
+    landed = np.searchsorted(times, min(LANDED, times[-1]))
     found: dict[str, object] = {
-        "largest_output": max_abs(outputs[times <= FIRST_SECONDS]),
-        "smallest_output": outputs[times >= min(LANDED, times[-1])].min(axis=0),
+        "largest_output": max_abs(outputs[:early]),
+        "smallest_output": outputs[landed:].min(axis=0),
         **{name: getattr(run, name) for name in ("seconds", "status", "message", "remark")},
         **{name: run.counts.get(name, 0) for name in model.counts},
         "trust_indicator": trust.indicator if trust else np.nan,
