@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vehiclemor.api import describe as describe
+    from vehiclemor.api import errors as errors
     from vehiclemor.api import maneuvers as maneuvers
     from vehiclemor.api import methods as methods
     from vehiclemor.api import model as model
@@ -36,7 +37,7 @@ __version__ = "0.1.0"
 # Name -> module that defines it.
 _DEFINED_IN = {
     **dict.fromkeys(
-        ("describe", "maneuvers", "methods", "model", "models", "plot"),
+        ("describe", "errors", "maneuvers", "methods", "model", "models", "plot"),
         "vehiclemor.api",
     ),
     **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
@@ -59,6 +60,7 @@ __all__ = [
     "compare",
     "convert",
     "describe",
+    "errors",
     "export",
     "figures",
     "load",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from vehiclemor.inputs.maneuver import Maneuver
     from vehiclemor.simulation.model import Model
-    from vehiclemor.simulation.trajectory import Start
+    from vehiclemor.simulation.trajectory import Start, Trajectory
     from vehiclemor.study.plans.training import Given
     from vehiclemor.study.scenario import Scenario
     from vehiclemor.study.status import StudyStatus
@@ -305,11 +305,57 @@ def status(
     return status_of(str(file_path("study", study)), file_path("results", results), seed)
 
 
+def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
+    """Errors of a run against the full-order run of the same input, for each output of the run.
+
+    Parameters
+    ----------
+    run, full
+        At the same output times; `full` has the outputs of `run`.
+
+    Returns
+    -------
+    xarray.Dataset
+        `rms_error` and `max_error` by output, in its unit.
+
+    Raises
+    ------
+    InputError
+        If the runs have other output times, or an output is missing.
+    """
+    import xarray as xr
+
+    from vehiclemor.metrics import max_abs, rms
+
+    _require_runs(run, full)
+    wanted = full if full.names == run.names else full.chosen(run.names)
+    difference = run.outputs - wanted.outputs
+    labels = run.chosen(run.names).dataset().drop_dims(["time", "input"])
+    return xr.Dataset(
+        {
+            "rms_error": ("output", rms(difference), {"long_name": "root mean square error"}),
+            "max_error": ("output", max_abs(difference), {"long_name": "largest error"}),
+        },
+        labels.coords,
+    )
+
+
+def _require_runs(run: Any, full: Any) -> None:
+    """Raise `InputError` if these are no two runs with the same output times."""
+    from vehiclemor.simulation.trajectory import Trajectory
+
+    for name, given in (("run", run), ("full", full)):
+        if not isinstance(given, Trajectory):
+            raise InputError(f"{name} is {quoted(given)}, not a run as `simulate` gives it")
+    if not np.array_equal(run.time, full.time):
+        raise InputError("the runs have other output times: simulate both with the same input")
+
+
 def plot(
-    result: xr.Dataset | str | Path,
+    result: xr.Dataset | Trajectory | str | Path,
+    *beside: Trajectory | str,
     kind: str = "histories",
     out: str | Path | None = None,
-    *,
     results: str | Path = RESULTS,
     **at: object,
 ) -> Figure:
@@ -318,8 +364,10 @@ def plot(
     Parameters
     ----------
     result
-        Dataset of `simulate`, `run_study` or a reduced model, a netCDF file, or the name of a study
-        that was run.
+        A run, a dataset of `simulate` or `run_study`, a netCDF file, or the name of a study that
+        was run.
+    *beside
+        The full-order run of the same input, to be drawn with the run; or the kind.
     kind
         `histories` of outputs, `paths`, or `errors`.
     out
@@ -339,12 +387,24 @@ def plot(
 
     from vehiclemor.report.accessor import ResultAccessor
     from vehiclemor.report.result_selection import stored_result
+    from vehiclemor.simulation.trajectory import Trajectory
 
     if isinstance(result, str | Path):
         result = stored_result(str(result), file_path("results", results))
+    elif isinstance(result, Trajectory):
+        result = _pictured(result, *(full for full in beside if not isinstance(full, str)))
     if not isinstance(result, xr.Dataset):
-        raise InputError(
-            f"result is {quoted(result)}; it must be a dataset (of a run: `dataset(run)` of its "
-            "reduced model), a file or a study"
-        )
+        raise InputError(f"result is {quoted(result)}; it must be a run, a dataset, file or study")
+    kind = next((str(given) for given in beside if isinstance(given, str)), kind)
     return ResultAccessor(result).plot(kind, out, **at)
+
+
+def _pictured(run: Trajectory, full: Trajectory | None = None) -> xr.Dataset:
+    """A run as a dataset, with the outputs of the full-order run."""
+    dataset = run.dataset()
+    if full is None:
+        return dataset
+    _require_runs(run, full)
+    reference = full if full.names == run.names else full.chosen(run.names)
+    of_full = {"reference_outputs": (("time", "output"), reference.outputs)}
+    return dataset.assign(of_full).assign(errors(run, full).data_vars)

@@ -23,8 +23,7 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import STATUSES
-from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
+from vehiclemor.simulation.trajectory import STATUSES, trajectory_dataset
 from vehiclemor.study.scenario import Scenario
 
 METHODS = names("method")

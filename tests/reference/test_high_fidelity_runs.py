@@ -19,6 +19,7 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.workspaces import Solver
 
 NAME = "high_fidelity_vehicle"
 N = 26
@@ -44,7 +45,7 @@ def integrate(
     longest_step: float | None = None,
 ) -> Trajectory:
     found = model.integrate(
-        maneuver, start, whole_space(2 * N), solver, tolerance, times, longest_step
+        maneuver, start, whole_space(2 * N), Solver(solver, tolerance, times, longest_step)
     )
     assert found.status == "ok", found.message
     return found
@@ -195,7 +196,7 @@ def test_a_rack_beyond_reach_ends_the_run(vehicle, factor):
     """The linkage locks near 1.3 rad; on the branch beyond it the closures hold all the same."""
     space = whole_space(2 * N)
     run = vehicle.integrate(
-        LANE_CHANGE.perturbed(amplitude=factor), vehicle.start(), space, "dopri5", 1e-6
+        LANE_CHANGE.perturbed(amplitude=factor), vehicle.start(), space, Solver("dopri5", 1e-6)
     )
     assert run.status == "diverged"
     assert "steer_F" in run.message

@@ -14,6 +14,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.workspaces import Solver
 
 NAME = "independent_suspension_vehicle"
 COORDINATES, WHEELS = 14, 4
@@ -228,7 +229,7 @@ def integrate(
     tolerance: float,
     times: np.ndarray,
 ) -> Trajectory:
-    found = model.integrate(maneuver, start, whole_space(28), solver, tolerance, times)
+    found = model.integrate(maneuver, start, whole_space(28), Solver(solver, tolerance, times))
     assert found.status == "ok", found.message
     return found
 

@@ -14,6 +14,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.workspaces import Solver
 
 PLAIN, FIDELITY = VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 LANE_CHANGE = {
@@ -35,7 +36,7 @@ each_solver = pytest.mark.parametrize("solver", INTEGRATORS)
 def integrate(model, start, solver="dopri5", tolerance=1e-9, longest_step=None, factor=1.0):
     """States of the lane change, and counts."""
     maneuver, space = LANE_CHANGE[model.name].perturbed(amplitude=factor), whole_space(len(start))
-    found = model.integrate(maneuver, start, space, solver, tolerance, TIMES, longest_step)
+    found = model.integrate(maneuver, start, space, Solver(solver, tolerance, TIMES, longest_step))
     assert found.status == "ok", found.message
     return found
 

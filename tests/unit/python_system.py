@@ -28,8 +28,8 @@ class PythonKernels:
     def __contains__(self, name: str) -> bool:
         return name in self.sources
 
-    def address(self, name: str, lanes: int = 1) -> int:
-        assert (name, lanes) == ("derivative", 1)
+    def address(self, name: str, lanes: int = 1, results: tuple[int, ...] = ()) -> int:
+        assert (name, lanes, results) == ("derivative", 1, ())
         return ctypes.cast(self._callback, ctypes.c_void_p).value or 0
 
 

@@ -40,12 +40,15 @@ class Derivation(ShortRepr):
         Kernel -> its source; `constants` makes the hoisted ones from the parameters.
     operations
         Function -> exact counts of its operations, see `operation_counts`.
+    copied
+        By output the number of the state that it is, -1 where it is another quantity.
     """
 
     shapes: dict[str, tuple[int, ...]]
     constants: int
     sources: dict[str, KernelSource]
     operations: dict[str, dict[str, int]]
+    copied: tuple[int, ...]
 
     @property
     def source(self) -> str:
@@ -85,11 +88,14 @@ def derived(program: Program) -> Derivation:
 
     text = kernel_source(program)
     further = tangent_source(program) if "residual_jacobian" in program.functions else ""
+    states = next(iter(program.arguments.values()))
+    outputs = program.functions["outputs"].results if "outputs" in program.functions else ()
     return Derivation(
         shapes={key: function.shape for key, function in program.functions.items()},
         constants=len(program.constant_symbols),
         sources=kernel_sources(text + further),
         operations=operation_counts(text),
+        copied=tuple(states.index(output) if output in states else -1 for output in outputs),
     )
 
 
@@ -98,6 +104,7 @@ def derived(program: Program) -> Derivation:
 def _read(content: bytes) -> Derivation:
     written = json.loads(content)
     written["shapes"] = {key: tuple(shape) for key, shape in written["shapes"].items()}
+    written["copied"] = tuple(written["copied"])
     for kernel in written["sources"].values():
         kernel |= {key: tuple(kernel[key]) for key in ("arguments", "sizes")}
     written["sources"] = {key: KernelSource(**kernel) for key, kernel in written["sources"].items()}

@@ -6,9 +6,10 @@ import ctypes
 import hashlib
 import re
 from collections.abc import Mapping
+from ctypes import addressof, c_char
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,6 +55,36 @@ class KernelSource:
                 raise ValueError(f"kernel {self.name}: {argument} has {length} floats, not {size}")
 
 
+class BareKernel(NamedTuple):
+    """A compiled function of a model for integrators of others.
+
+    Nothing is checked: arguments are C-contiguous arrays of floats that can be written, as long as
+    the model's.
+
+    Attributes
+    ----------
+    address
+        Of `void f(double *x, double *u, double *constants, double *result)`.
+    constants
+        Third argument: hoisted constants of the model.
+    function, constants_address
+        The same for Python, by addresses.
+    owner
+        Keeps the machine code.
+    """
+
+    address: int
+    constants: np.ndarray
+    function: Any
+    constants_address: int
+    owner: Any
+
+    def __call__(self, x: np.ndarray, u: np.ndarray, result: np.ndarray) -> None:
+        """Write the result at a state and inputs."""
+        first, second, last = [addressof(c_char.from_buffer(array)) for array in (x, u, result)]
+        self.function(first, second, self.constants_address, last)
+
+
 class Kernels:
     """Kernels by name, each compiled when it is first used.
 
@@ -69,15 +100,22 @@ class Kernels:
     def __contains__(self, name: str) -> bool:
         return name in self.sources
 
-    def address(self, name: str, lanes: int = 1) -> int:
+    def address(self, name: str, lanes: int = 1, results: tuple[int, ...] = ()) -> int:
         """Address of a kernel's machine code, for loops; 0 where there is no such kernel.
 
         Parameters
         ----------
         lanes
             Samples that it takes at once, see `llvm_kernels.kernel_module`.
+        results
+            Numbers of the results that it computes, in their new order; all where none are named.
         """
-        return _machine(self.sources[name], lanes)[0] if name in self.sources else 0
+        return _machine(self.sources[name], lanes, results)[0] if name in self.sources else 0
+
+    def bare(self, name: str, constants: np.ndarray) -> BareKernel:
+        """A kernel of states and inputs without its checks."""
+        address, function, code = _machine(self.sources[name])
+        return BareKernel(address, constants, function, constants.ctypes.data, code)
 
     def call(self, name: str, *arrays: np.ndarray) -> None:
         """Run a kernel.
@@ -117,9 +155,12 @@ def _checked(source: KernelSource, place: int, array: Any) -> int:
 
 
 @once
-def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCode]:
+def _machine(
+    source: KernelSource, lanes: int = 1, results: tuple[int, ...] = ()
+) -> tuple[int, Any, MachineCode]:
     """Address and C function of a kernel, and what owns its machine code."""
-    parts = [source.text, str(lanes), source_digest(("codegen",)), compiler_identity()]
+    of_results = ",".join(map(str, results))
+    parts = [source.text, str(lanes), of_results, source_digest(("codegen",)), compiler_identity()]
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
 
     def make() -> bytes:
@@ -127,7 +168,8 @@ def _machine(source: KernelSource, lanes: int = 1) -> tuple[int, Any, MachineCod
         from vehiclemor.codegen.llvm_kernels import kernel_module
         from vehiclemor.codegen.operations import Kernel
 
-        return compiled_module(kernel_module([Kernel(source.text)], lanes))
+        kernel = Kernel(source.text)
+        return compiled_module(kernel_module([kernel.of(results) if results else kernel], lanes))
 
     code = MachineCode(fetched(f"kernels/{source.name}-{key}.o", make))
     address = code.address(source.name)

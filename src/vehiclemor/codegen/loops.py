@@ -224,8 +224,7 @@ def _loops(
     key = hashlib.sha256("\n".join([*parts, compiler_identity()]).encode()).hexdigest()[:20]
 
     def make() -> bytes:
-        from vehiclemor.codegen.compiler import compiled_loops
-        from vehiclemor.codegen.loop_intrinsics import inlined_kernel
+        from vehiclemor.codegen.compiler import compiled_loops, inlined_kernel
 
         given = {name: inlined_kernel(text) for name, text in kernels}
         return compiled_loops(imported, entries, given | dict(sizes))

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Collection, Mapping, Sequence
+from copy import copy
 from typing import Any, NamedTuple
 
 from vehiclemor.codegen.vector_lanes import LANES, RESULTS, padded
@@ -131,6 +132,22 @@ class Kernel:
             flat = place[0] if len(place) == 1 else place[0] * self.columns + place[1]
             self.operations[number] = self.operations[number]._replace(detail=flat)
             self.sizes["_result"] = max(self.sizes["_result"], flat + 1)
+
+    def of(self, results: Sequence[int]) -> Kernel:
+        """The kernel of some results alone, which become a vector in this order."""
+        stored = {op.detail: n for n, op in enumerate(self.operations) if op.kind == "store"}
+        wanted = {stored[result]: place for place, result in enumerate(results)}
+        numbers = {old: new for new, old in enumerate(needed(self.operations, wanted))}
+        found = copy(self)
+        found.operations = [
+            Operation(kind, tuple(numbers[n] for n in arguments), wanted.get(old, detail))
+            for old in numbers
+            for kind, arguments, detail in [self.operations[old]]
+        ]
+        found.anchors = [numbers[n] for n in self.anchors if n in numbers]
+        found.dimensions, found.columns = 1, len(results)
+        found.sizes = self.sizes | {"_result": len(results)}
+        return found
 
     @property
     def laned(self) -> list[str]:

@@ -14,7 +14,7 @@ from vehiclemor.arguments import number
 from vehiclemor.errors import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.online import model_file
-from vehiclemor.reduction.interface import Method, ReducedModel
+from vehiclemor.reduction.interface import Method, ReducedModel, simulated
 from vehiclemor.reduction.reduced_system import StateSpace
 from vehiclemor.registry import choice, component
 from vehiclemor.resources import data_folder
@@ -22,7 +22,7 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, checked_array, checked_path
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
-from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, output_names
 from vehiclemor.study.experiment import Settings
 from vehiclemor.study.input_range import InputRange, input_range
 from vehiclemor.study.plans.training import Given, training_set
@@ -87,7 +87,12 @@ class ReducedOrderModel(ShortRepr):
         return self.model.parameters.values()
 
     def simulate(
-        self, maneuver: str | Maneuver | None = None, start: Start | None = None
+        self,
+        maneuver: str | Maneuver | None = None,
+        start: Start | None = None,
+        *,
+        outputs: Names = None,
+        times: Any = None,
     ) -> Trajectory:
         """A whole run at the maneuver's output times.
 
@@ -97,13 +102,17 @@ class ReducedOrderModel(ShortRepr):
             A maneuver or its registered name; the model's own by default.
         start
             Initial condition of the full model, by name or as a state (n,); its first by default.
+        outputs, times
+            What alone is kept, see `Trajectory.chosen`.
         """
         chosen = self.model.definition.maneuver if maneuver is None else maneuver
         if isinstance(chosen, str):
             chosen = component("maneuver", chosen)
         begun = self.model.starts[0] if start is None else start
         with blamed(f"method {self.method!r}: simulate", self.reduced):
-            run = self.reduced.simulate(chosen, begun)
+            names = None if outputs is None else output_names(outputs)
+            run = simulated(self.reduced, chosen, begun, names)
+        run = run if times is None else run.chosen(times=times)
         if run.trust or self._range is None:
             return run
         own = begun if isinstance(begun, str) else tuple(self.model.start(begun).tolist())
@@ -145,9 +154,7 @@ class ReducedOrderModel(ShortRepr):
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""
-        from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
-
-        return trajectory_dataset(self.model, run).assign_attrs(model=self.model.name)
+        return run.dataset()
 
     def state(self, start: Start | None = None, inputs: Any = None) -> np.ndarray:
         """State (dim,) of a start of the full model, as `simulate` begins with it.

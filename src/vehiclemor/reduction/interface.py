@@ -6,6 +6,8 @@ The entry point of a method, in the group `vehiclemor.methods`, names a `Method`
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from inspect import signature
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -63,12 +65,32 @@ class ReducedModel(Protocol):
         ...
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Trajectory at the maneuver's output times."""
+        """Trajectory at the maneuver's output times.
+
+        It may take `outputs`, the names (a tuple) of all that is kept of it; see `simulated`.
+        """
         ...
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """Projection of full-order states (samples, n) onto the same subspaces, if any."""
         ...
+
+
+def simulated(
+    reduced: ReducedModel, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None
+) -> Trajectory:
+    """A run of a reduced model, with some outputs alone."""
+    if outputs is None:
+        return reduced.simulate(maneuver, start)
+    if _selects(type(reduced)):
+        return reduced.simulate(maneuver, start, outputs)  # type: ignore[call-arg]
+    return reduced.simulate(maneuver, start).chosen(outputs)
+
+
+@cache
+def _selects(kind: type) -> bool:
+    """Whether reduced models of a class make some outputs alone."""
+    return "outputs" in signature(kind.simulate).parameters  # type: ignore[attr-defined]
 
 
 # Gives the method of a name with its settings, fitted to the same training runs.

@@ -282,14 +282,16 @@ class ReducedSystem(ShortRepr):
     def _starts(self) -> dict[tuple[str | bytes, bytes], np.ndarray]:
         return {}
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(
+        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
         """Integrate, then lift to full states at the maneuver's output times."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
         run = self.run(maneuver, start)
         inputs = recorded_inputs(maneuver)[1]
         states = self._lifted(run, inputs)
         trust = self.judge(run, inputs) if self.judge else None
-        found = self.model.recorded(maneuver, run, inputs, states, trust)
+        found = self.model.recorded(maneuver, run, inputs, states, trust, outputs)
         run.give_back()
         return found
 

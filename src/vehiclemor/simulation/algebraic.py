@@ -32,7 +32,7 @@ from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Start, Trajectory
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Names, Start, Trajectory
 
 # Input increment (m) above which a step of the input is cut into substeps.
 LARGEST_INCREMENT = 5e-3
@@ -172,6 +172,7 @@ class AlgebraicModel(Model):
         times: np.ndarray | None = None,
         solver: str | None = None,
         tolerance: float | None = None,
+        outputs: Names = None,
     ) -> Trajectory:
         """Full-order solution at the given times (the maneuver's output times by default).
 
@@ -189,6 +190,8 @@ class AlgebraicModel(Model):
             lanes; where that fails, `newton`.
         tolerance
             Largest component of the last step of an iteration (rad or m), 1e-12 by default.
+        outputs
+            Names of outputs or coordinates to keep, see `Trajectory.chosen`.
 
         Raises
         ------
@@ -205,7 +208,8 @@ class AlgebraicModel(Model):
             inputs = self.inputs_of(maneuver, times)
             sampled = times, inputs, ready(newton_loops.Samples(inputs))
         tolerance = NEWTON_TOLERANCE if tolerance is None else tolerance
-        return self._solved(sampled, "newton" if solver is None else solver, tolerance)
+        run = self._solved(sampled, "newton" if solver is None else solver, tolerance)
+        return run if outputs is None else run.chosen(outputs)
 
     def sampled(self, maneuver: Maneuver) -> Sampled:
         """Output times (samples,) in s of a maneuver and its inputs, which are ready for loops.
@@ -326,6 +330,7 @@ class AlgebraicModel(Model):
             status=status,
             message=message,
             names=self.outputs,
+            model=self,
         )
 
     def loop(self, name: str, *further: str) -> Loop:

@@ -122,48 +122,29 @@ def output_times(
     return times
 
 
-def limits_of(definition: ModelDefinition) -> tuple[list[str], np.ndarray, np.ndarray]:
+def limits_of(definition: ModelDefinition) -> tuple[list[str], tuple[str, ...], np.ndarray]:
     """What outputs are watched for.
 
     Returns
     -------
     tuple
-        Names of the outputs with a range of validity; numbers (limits,) of these and, after them,
-        of the loads; their smallest and largest values (limits, 2).
+        Names of the outputs with a range of validity; of these and, after them, of the loads; their
+        smallest and largest values (limits, 2).
     """
     names = [quantity.name for quantity in definition.outputs]
     # An input is checked before the run.
     valid = {name: r for name, r in definition.validity.items() if name in names}
     # The smallest positive number: no load is none.
     ranges = [*valid.values(), *((5e-324, np.inf) for _ in definition.loads)]
-    places = np.array([names.index(name) for name in (*valid, *definition.loads)], dtype=np.int64)
-    return list(valid), places, np.array(ranges, dtype=float).reshape(-1, 2)
+    watched = *valid, *definition.loads
+    return list(valid), watched, np.array(ranges, dtype=float).reshape(-1, 2)
 
 
-def left_validity(
-    definition: ModelDefinition,
-    names: Sequence[str],
-    first: Sequence[int],
-    times: np.ndarray,
-    outputs: np.ndarray,
-) -> tuple[str, int]:
-    """What has left its range of validity first, and at which sample; nothing: ("", samples).
-
-    Parameters
-    ----------
-    names, first
-        Outputs with a range, and first sample of each that is outside; samples if none is.
-    times, outputs
-        Times (samples,) in s, histories (samples, outputs).
-    """
-    sample = min(first, default=len(times))
-    if sample == len(times):
-        return "", sample
-    name = names[first.index(sample)]
-    value = outputs[sample, [quantity.name for quantity in definition.outputs].index(name)]
+def left_validity(definition: ModelDefinition, name: str, value: float, time: float) -> str:
+    """That an output has left its range of validity with this value, at this time in s."""
     low, high = definition.validity[name]
-    message = f"{name} is {value:.4g} at t = {times[sample]:.6g} s"
-    return f"{message}; the model holds from {low:g} to {high:g}", sample
+    message = f"{name} is {value:.4g} at t = {time:.6g} s"
+    return f"{message}; the model holds from {low:g} to {high:g}"
 
 
 def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray) -> str:

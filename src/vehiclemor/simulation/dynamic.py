@@ -24,15 +24,23 @@ from vehiclemor.simulation.maneuver_checks import checked_maneuver, cut_short
 from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
-from vehiclemor.simulation.recording import Recorder
+from vehiclemor.simulation.recording import Recorder, Recording
 from vehiclemor.simulation.system import System
-from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory, Trust
+from vehiclemor.simulation.trajectory import (
+    DYNAMIC_COUNTS,
+    Names,
+    Start,
+    Trajectory,
+    Trust,
+    output_names,
+)
 from vehiclemor.simulation.workspaces import Run, Solver
 
 # What derivatives are of -> function of the equations.
 RESULTS = {"rhs": "derivative", "outputs": "outputs"}
-# Tolerance of the full-order runs that others are measured against.
-REFERENCE_TOLERANCE = 1e-9
+# How the full-order runs that others are measured against are solved: of the integrators the
+# fastest of that error, see the page on findings.  The tolerance of others is as tight as is usual.
+REFERENCE_SOLVER, REFERENCE_TOLERANCE, TIGHT = "exponential_adams", 1e-10, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +161,7 @@ class DynamicModel(Model):
         tolerance: float | None = None,
         longest_step: float | None = None,
         begin: float = 0.0,
+        outputs: Names = None,
     ) -> Trajectory:
         """Full-order trajectory at the given times (the maneuver's output times by default).
 
@@ -168,14 +177,17 @@ class DynamicModel(Model):
             `dopri5`: Dormand-Prince 5(4).  `rodas4`: Rosenbrock method of order 4, a fresh
             Jacobian in every step.  `ros34pw2`: W-method of order 3 with one Jacobian, that of
             straight running, for all steps and runs.  With the same `etdrk4`: exponential
-            Runge-Kutta method of order 4, and `exponential_adams`: exponential Adams method of
-            order up to 6.
+            Runge-Kutta method of order 4, and `exponential_adams`, the default: exponential Adams
+            method of order up to 6.
         tolerance
             Largest local error of a state relative to its typical size plus its own.
         longest_step
             In s; unlimited by default.
         begin
             Time in s at which the run begins with the start, in mid-maneuver if it isn't 0.
+        outputs
+            Names of outputs, coordinates or speeds to keep, see `Trajectory.chosen`; only these
+            are computed.
 
         Raises
         ------
@@ -190,11 +202,14 @@ class DynamicModel(Model):
             maneuver,
             self.start(start),
             whole_space(2 * len(self.coordinates)),
-            solver or "dopri5",
-            REFERENCE_TOLERANCE if tolerance is None else tolerance,
-            times,
-            longest_step,
-            begin if type(begin) is float else number("begin", begin),
+            Solver(
+                solver or REFERENCE_SOLVER,
+                (TIGHT if solver else REFERENCE_TOLERANCE) if tolerance is None else tolerance,
+                times,
+                longest_step,
+                begin if type(begin) is float else number("begin", begin),
+            ),
+            None if outputs is None else output_names(outputs),
         )
         if trajectory.status != "ok":
             raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)
@@ -205,11 +220,8 @@ class DynamicModel(Model):
         maneuver: Maneuver,
         state: np.ndarray,
         windows: ProjectionWindows,
-        solver: str,
-        tolerance: float,
-        times: np.ndarray | None = None,
-        longest_step: float | None = None,
-        begin: float = 0.0,
+        how: Solver,
+        outputs: tuple[str, ...] | None = None,
     ) -> Trajectory:
         """Trajectory of the full or a projected system; a divergence is recorded in it.
 
@@ -219,15 +231,16 @@ class DynamicModel(Model):
             Initial state (2 n,).
         windows
             Formulation of the system and its subspaces by window.
+        outputs
+            Those that alone are kept.
         """
         maneuver = checked_maneuver(maneuver, self.definition)
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
-        how = Solver(solver, tolerance, times, longest_step, begin)
         run = self.system.run(maneuver, state, windows, how, 0.0)
-        whole = times is None and not begin
+        whole = how.times is None and not how.begin
         inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
-        found = self.recorded(maneuver, run, inputs, run.whole)
+        found = self.recorded(maneuver, run, inputs, run.whole, outputs=outputs)
         run.give_back()
         return found
 
@@ -238,6 +251,7 @@ class DynamicModel(Model):
         inputs: np.ndarray,
         states: np.ndarray,
         trust: Trust | None = None,
+        outputs: tuple[str, ...] | None = None,
     ) -> Trajectory:
         """Trajectory of a run whose path has been brought to the model's states.
 
@@ -249,8 +263,10 @@ class DynamicModel(Model):
             Where the run is recorded: 2 n columns, and what may follow them.
         trust
             What a reduced model tells of the run.
+        outputs
+            Outputs, coordinates or speeds that alone are kept; else all can be read.
         """
-        return self._told(run, inputs, states, cut_short(maneuver), trust)
+        return self._recorded(run, inputs, states, cut_short(maneuver), trust, outputs)
 
     def trajectory(
         self,
@@ -263,46 +279,57 @@ class DynamicModel(Model):
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
         run = Run(times, states, np.asarray(counts), seconds, failure)
-        return self._told(run, loop_array(inputs), loop_array(states), "")
+        return self._recorded(run, loop_array(inputs), loop_array(states), "")
 
-    def _told(
+    def _recorded(
         self,
         run: Run,
         inputs: np.ndarray,
         states: np.ndarray,
         remark: str,
         trust: Trust | None = None,
+        outputs: tuple[str, ...] | None = None,
     ) -> Trajectory:
         """See `recorded`; a remark is added to what there is to remark."""
-        recorder, times, n = self._recorder, run.times, len(self.coordinates)
-        recording, first = recorder.recorded(run, inputs, states)
-        watched, message, sample = len(recorder.names), run.failure, len(times)
-        if message or min(first[:watched], default=sample) < sample:
-            table = recording.table()
-            recording = recording._replace(points=table, places=run.places[:0])
-            if message:
-                # From the failure on there are no numbers, which says nothing of limits.
-                sample = int(np.isfinite(table[:, : 2 * n]).all(axis=1).sum())
-                first = [len(times) if number == sample else number for number in first]
-            else:
-                names, outputs = recorder.names, table[:, 2 * n :]
-                found = left_validity(self.definition, names, first[:watched], times, outputs)
-                message, sample = found
+        recorder, times, n = self._recorder, run.times, 2 * len(self.coordinates)
+        at_points = run.recorded_at(inputs)[1]
+        first = recorder.first_outside(run, at_points, states)
+        limited, message, end = len(recorder.limited), run.failure, len(times)
+        points = states[: run.rows], at_points[: run.rows], run.places
+        left = min(first[:limited], default=end)
+        if message:
+            # From the failure on there are no numbers, which says nothing of limits.
+            reached = int(np.isfinite(Recording(recorder, *points).state_history[:, 0]).sum())
+            first = [end if sample == reached else sample for sample in first]
+        elif left < end:
+            name = recorder.limited[first.index(left)]
+            value = Recording(recorder, *points).columns((name,))[left, 0]
+            message = left_validity(self.definition, name, value, times[left])
+        lifted = lifted_wheels(self.definition.loads, first[limited:], times)
+        fields = {
+            "time": times,
+            "inputs": inputs,
+            "counts": dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
+            "seconds": run.seconds,
+            "status": "diverged" if message else "ok",
+            "message": message,
+            "remark": f"{lifted}; {remark}" if lifted and remark else lifted or remark,
+            "trust": trust,
+            "names": self.outputs,
+            "model": self,
+        }
+        if outputs is not None and not message:
+            histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]
+            fields |= {"names": outputs, "coordinates": nothing, "speeds": nothing}
+            found = Trajectory.of(**fields, outputs=histories)
+        else:
+            points = points[0][:, :n], *points[1:]
+            recording = Recording(recorder, *(array.copy() for array in points))
+            if left < end and not run.failure:
                 # What follows means nothing.
-                table[sample:] = np.nan
-        lifted = lifted_wheels(self.definition.loads, first[watched:], times)
-        found = Trajectory.of(
-            time=times,
-            inputs=inputs,
-            recording=recording,
-            names=self.outputs,
-            counts=dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
-            seconds=run.seconds,
-            status="diverged" if message else "ok",
-            message=message,
-            remark=f"{lifted}; {remark}" if lifted and remark else lifted or remark,
-            trust=trust,
-        )
+                recording.end = left
+            found = Trajectory.of(**fields, recording=recording)
+            found = found if outputs is None else found.chosen(outputs)
         return found.judged(trust) if trust is not None and trust.reason else found
 
     @cached_property

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation
-from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.kernels import BareKernel, Kernels
 from vehiclemor.errors import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
@@ -29,7 +29,7 @@ from vehiclemor.simulation.kernel_derivatives import (
     partial,
 )
 from vehiclemor.simulation.paths import along as along_path
-from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Start, Trajectory
+from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Names, Start, Trajectory
 
 NEEDED_FOR = {
     "second_order": "equations of motion can't be projected in the coordinates, nor weighed by "
@@ -159,6 +159,7 @@ class Model(ShortRepr):
         times: np.ndarray | None = None,
         solver: str | None = None,
         tolerance: float | None = None,
+        outputs: Names = None,
     ) -> Trajectory:
         """Full-order solution; where None, the model's first start, output times and defaults."""
 
@@ -213,6 +214,17 @@ class Model(ShortRepr):
         state, u = self._state(state, "q" if self.kind == "ae" else "x"), self._inputs(u)
         self.kernels.call(function, state, u, self.constants, result)
         return result
+
+    def bare(self, function: str) -> BareKernel:
+        """A function of the equations for integrators of others, see `BareKernel`.
+
+        Parameters
+        ----------
+        function
+            Such as `derivative` or `outputs`.
+        """
+        self.require(function)
+        return self.kernels.bare(function, self.constants)
 
     def derivatives(self, function: str, state: Any, u: Any, by: By) -> np.ndarray:
         """Analytic derivatives (results, columns) of a function of the equations, see `jacobian`.

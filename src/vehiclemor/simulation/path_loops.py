@@ -9,7 +9,6 @@ from vehiclemor.codegen.loop_types import (
     Vector,
     call_kernel,
     call_lanes,
-    matrix,
     mixed_rows,
 )
 from vehiclemor.codegen.vector_lanes import LANES
@@ -19,14 +18,21 @@ from vehiclemor.simulation.integrators.structures import (
     NODE_2,
     NODES,
     Equations,
-    Observer,
+    Outputs,
 )
 
 # Of Lagrange's polynomials at the outer and inner points: 1 over their products of differences.
 OUTER = 1.0 / ((NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0))
 INNER = 1.0 / ((NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0))
 
-INLINED = ("read_point", "weights_of", "entry", "cubics_within", "point_of", "note_outside")
+# Of the distances of inner and outer points from the middle of a step: square, and difference.
+INNER_SQUARE = (0.5 - NODE_2) ** 2
+SQUARES = (0.5 - NODE_1) ** 2 - INNER_SQUARE
+
+INLINED = (
+    *("read_point", "weights_of", "entry", "value_at", "cubic_of", "cubics_within"),
+    *("point_of", "note_outside"),
+)
 
 
 def kernel_path(
@@ -49,66 +55,89 @@ def lane_path(
     return 0
 
 
-def observed(
+def watched(
     states: Matrix,
     inputs: Matrix,
     places: Matrix,
-    observer: Observer,
-    space: Vector,
+    outputs: Outputs,
+    results: Matrix,
     first: IntVector,
 ) -> Int:
-    """States and outputs side by side at the points of a run: the space, as a table.
-
-    The first sample at which each limited output is outside of its range is found too, if any; else
-    it is the number of samples.
+    """The first sample at which each of some outputs is outside of its range; else their number.
 
     Parameters
     ----------
     states
-        At the points (points, n or more); only the first n are read.
+        At the points of a run (points, n or more).
     places
         See `structures.Output`; where there are none the points are the samples.
-    space
-        As long as the table and a row more.
+    results
+        Scratch space (points, results) of the kernel.
     """
-    n, width = observer.states, observer.width
-    points = matrix(space, 0, len(states), width)
-    for row in range(len(states)):
-        for i in range(n):
-            points[row, i] = states[row, i]
-        # What happens to stand behind the outputs may take a hundred times as long to add.
-        for i in range(max(n, width - LANES + 1), width):
-            points[row, i] = 0.0
-    outputs = matrix(space, n, len(states), width)
-    if len(states) >= LANES:
-        lane_path(states, inputs, observer.kernel, observer.constants, outputs)
-    else:
-        kernel_path(states, inputs, observer.kernel, observer.constants, outputs)
     samples = len(places) if len(places) else len(states)
     for k in range(len(first)):
         first[k] = samples
+    evaluate(states, inputs, outputs, results)
     known, within = -1, False
     for sample in range(samples):
         row, z = point_of(places, sample)
         if z < 0.0:
             within = False
         elif row != known:
-            within = cubics_within(points, row, observer)
+            within = cubics_within(states, results, row, outputs)
         known = row
         if not within:
-            note_outside(points, row, z, observer, sample, samples, first)
+            note_outside(states, results, (row, z), outputs, sample, samples, first)
     return 0
 
 
-def sampled(points: Matrix, places: Matrix, columns: IntVector, result: Matrix) -> Int:
-    """Some columns of the table at the samples; all, in whole vectors, where none are named."""
-    for sample in range(len(result)):
+def chosen(
+    states: Matrix,
+    inputs: Matrix,
+    places: Matrix,
+    outputs: Outputs,
+    results: Matrix,
+    histories: Matrix,
+) -> Int:
+    """Histories (outputs, samples) of some outputs, see `watched`."""
+    evaluate(states, inputs, outputs, results)
+    samples = histories.shape[1]
+    for k in range(len(outputs.columns)):
+        column, sample = outputs.columns[k], 0
+        table, own = (states, column) if column >= 0 else (results, -1 - column)
+        while sample < samples:
+            row, z = point_of(places, sample)
+            if row < 0 or z < 0.0:
+                histories[k, sample] = value_at(table, row, z, own)
+                sample += 1
+                continue
+            even, even_slope, odd, odd_slope = cubic_of(table, row, own)
+            end = sample + 1
+            while end < samples and places[end, 0] == places[sample, 0]:
+                end += 1
+            for i in range(sample, end):
+                y = places[i, 1] - 0.5
+                w = y * y - INNER_SQUARE
+                histories[k, i] = (even + w * even_slope) + y * (odd + w * odd_slope)
+            sample = end
+    return 0
+
+
+def evaluate(states, inputs, outputs, results):
+    """Write the results of a kernel, if it has any."""
+    if results.shape[1] == 0:
+        return
+    if len(states) >= LANES:
+        lane_path(states, inputs, outputs.kernel, outputs.constants, results)
+    else:
+        kernel_path(states, inputs, outputs.kernel, outputs.constants, results)
+
+
+def sampled(points: Matrix, places: Matrix, histories: Matrix) -> Int:
+    """A table of whole vectors at the samples."""
+    for sample in range(len(histories)):
         row, z = point_of(places, sample)
-        if not len(columns):
-            read_point(points, row, z, result[sample])
-        else:
-            for k in range(len(columns)):
-                result[sample, k] = entry(points, row, z, columns[k])
+        read_point(points, row, z, histories[sample])
     return 0
 
 
@@ -119,12 +148,13 @@ def point_of(places, sample):
     return sample, -1.0
 
 
-def note_outside(points, row, z, observer, sample, samples, first):
-    """Note which limited outputs are outside of their ranges for the first time."""
+def note_outside(states, results, point, outputs, sample, samples, first):
+    """Note which outputs are outside of their ranges for the first time."""
+    ranges = outputs.ranges
     for k in range(len(first)):
-        value = entry(points, row, z, observer.states + observer.limited[k])
+        value = entry(states, results, point[0], point[1], outputs.columns[k])
         # What is no number lies outside too.
-        inside = observer.ranges[k, 0] <= value <= observer.ranges[k, 1]
+        inside = ranges[k, 0] <= value <= ranges[k, 1]
         if not inside and first[k] == samples:
             first[k] = sample
 
@@ -135,20 +165,37 @@ def weights_of(z):
     return b * c * d * OUTER, a * c * d * INNER, -a * b * d * INNER, -a * b * c * OUTER
 
 
-def entry(points, row, z, column):
-    """A column of the table at a point of a run, or where the part z of a step has passed."""
+def entry(states, results, row, z, column):
+    """An output at a point of a run, or where the part z of a step has passed, see `Outputs`."""
+    if column >= 0:
+        return value_at(states, row, z, column)
+    return value_at(results, row, z, -1 - column)
+
+
+def value_at(table, row, z, column):
+    """A column of a table at a point, or where the part z of a step has passed."""
     if row < 0:
         return math.nan
     if z < 0.0:
-        return points[row, column]
+        return table[row, column]
     p, q, r, s = weights_of(z)
-    return (p * points[row, column] + q * points[row + 1, column]) + (
-        r * points[row + 2, column] + s * points[row + 3, column]
+    return (p * table[row, column] + q * table[row + 1, column]) + (
+        r * table[row + 2, column] + s * table[row + 3, column]
     )
 
 
+def cubic_of(table, row, column):
+    """A cubic through the points of a step, as even and odd part about its middle."""
+    first, second = table[row, column], table[row + 1, column]
+    third, fourth = table[row + 2, column], table[row + 3, column]
+    even, odd = 0.5 * (second + third), (third - second) / (1.0 - 2.0 * NODE_2)
+    even_slope = (0.5 * (first + fourth) - even) / SQUARES
+    odd_slope = ((fourth - first) / (1.0 - 2.0 * NODE_1) - odd) / SQUARES
+    return even, even_slope, odd, odd_slope
+
+
 def read_point(points, row, z, into):
-    """All columns of the table, as `entry`."""
+    """All columns of a table, as `entry`."""
     if row < 0:
         for i in range(len(into)):
             into[i] = math.nan
@@ -159,21 +206,21 @@ def read_point(points, row, z, into):
         mixed_rows(points[row:], weights_of(z), into)
 
 
-def cubics_within(points, row, observer):
+def cubics_within(states, results, row, outputs):
     """Whether no cubic of a step can leave its limits: each is sampled only if it could.
 
     Between its ends a cubic stays within 1.85 times what its Chebyshev points span.
     """
-    for k in range(len(observer.limited)):
-        column = observer.states + observer.limited[k]
+    ranges = outputs.ranges
+    for k in range(len(ranges)):
         low, high = math.inf, -math.inf
         for node in range(NODES):
-            value = points[row + node, column]
+            value = entry(states, results, row + node, -1.0, outputs.columns[k])
             if not math.isfinite(value):
                 return False
             low, high = min(low, value), max(high, value)
         margin = 0.5 * (high - low)
-        if low - margin < observer.ranges[k, 0] or high + margin > observer.ranges[k, 1]:
+        if low - margin < ranges[k, 0] or high + margin > ranges[k, 1]:
             return False
     return True
 

@@ -44,29 +44,41 @@ def along(
     result = np.empty((len(states), sizes[2]))
     if name in kernels:
         kernels.sources[name].check(sizes[0], sizes[1], len(constants), sizes[2])
-    if len(states) < LANES:
-        address = np.array([address_of(kernels, name)], dtype=np.int64)
-        path_loops()["kernel_path"](states, inputs, address, constants, result)
-    else:
-        address = np.array([address_of(kernels, name, LANES)], dtype=np.int64)
-        path_loops()["lane_path"](states, inputs, address, constants, result)
+    evaluate(kernels, name, constants, (states, inputs), result)
     return result
 
 
-def address_of(kernels: Kernels, name: str, lanes: int = 1) -> int:
+def evaluate(
+    kernels: Kernels,
+    name: str,
+    constants: np.ndarray,
+    paths: tuple[np.ndarray, np.ndarray],
+    result: np.ndarray,
+    results: tuple[int, ...] = (),
+) -> None:
+    """Write results of a kernel along a path, some of them where `results` names their numbers."""
+    lanes = LANES if len(result) >= LANES else 1
+    address = np.array([address_of(kernels, name, lanes, results)], dtype=np.int64)
+    loop = path_loops()["lane_path" if lanes == LANES else "kernel_path"]
+    loop(*paths, address, constants, result)
+
+
+def address_of(kernels: Kernels, name: str, lanes: int = 1, results: tuple[int, ...] = ()) -> int:
     """Address of a kernel for compiled loops, which don't look before they call it.
 
     Parameters
     ----------
     lanes
         Samples that it takes at once.
+    results
+        Numbers of the results that it computes; all where none are named.
 
     Raises
     ------
     InputError
         If there is none.
     """
-    address = kernels.address(name, lanes)
+    address = kernels.address(name, lanes, results)
     if not address:
         raise InputError(f"the equations have no {name}")
     return address
@@ -74,5 +86,5 @@ def address_of(kernels: Kernels, name: str, lanes: int = 1) -> int:
 
 def path_loops() -> Mapping[str, Loop]:
     """Loops over the samples of a path, the same for all systems."""
-    entries = "kernel_path", "lane_path", "observed", "sampled", "jacobian_at"
+    entries = "kernel_path", "lane_path", "watched", "chosen", "sampled", "jacobian_at"
     return loops(PATH_LOOPS, entries)

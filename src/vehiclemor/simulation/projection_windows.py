@@ -10,8 +10,6 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.integrators.structures import Spans, Subspaces
 from vehiclemor.sizes import require, shaped, within
 
-# Of the equations that are integrated; see the modules of these names in `formulations`.
-FORMULATIONS = ("full", "state", "coordinates")
 # Lists of spans that are kept.
 MOST_SPANS = 64
 
@@ -23,7 +21,7 @@ class ProjectionWindows(ShortRepr):
     Attributes
     ----------
     formulation
-        One of `FORMULATIONS`.
+        `full`, `state` or `coordinates`, see the modules of these names in `formulations`.
     edges
         Window edges (windows + 1,) in s.
     means
@@ -45,7 +43,7 @@ class ProjectionWindows(ShortRepr):
         """Raise `ValueError` if loops would read or write beyond a basis."""
         windows, form = len(self.ranks), self.formulation
         rows, columns = self.trial_basis.shape[1:]
-        require(form in FORMULATIONS and windows > 0, "formulation")
+        require(form in ("full", "state", "coordinates") and windows > 0, "formulation")
         bases = (
             (self.trial_basis, windows, rows, columns),
             (self.test_basis, windows, rows, columns),

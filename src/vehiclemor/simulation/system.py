@@ -14,6 +14,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, loop_array, output_times
+from vehiclemor.simulation.formulations import FORMULATIONS
 from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.step_text import Frame
@@ -40,13 +41,6 @@ REASONS = {
     NOT_FINITE: "a state is not finite",
     SINGULAR: "the matrix of a linear system is singular",
     STEP_TOO_SMALL: "the step size has become too small",
-}
-# Kernels that a formulation calls; one of whole steps comes besides.
-CALLED = {
-    "full": ("derivative",),
-    "vehicle_frame": ("derivative",),
-    "state": ("derivative",),
-    "coordinates": ("derivative", "second_order", "speeds"),
 }
 
 
@@ -210,7 +204,7 @@ class System(ShortRepr):
         key = formulation, solver
         if key not in self._ready:
             step = self.step_address(solver) if solver else 0
-            self._ready[key] = ready(self.equations(*CALLED[formulation], step=step))
+            self._ready[key] = ready(self.equations(*FORMULATIONS[formulation], step=step))
         return self._ready[key]
 
     def run(

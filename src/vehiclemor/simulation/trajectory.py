@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vehiclemor.arguments import quoted, real_array
+from vehiclemor.errors import InputError
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.run_timer import CLOCK
 from vehiclemor.sizes import shaped
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+HISTORIES = ("coordinates", "outputs", "inputs", "speeds")
+# Times (s) that differ by less are one.
+SAME_TIME = 1e-9
 
 # A named initial condition of a model, or a state (n,).
 Start = str | tuple[float, ...] | np.ndarray
+# Outputs, coordinates or speeds; all outputs where there are none.
+Names = str | Sequence[str] | None
 STATUSES = ("ok", "untrusted", "diverged", "unreachable", "rejected", "error")
 # Of a run that has come to its end; `untrusted` it has left what its model knows, and says so.
 FINISHED = ("ok", "untrusted")
@@ -84,6 +99,8 @@ class Trajectory(ShortRepr):
         What a reduced model tells of this run; none of a model that is the full one.
     names
         Of the outputs.
+    model
+        Of which it is.
     """
 
     time: np.ndarray
@@ -98,6 +115,7 @@ class Trajectory(ShortRepr):
     remark: str = ""
     trust: Trust | None = None
     names: tuple[str, ...] = ()
+    model: Any = None
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None
@@ -122,28 +140,79 @@ class Trajectory(ShortRepr):
 
     def __getattr__(self, name: str) -> Any:
         """Histories that nobody has read so far, see `of`."""
-        if name not in ("coordinates", "speeds", "outputs") or "recording" not in self.__dict__:
+        fields = self.__dict__
+        if name not in ("coordinates", "speeds", "outputs") or "recording" not in fields:
             raise AttributeError(f"{type(self).__name__} has no {name}")
-        self.__dict__.update(self.__dict__.pop("recording").histories())
-        return self.__dict__[name]
+        recording, n = fields["recording"], len(fields["model"].coordinates)
+        if name == "outputs":
+            fields[name] = recording.output_history
+        else:
+            fields["coordinates"] = recording.state_history[:, :n]
+            fields["speeds"] = recording.state_history[:, n:]
+        return fields[name]
 
-    def __getitem__(self, output: str) -> np.ndarray:
-        """History (samples,) of an output, without the others.
+    def __getitem__(self, name: str) -> np.ndarray:
+        """History (samples,) of an output, a coordinate or a speed, without the others.
 
         Raises
         ------
         InputError
-            If there is no such output.
+            If there is no such quantity.
         """
-        number = self.names.index(choice("output", output, self.names))
-        if "recording" in self.__dict__:
-            return self.__dict__["recording"].output(number)
-        return self.outputs[:, number]
+        return self._columns((name,))[:, 0]
 
-    def __getstate__(self) -> dict[str, Any]:
-        """All fields, read."""
-        assert self.outputs is not None
-        return self.__dict__
+    def _columns(self, names: tuple[str, ...]) -> np.ndarray:
+        """Histories (samples, names) of outputs, coordinates or speeds."""
+        recording = self.__dict__.get("recording")
+        groups = {"outputs": self.names}
+        if recording is not None or self.coordinates.shape[1]:
+            groups |= {group: getattr(self.model, group, ()) for group in ("coordinates", "speeds")}
+        places = {
+            name: (group, column)
+            for group in reversed(groups)
+            for column, name in enumerate(groups[group])
+        }
+        for name in names:
+            choice("quantity", name, places)
+        if recording is not None and "outputs" not in self.__dict__:
+            return recording.columns(names)
+        return np.stack([getattr(self, places[name][0])[:, places[name][1]] for name in names], 1)
+
+    def chosen(self, outputs: Names = None, times: Any = None) -> Trajectory:
+        """The same run with some outputs alone, at some of its output times.
+
+        Parameters
+        ----------
+        outputs
+            Name or names of outputs, coordinates or speeds, which become the outputs of the run:
+            it has no coordinates and speeds then.  All outputs by default.
+        times
+            In s, increasing; all output times by default.
+
+        Raises
+        ------
+        InputError
+            If there is no such quantity, or a time is no output time.
+        """
+        fields = dict(self.__dict__)
+        if outputs is not None:
+            names = output_names(outputs)
+            nothing = self.inputs[:, :0]
+            fields.pop("recording", None)
+            fields |= {"names": names, "coordinates": nothing, "speeds": nothing}
+            fields["outputs"] = self._columns(names)
+        if times is not None:
+            rows = sample_rows(times, self.time)
+            for history in ("time", "inputs", "coordinates", "speeds", "outputs"):
+                if history in fields:
+                    fields[history] = fields[history][rows]
+            if "recording" in fields:
+                fields["recording"] = fields["recording"].at(rows)
+        return Trajectory.of(**fields)
+
+    def dataset(self) -> xr.Dataset:
+        """Labelled dataset of histories, counts, seconds and status, with units."""
+        return trajectory_dataset(self.model, self).assign_attrs(model=self.model.name)
 
     @property
     def finished(self) -> bool:
@@ -161,3 +230,113 @@ class Trajectory(ShortRepr):
     def states(self) -> np.ndarray:
         """Coordinates and speeds side by side (samples, n)."""
         return np.hstack((self.coordinates, self.speeds))
+
+
+def output_names(outputs: Any) -> tuple[str, ...]:
+    """Names of chosen outputs; `InputError` if they are none."""
+    names = (outputs,) if isinstance(outputs, str) else outputs
+    if type(names) not in (tuple, list) or not names or not all(type(n) is str for n in names):
+        raise InputError(f"outputs is {quoted(outputs)}, not a list of names")
+    return tuple(names)
+
+
+def sample_rows(times: Any, known: np.ndarray) -> np.ndarray:
+    """Numbers of the samples at some of the output times, all in s.
+
+    Raises
+    ------
+    InputError
+        If the times don't increase, or one of them is no output time.
+    """
+    try:
+        wanted = np.atleast_1d(real_array(times))
+    except (TypeError, ValueError):
+        raise InputError(f"times is {quoted(times)}, no list of times in s") from None
+    if wanted.ndim != 1 or not len(wanted) or not np.isfinite(wanted).all():
+        raise InputError("times must be a list of finite times in s")
+    if (np.diff(wanted) <= SAME_TIME).any():
+        raise InputError("times must increase")
+    rows = np.minimum(np.searchsorted(known, wanted - SAME_TIME), len(known) - 1)
+    missed = abs(known[rows] - wanted) > SAME_TIME
+    if missed.any():
+        raise InputError(
+            f"{wanted[missed.argmax()]:g} s is no output time; they go from {known[0]:g} to "
+            f"{known[-1]:g} s by {known[min(1, len(known) - 1)] - known[0]:g} s"
+        )
+    return rows
+
+
+def trajectory_dataset(
+    model: Any, trajectory: Trajectory, further: dict[str, tuple] | None = None
+) -> xr.Dataset:
+    """Labelled dataset of a trajectory: histories, counts, seconds and status, with units.
+
+    Parameters
+    ----------
+    further
+        Name -> (dimensions, values, attributes) of variables to add.
+    """
+    import xarray as xr
+
+    variables: dict[str, tuple] = {}
+    for name in HISTORIES:
+        history = getattr(trajectory, name)
+        if history.shape[1]:
+            label = name.removesuffix("s")
+            attributes = {"long_name": name, "units": f"see {label}_unit"}
+            variables[name] = (("time", label), history, attributes)
+    held = tuple(variables)
+    for name, long_name in model.counts.items():
+        attributes = {"units": "1", "long_name": long_name}
+        variables[name] = ((), trajectory.counts.get(name, 0), attributes)
+    seconds = {"units": "s", "long_name": "time spent in the compiled loop", "clock": CLOCK}
+    variables["seconds"] = ((), trajectory.seconds, seconds)
+    for name, long_name in (
+        ("status", f"one of {', '.join(STATUSES)}"),
+        ("message", "why the status is not ok"),
+        ("remark", "what else there is to know"),
+    ):
+        variables[name] = ((), getattr(trajectory, name), {"long_name": long_name})
+    names = trajectory.names or model.outputs
+    labels = _labels(model.definition, held, names, trajectory.time.tobytes())
+    return with_units(xr.Dataset(variables | (further or {}), labels))
+
+
+# An index of names takes a tenth of a millisecond to make.
+@lru_cache(maxsize=16)
+def _labels(
+    definition: ModelDefinition, histories: tuple[str, ...], names: tuple[str, ...], times: bytes
+) -> xr.Coordinates:
+    """Times, and names and units of histories; the outputs are those of the names."""
+    import xarray as xr
+
+    seconds = np.frombuffer(times)
+    found: dict[str, tuple] = {"time": ("time", seconds, {"units": "s", "long_name": "time"})}
+    declared = (*definition.outputs, *definition.coordinates, *definition.speeds)
+    known = {quantity.name: quantity for quantity in reversed(declared)}
+    for name in histories:
+        quantities, label = getattr(definition, name), name.removesuffix("s")
+        if name == "outputs":
+            quantities = [known[output] for output in names]
+        for key, values, text in (
+            (label, [q.name for q in quantities], "name"),
+            (f"{label}_unit", [q.unit for q in quantities], "SI unit"),
+        ):
+            array = np.array(values)
+            array.flags.writeable = False
+            found[key] = label, array, {"long_name": f"{text} of the {label}"}
+    return xr.Dataset(coords=found).coords
+
+
+def with_units(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with a unit at each variable that has one.
+
+    `see output_unit` becomes the unit of all outputs if they share one, and is left out otherwise:
+    a plot would show it.  The unit of each output stays beside it.
+    """
+    for variable in dataset.variables.values():
+        if str(variable.attrs.get("units", "")).startswith("see "):
+            of = variable.attrs.pop("units").removeprefix("see ")
+            units = set(dataset.variables[of].values.tolist())
+            variable.attrs |= {"units": units.pop()} if len(units) == 1 else {}
+    return dataset

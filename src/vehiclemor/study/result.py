@@ -18,8 +18,7 @@ from vehiclemor.reduction.interface import ReducedModel
 from vehiclemor.registry import component
 from vehiclemor.resources import data_folder
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.simulation.trajectory_dataset import trajectory_dataset, with_units
+from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset, with_units
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.failure import Failure
 from vehiclemor.study.provenance import attributes

@@ -9,9 +9,8 @@ from numba.core.errors import NumbaError
 
 from vehiclemor.codegen import loop_types
 from vehiclemor.codegen import loops as module
-from vehiclemor.codegen.compiler import compiled_loops
+from vehiclemor.codegen.compiler import compiled_loops, inlined_kernel
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
-from vehiclemor.codegen.loop_intrinsics import inlined_kernel
 from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, declared_arguments
 from vehiclemor.codegen.loops import Loop, address_of_array, cache_lines, ready
 from vehiclemor.codegen.machine_code import MachineCode

@@ -16,6 +16,7 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.workspaces import Solver
 
 STRAIGHT = component("maneuver", "rack_straight_ahead")
 QUIET = maneuver(lambda times, *_: np.zeros((len(times), 3)), 1.0)
@@ -34,7 +35,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setattr(
         codegen_kernels,
         "_machine",
-        lambda source, lanes: asked.append(source.name) or machine(source, lanes),
+        lambda source, *how: asked.append(source.name) or machine(source, *how),
     )
     return asked
 
@@ -87,7 +88,7 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
     edges, rank = np.array([0.0, 9.0]), np.array([2])
     space = ProjectionWindows("coordinates", edges, np.zeros((1, 4)), nothing, nothing, rank)
     with pytest.raises(InputError, match=f"has no {lacking}"):
-        model.integrate(QUIET, model.start(), space, "dopri5", 1e-3)
+        model.integrate(QUIET, model.start(), space, Solver("dopri5", 1e-3))
     function = model.mass_matrix if lacking == "second_order" else model.speeds_of_rates
     with pytest.raises(InputError, match=f"has no {lacking}"):
         function(model.start())

@@ -13,8 +13,8 @@ from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import (
     ALGEBRAIC_COUNTS,
     DYNAMIC_COUNTS,
+    trajectory_dataset,
 )
-from vehiclemor.simulation.trajectory_dataset import trajectory_dataset
 from vehiclemor.study.result import variables
 
 

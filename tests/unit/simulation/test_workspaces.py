@@ -10,7 +10,7 @@ import pytest
 from vehiclemor.codegen.loops import cache_lines
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.integrators.structures import NODE_1, NODE_2, Observer
+from vehiclemor.simulation.integrators.structures import NODE_1, NODE_2, Outputs
 from vehiclemor.simulation.paths import path_loops
 from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import Trajectory
@@ -116,18 +116,21 @@ def test_limits_are_watched_between_the_points_of_a_step(rng):
         expected = np.concatenate([states[0], np.polyval(cubic, parts), states[5]])
         low, high = np.sort(rng.normal(scale=4.0, size=2))
         ranges = np.array([[low, high], [-np.inf, 2.5]])
-        observer = Observer(address, np.zeros(1), np.array([0, 1]), ranges, 1, 8)
+        # The state itself, and what the kernel makes of it.
+        outputs_of = Outputs(address, np.zeros(1), np.array([0, -2]), ranges)
+        run = states, np.zeros((6, 1)), places, outputs_of, np.empty((6, 2))
         first, result = np.empty(2, dtype=np.int64), cache_lines(43, 8)[0]
-        table = np.empty((7, 8))
-        path_loops()["observed"](
-            states, np.zeros((6, 1)), places, observer, table.reshape(-1), first
-        )
-        path_loops()["sampled"](table, places, np.zeros(0, dtype=np.int64), result)
-        single = np.empty((43, 2))
-        path_loops()["sampled"](table, places, np.array([2, 0]), single)
-        np.testing.assert_allclose(single, result[:, [2, 0]], rtol=1e-12)
-        if np.isfinite(states).all():
+        path_loops()["watched"](*run, first)
+        table = np.zeros((6, 8))
+        table[:, :3] = states * [1.0, 1.0, -1.0]
+        path_loops()["sampled"](table, places, result)
+        chosen = np.empty((2, 43))
+        path_loops()["chosen"](*run, chosen)
+        finite = np.isfinite(states).all()
+        np.testing.assert_array_equal(np.isfinite(chosen.T), np.isfinite(result[:, [0, 2]]))
+        if finite:
             np.testing.assert_allclose(result[:, 0], expected, atol=1e-12)
+            np.testing.assert_allclose(chosen.T, result[:, [0, 2]], atol=1e-12)
         for k, (a, b) in enumerate(ranges):
             values = result[:, 1 + k]
             outside = np.flatnonzero(~((a <= values) & (values <= b)))

@@ -70,10 +70,13 @@ class FullOrderModel(ShortRepr):
         """Number of coordinates."""
         return len(self.model.coordinates)
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(
+        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
         """Full-order trajectory at the output times; it may have diverged."""
+        how = {"solver": self.solver, "tolerance": self.tolerance, "outputs": outputs}
         try:
-            return self.model.simulate(maneuver, start, None, self.solver, self.tolerance)
+            return self.model.simulate(maneuver, start, **how)
         except ConvergenceError as error:
             if error.trajectory is None:
                 raise

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
+from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel, simulated
 from vehiclemor.reduction.reduced_system import StateSpace
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
@@ -79,15 +79,17 @@ class GuardedModel(ShortRepr):
         """That of the fast model, which tells where it is not to be trusted any more."""
         return self.ahead.state_space  # type: ignore[attr-defined]
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(
+        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
         """The fast run; where it can't be trusted, the safe one."""
-        run = self.ahead.simulate(maneuver, start)
+        run = simulated(self.ahead, maneuver, start, outputs)
         if run.status == "ok" and run.trust:
             return run
         # A model that does not judge itself is trusted nowhere.
         silent = run.message or "the fast model does not judge itself"
         trust = run.trust or Trust(np.inf, 0.0, silent)
-        safe = self.safe.simulate(maneuver, start)
+        safe = simulated(self.safe, maneuver, start, outputs)
         told = f"from t = 0 s on by {SAFE}: {trust.reason or run.message}"
         return replace(
             safe,

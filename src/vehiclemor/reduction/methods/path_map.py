@@ -231,6 +231,7 @@ class PathMapModel(ShortRepr):
             message=message,
             trust=Trust(indicator, until, reason),
             names=model.outputs,
+            model=model,
         )
 
     def _outside(self, inputs: np.ndarray) -> str:

@@ -1,7 +1,8 @@
 """Reduced vehicles: few coordinates of the shape, heading and place as quadratures, compiled."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -189,20 +190,30 @@ class ReducedVehicle(ShortRepr):
         run = self.equations.run(maneuver, start, times)
         return None if run.failure or not np.isfinite(run.path).all() else run.path
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(
+        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
-        maneuver = checked_maneuver(maneuver, self.model.definition)
-        inputs = recorded_inputs(maneuver)[1]
+        maneuver, inputs, driven = self._driven(maneuver)
         known = self.known(start, inputs[0])
         run = self.equations.run(maneuver, start, direct_until=known.until)
-        told = *known.told, *self.reach.driven(maneuver)
-        states, trust = self.lift.of_run(run, inputs, known.excited, told)
+        states, trust = self.lift.of_run(run, inputs, known.excited, (*known.told, *driven))
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state
-        found = self.model.recorded(maneuver, run, inputs, states, trust)
+        found = self.model.recorded(maneuver, run, inputs, states, trust, outputs)
         run.give_back()
         return found
+
+    @cached_property
+    def _driven(self) -> Callable[[Maneuver], tuple[Maneuver, np.ndarray, tuple[float, float]]]:
+        """Of the last maneuvers: checked, inputs at the output times, how far these go."""
+
+        def made(maneuver: Maneuver) -> tuple[Maneuver, np.ndarray, tuple[float, float]]:
+            maneuver = checked_maneuver(maneuver, self.model.definition)
+            return maneuver, recorded_inputs(maneuver)[1], self.reach.driven(maneuver)
+
+        return lru_cache(MOST_STARTS)(made)
 
     def excited(self, state: np.ndarray) -> np.ndarray:
         """What of the transient a full state excites, see `Lifting.excited`."""

@@ -13,6 +13,7 @@ from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.errors import InputError
 from vehiclemor.progress import first_use
 from vehiclemor.registry import choice
+from vehiclemor.simulation.formulations import FORMULATIONS
 from vehiclemor.simulation.integrators import exponential_functions, exponential_modes, tableaus
 from vehiclemor.simulation.integrators.loop import scratch_end
 from vehiclemor.simulation.integrators.ros34pw2 import GAMMA
@@ -268,10 +269,9 @@ def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, whole_steps:
     return scratch_end(n, inputs) + own
 
 
-FORMULATIONS = ("inputs", "full", "vehicle_frame", "state", "coordinates")
 # All source that a run may be compiled from.
 LOOP_SOURCES = (
-    *(f"simulation.formulations.{name}" for name in FORMULATIONS),
+    *(f"simulation.formulations.{name}" for name in ("inputs", *FORMULATIONS)),
     *(
         f"simulation.integrators.{name}"
         for own in INTEGRATORS.values()

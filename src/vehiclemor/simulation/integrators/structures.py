@@ -190,27 +190,25 @@ class Output(NamedTuple):
     direct_until: Float
 
 
-class Observer(NamedTuple):
-    """How outputs follow from states, and what they are watched for.
+class Outputs(NamedTuple):
+    """Some outputs of a model.
 
     Attributes
     ----------
     kernel
-        Address of the kernel of the outputs: for `LANES` samples, or for one on shorter paths.
+        Address of their kernel: for `LANES` samples, or for one on shorter paths.
     constants
         Of the kernel.
-    limited, ranges
-        Numbers (limits,) of outputs, and their smallest and largest values (limits, 2).
-    states, width
-        Number of states, and length of a row of these and the outputs: whole vectors.
+    columns
+        By output the column of the states, or -1 less the column of the kernel's results.
+    ranges
+        Smallest and largest value (limited, 2) of those that are watched.
     """
 
     kernel: IntVector
     constants: Vector
-    limited: IntVector
+    columns: IntVector
     ranges: Matrix
-    states: Int
-    width: Int
 
 
 class Problem(NamedTuple):

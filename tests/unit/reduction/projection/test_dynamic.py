@@ -15,6 +15,7 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.workspaces import Solver
 
 N = 14
 STATE, COORDINATES = "state", "coordinates"
@@ -55,8 +56,8 @@ def test_the_whole_space_gives_the_full_model(model, form, start):
     mixing = np.eye(size) + 0.1 * generator.normal(size=(size, size))
     spaces = in_windows(form, [0.0, 0.7, 2.0, 25.0], mean=0.3, mixing=mixing)
     state = model.start(start)
-    full = model.integrate(lane_change, state, whole_space(2 * N), "dopri5", 1e-10, TIMES)
-    reduced = model.integrate(lane_change, state, spaces, "dopri5", 1e-10, TIMES)
+    full = model.integrate(lane_change, state, whole_space(2 * N), Solver("dopri5", 1e-10, TIMES))
+    reduced = model.integrate(lane_change, state, spaces, Solver("dopri5", 1e-10, TIMES))
     assert reduced.status == "ok"
     np.testing.assert_allclose(reduced.states, full.states, rtol=1e-7, atol=1e-6)
 
@@ -71,7 +72,10 @@ def test_only_the_subspace_counts_not_its_basis(model):
         drops[k, :rank] = np.linalg.inv(mixing).T @ drops[k, :rank]
     mixed = ProjectionWindows(COORDINATES, spaces.edges, spaces.means, lifts, drops, spaces.ranks)
     state = model.start("dropped")
-    runs = [model.integrate(lane_change, state, s, "dopri5", 1e-10, TIMES) for s in (spaces, mixed)]
+    runs = [
+        model.integrate(lane_change, state, s, Solver("dopri5", 1e-10, TIMES))
+        for s in (spaces, mixed)
+    ]
     np.testing.assert_allclose(runs[0].states, runs[1].states, rtol=0, atol=1e-7)
 
 

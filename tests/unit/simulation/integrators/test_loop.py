@@ -44,7 +44,9 @@ STILL = maneuver(lambda t, *_: np.array([0.0, 1.0, 0.0]) + 0.0 * t[:, None], 8.0
 
 def integrate(model, man, solver, tolerance, times, longest_step=None) -> Trajectory:
     space = whole_space(2 * len(model.coordinates))
-    return model.integrate(man, model.start(), space, solver, tolerance, times, longest_step)
+    return model.integrate(
+        man, model.start(), space, Solver(solver, tolerance, times, longest_step)
+    )
 
 
 def driven_error(model, solver, times, tolerance, longest_step=None) -> float:
@@ -200,7 +202,7 @@ def test_windows_that_hold_the_solution_do_not_change_it(model, solver):
     rng, times = np.random.default_rng(7), np.linspace(0.0, 8.0, 33)
     turned = [np.linalg.qr(rng.normal(size=(4, 4)))[0] for _ in range(3)]
     space = windows([0.0, 1.3, 4.0, 8.0], rng.normal(size=(3, 4)), turned)
-    found = model.integrate(DRIVEN, model.start(), space, solver, 1e-9, times)
+    found = model.integrate(DRIVEN, model.start(), space, Solver(solver, 1e-9, times))
     assert found.status == "ok"
     np.testing.assert_allclose(found.states[:, ANGLE], np.cos(times), atol=1e-7)
     np.testing.assert_allclose(found.states[:, ANGULAR_SPEED], -np.sin(times), atol=1e-7)
@@ -215,7 +217,7 @@ def test_a_window_projects_the_state_that_enters_it(model, solver):
     mean[1, TRACKED] = 0.3
     space = windows([0.0, 2.0, 4.0, 8.0], mean, [everything, held, everything])
     times = np.array([1.9, 2.5, 3.9, 4.5, 8.0])
-    states = model.integrate(DRIVEN, model.start(), space, solver, 1e-9, times).states
+    states = model.integrate(DRIVEN, model.start(), space, Solver(solver, 1e-9, times)).states
     # From 4 on the distance to cos t decays by exp(-(t - 4)).
     left = (0.3 - math.cos(4.0)) * np.exp(-(times[3:] - 4.0)) + np.cos(times[3:])
     expected = [math.cos(1.9), 0.3, 0.3, *left]
@@ -227,7 +229,7 @@ def test_a_window_projects_the_state_that_enters_it(model, solver):
 def test_a_frozen_jacobian_is_refused_in_a_reduced_system(model, solver):
     space = windows([0.0, 8.0], np.zeros((1, 4)), [np.eye(4)])
     with pytest.raises(InputError, match="not for a reduced model"):
-        model.integrate(DRIVEN, model.start(), space, solver, 1e-4)
+        model.integrate(DRIVEN, model.start(), space, Solver(solver, 1e-4))
 
 
 # Break points
