@@ -1,5 +1,6 @@
 """Loops: ordinary functions with declared arguments, compiled together and called by address."""
 
+from importlib.metadata import requires, version
 from types import ModuleType
 from typing import NamedTuple
 
@@ -220,3 +221,13 @@ def test_another_source_kernel_size_or_compiler_is_another_file(monkeypatch):
         ask()
     assert names[0] == names[1]
     assert len(set(names)) == len(names) - 1
+
+
+def test_numba_is_of_a_version_that_was_seen_to_work():
+    """Runs of vehicle and suspension were made with 0.61, 0.63, 0.65 and 0.68."""
+    oldest, newest = (0, 61), (0, 68)
+    installed = tuple(map(int, version("numba").split(".")[:2]))
+    assert oldest <= installed <= newest
+    allowed = next(text for text in requires("vehiclemor") or () if text.startswith("numba"))
+    bounds = {">=0.61", "<0.69"}
+    assert set(allowed.removeprefix("numba").split(",")) == bounds
