@@ -23,7 +23,7 @@ Presets = Mapping[str, Mapping[str, Value]]
 
 
 @dataclass(frozen=True)
-class Offline:
+class OfflineCost:
     """Cost of making a reduced model, compilation not included.
 
     Attributes
@@ -43,22 +43,26 @@ class Offline:
 
 def offline_cost(
     began: float, model: Model, runs: Sequence[Trajectory] = (), further: int = 0
-) -> Offline:
+) -> OfflineCost:
     """Seconds since `began` (`time.process_time()`), evaluations of the runs and `further` ones."""
     evaluations = sum(run.counts[model.evaluations] for run in runs) + further
-    return Offline(time.process_time() - began, evaluations)
+    return OfflineCost(time.process_time() - began, evaluations)
 
 
-class ReducedModel(Protocol):
-    """What `fit` returns."""
+class FittedModel(Protocol):
+    """What `fit` returns: whole runs.
+
+    One that can be stepped too is a `ReducedSystem` or a `ReducedMechanism`, or has `states`,
+    `begin`, `step`, `rates`, `derivatives`, `decode` and `trust` as these do.
+    """
 
     @property
-    def offline(self) -> Offline:
+    def offline(self) -> OfflineCost:
         """Cost of making it."""
         ...
 
     @property
-    def effective_rank(self) -> int:
+    def order(self) -> int:
         """Largest number of reduced coordinates in any window; n for a full-order model."""
         ...
 
@@ -72,7 +76,7 @@ class ReducedModel(Protocol):
 
 
 # Gives the method of a name with its settings, fitted to the same training runs.
-FitOther = Callable[[str, Any], ReducedModel]
+FitOther = Callable[[str, Any], FittedModel]
 
 
 def never_refused(model: Any) -> str:  # noqa: ARG001
@@ -128,7 +132,7 @@ class Method(ShortRepr):
     name: str
     summary: str
     settings: Mapping[str, type[Settings]]
-    fit: Callable[..., ReducedModel]
+    fit: Callable[..., FittedModel]
     reference: str = ""
     refusal: Callable[[Any], str] = never_refused
     check: Callable[[Any, Any], None] = fits_all

@@ -157,6 +157,10 @@ class Trajectory(ShortRepr):
         told = {"trust": trust, "status": "untrusted", "message": trust.message}
         return Trajectory.of(**self.__dict__ | told)
 
+    def chosen(self, outputs: Any = None, times: Any = None) -> Trajectory:  # noqa: ARG002
+        """The run restricted to some outputs and times."""
+        return self
+
     @property
     def states(self) -> np.ndarray:
         """Coordinates and speeds side by side (samples, n)."""

@@ -25,12 +25,11 @@ from vehiclemor.codegen.tangent import Tangent, tangent
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import Method, Offline, offline_cost
-from vehiclemor.reduction.polynomials.map_loops import TOLD, Cells
-from vehiclemor.reduction.reduced_system import KinematicStates
+from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
+from vehiclemor.reduction.map_loops import TOLD, Cells
+from vehiclemor.reduction.reduced_system import ReducedMechanism
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
-from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.kernel_derivatives import By
@@ -83,7 +82,7 @@ def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -
 def map_loop(inputs: int, moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> Loop:
     """Compiled loop of polynomials of that total degree in those of the inputs that move."""
     sizes = {"INPUTS": inputs, "QUANTITIES": len(columns)}
-    modules = "simulation.newton_loops", "reduction.polynomials.map_loops"
+    modules = "simulation.newton_loops", "reduction.map_loops"
     kernels = {"polynomials": map_kernel(moving, degree, columns)}
     return loops(modules, ("map_path",), kernels, sizes)["map_path"]
 
@@ -101,7 +100,7 @@ class PathMapSettings(Settings):
 
 
 @dataclass(frozen=True)
-class PathMapModel(ShortRepr):
+class PathMapModel(ReducedMechanism):
     """Coordinates and outputs as polynomials, of that total degree, of the inputs that move.
 
     Attributes
@@ -121,7 +120,7 @@ class PathMapModel(ShortRepr):
     cells: Cells
     columns: tuple[int, ...]
     stops: bool
-    offline: Offline
+    offline: OfflineCost
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if the loop would read beyond inputs, cells or columns."""
@@ -142,7 +141,7 @@ class PathMapModel(ShortRepr):
         require(bool(self.moving) and terms * width <= MOST_SIZE, "degree")
 
     @property
-    def effective_rank(self) -> int:
+    def order(self) -> int:
         """Number of inputs that move."""
         return len(self.moving)
 
@@ -169,21 +168,17 @@ class PathMapModel(ShortRepr):
         self.model.check_start(start)
         return self._along(*self.model.sampled(maneuver))
 
-    @property
-    def state_space(self) -> KinematicStates:
-        """The coordinates; a step is an evaluation."""
-
-        def solved(time: float, inputs: np.ndarray, _: np.ndarray) -> Trajectory:
-            return self._along(np.array([time]), inputs, ready(Samples(inputs)))
-
-        return KinematicStates(self.model, solved, self._slopes)
+    def solved(self, time: float, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+        """Polynomials at one time: a step is an evaluation."""
+        del state
+        return self._along(np.array([time]), inputs, ready(Samples(inputs)))
 
     @cached_property
     def _tangent(self) -> Tangent:
         (source,) = kernel_sources(map_kernel(self.moving, self.degree, self.columns)).values()
         return tangent(source, source.arguments[0], len(self.columns), len(self.ranges))
 
-    def _slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
+    def slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
         """Derivatives of coordinates, or of the model's outputs there, by the inputs."""
         if by != "inputs" or of not in ("coordinates", "outputs"):
             raise InputError("path_map: derivatives are of coordinates or outputs, by inputs")
@@ -243,10 +238,6 @@ class PathMapModel(ShortRepr):
         """The map of another mechanism, between the same inputs."""
         number = int(self.cells.numbers.max())
         return _mapped(model, self.ranges, self.degree, number, self.stops)
-
-    def best_approximation(self, states: np.ndarray) -> None:
-        """There is no subspace to project onto."""
-        del states
 
 
 def _named(model: AlgebraicModel, values: np.ndarray) -> str:

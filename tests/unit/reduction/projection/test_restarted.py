@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.projection.dynamic import RestartedProjection
+from vehiclemor.reduction.interface import OfflineCost
+from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.registry import component
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 
@@ -42,10 +42,8 @@ def test_with_all_directions_it_is_the_full_model(car, maneuver):
     ranks, edges = np.full(windows, states), np.linspace(0.0, 4.0, windows + 1)
     spaces = ProjectionWindows("state", edges, means, eye, eye, ranks)
     full = car.simulate(maneuver)
-    for moved in (True, False):
-        reduced = RestartedProjection(
-            car, car.system, spaces, states, Offline(), "dopri5", 1e-9, moved=moved
-        )
+    for restart in ("full_model", "projected"):
+        reduced = DynamicProjection(car, spaces, OfflineCost(), "dopri5", 1e-9, restart=restart)
         run = reduced.simulate(maneuver, "equilibrium")
         np.testing.assert_allclose(run.states, full.states, rtol=1e-6, atol=1e-6)
         assert run.counts["rhs_calls"] > full.counts["rhs_calls"]
