@@ -110,8 +110,8 @@ class Method(ShortRepr):
         What `fit` looks at: `runs` of the model that it reduces; of runs the `inputs` at most, so
         that nothing is learnt of the model's parameters.
     own_limits
-        Whether its runs tell themselves when they leave what the model knows, or it knows no
-        bounds; else a run beyond the inputs of the training runs is not trusted.
+        Whether its runs have a trust indicator of their own, or it knows no bounds; else a run
+        beyond the inputs of the training runs is not trusted.
     follows_time
         Whether what it fits belongs to the times of the training runs, as a basis for each control
         period does: then a run is known where its inputs are those of a training run.

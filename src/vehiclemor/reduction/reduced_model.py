@@ -245,7 +245,7 @@ class ReducedOrderModel(ShortRepr):
     def trust(self, state: Any, inputs: Any) -> Trust:
         """How far a state, or states (samples, dim), go in what the model knows.
 
-        A model that does not judge itself knows the inputs that it was trained on, and the full
+        A model without ranges of its own knows the inputs that it was trained on, and the full
         one the ranges of validity of inputs and outputs that it declares.  Where a run came from is
         not in a state.
         """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +25,7 @@ from vehiclemor.simulation.checks import checked_path
 from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
-from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory
+from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory, Trust
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,14 +38,14 @@ LARGEST = 4 << 30
 MOST_SETS = 32
 # Times (s) that differ by less are one.
 SAME_TIME = 1e-9
-# What else there is of each run: its value before it is known, unit and meaning.
-REPORTED: dict[str, tuple[str | float, str, str]] = {
-    "status": ("ok", "", f"one of {', '.join(STATUSES)}"),
-    "message": ("", "", "why the status is not ok"),
-    "remark": ("", "", "what else there is to know"),
-    "indicator": (np.nan, "1", "how far the run goes in what its model knows; 1 is the edge"),
-    "until": (np.inf, "s", "time at which the indicator has first passed 1"),
-    "seconds": (0.0, "s", "time spent in the compiled loop"),
+# What else there is of each run: unit and meaning.
+REPORTED = {
+    "status": ("", f"one of {', '.join(STATUSES)}"),
+    "message": ("", "why the status is not ok"),
+    "remark": ("", "what else there is to know"),
+    "indicator": ("1", "how far the run goes in what its model knows; 1 is the edge"),
+    "until": ("s", "time at which the indicator has first passed 1"),
+    "seconds": ("s", "time spent in the compiled loop"),
 }
 
 
@@ -88,7 +89,7 @@ def simulate_many(
     -------
     xarray.Dataset
         `values` (run, time, output) and, by run, `status`, `message`, `remark`, `indicator` and
-        `until` (what a reduced model tells of itself), `seconds` and solver counts.  A run that has
+        `until` (of its trust), `seconds` and solver counts.  A run that has
         failed, or that the model refuses, tells so in its status, and is not a number from there
         on.
 
@@ -101,65 +102,41 @@ def simulate_many(
     full = getattr(given, "model", given)
     if not isinstance(full, Model):
         raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
-    runs = _count_of(signals, full)
-    chosen = _columns(full, outputs)
+    runs, columns = _count_of(signals, full), _columns(full, outputs)
     kept, rows = _kept_times(times, signals)
     begins = _starts_of(starts, runs, full)
-    remade = getattr(given, "for_parameters", None)
-    if given is full:
-        remade = partial(reparametrised, full)
-    sets = _parameter_sets(parameters, runs, full, remade)
+    model_of = _models(given, full, parameters, runs)
     threads = _cores() if jobs is None else count("jobs", jobs, most=MOST_JOBS)
-    shape = runs, len(kept), len(chosen)
+    shape = runs, len(kept), len(columns)
     if 8 * math.prod(shape) > LARGEST:
         size = 8e-9 * math.prod(shape)
         raise InputError(f"the result would take {size:.1f} GB of memory: choose outputs=, times=")
-    values, counts = np.empty(shape), np.zeros((runs, len(full.counts)), dtype=np.int64)
-    reported = {
-        name: np.full(runs, first, dtype=object if isinstance(first, str) else float)
-        for name, (first, _, _) in REPORTED.items()
-    }
+    values = np.empty(shape)
 
-    @lru_cache(MOST_SETS)
-    def model_of(own: tuple) -> Any:
-        try:
-            return remade(dict(own))
-        except VehiclemorError as error:
-            return Failure("rejected", str(error))
-
-    def result(run: int) -> Trajectory | Failure:
-        of_run = given if sets is None else model_of(sets[run])
-        if isinstance(of_run, Failure):
-            return of_run
-        return attempt(lambda: _whole_run(of_run, signals[run], begins[run]))
-
-    def write(run: int, done: Trajectory | Failure) -> None:
-        reported["status"][run], reported["message"][run] = done.status, done.message
+    def report(run: int) -> tuple:
+        """What else there is of a run, whose values are written."""
+        done = attempt(lambda: _whole_run(model_of(run), signals[run], begins[run]))
         if isinstance(done, Failure):
-            values[run], reported["until"][run] = np.nan, 0.0
-            return
-        for k, (_, group, column) in enumerate(chosen):
+            values[run] = np.nan
+            nothing = [0] * len(full.counts)
+            return done.status, done.message, "", np.nan, 0.0, 0.0, *nothing
+        for k, (_, group, column) in enumerate(columns):
             values[run, :, k] = getattr(done, group)[rows[run], column]
-        reported["remark"][run], reported["seconds"][run] = done.remark, done.seconds
-        counts[run] = list(done.counts.values())
-        if done.trust is not None:
-            found = done.trust
-            reported["indicator"][run], reported["until"][run] = found.indicator, found.until
+        trust = done.trust or Trust(np.nan)
+        own = done.status, done.message, done.remark, trust.indicator, trust.until, done.seconds
+        return *own, *done.counts.values()
 
-    def work(first: int) -> None:
-        for run in range(first, min(first + CHUNK, runs)):
-            write(run, result(run))
+    def reports(first: int) -> list[tuple]:
+        return [report(run) for run in range(first, min(first + CHUNK, runs))]
 
     with one_thread(), ThreadPoolExecutor(threads, "vehiclemor") as pool:
-        for _ in pool.map(work, range(0, runs, CHUNK)):
-            pass
-    found = _dataset(full, [name for name, *_ in chosen], kept, (values, reported, counts))
+        found = list(itertools.chain(*pool.map(reports, range(0, runs, CHUNK))))
     default = {"solver": "dopri5", "tolerance": REFERENCE_TOLERANCE}
     if full.kind == "ae":
         default = {"solver": "newton", "tolerance": NEWTON_TOLERANCE}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
     title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}
-    return found.assign_attrs(
+    return _dataset(full, [name for name, *_ in columns], kept, values, found).assign_attrs(
         attributes(title, full.kernel_hash, **of, settings=repr(dict(settings)))
     )
 
@@ -262,27 +239,40 @@ def _starts_of(starts: Any, runs: int, model: Model) -> Sequence[Start]:
     return [start if isinstance(start, str) else model.start(start) for start in starts]
 
 
-def _parameter_sets(
-    parameters: Any, runs: int, model: Model, remade: Callable[[dict], Any] | None
-) -> Sequence[tuple] | None:
-    """Parameters (name, value) of each run, none if all have the model's own."""
+def _models(given: Any, full: Model, parameters: Any, runs: int) -> Callable[[int], Any]:
+    """The model of each run, by its index; it raises `InputError` where there is none."""
     if parameters is None:
-        return None
-    if remade is None:
-        raise InputError("parameters: the model can't be made with others")
-    # What is trained on runs says so.
-    remade({})
+        return lambda _: given
+    remade = partial(reparametrised, full)
+    if given is not full:
+        remade = getattr(given, "for_parameters", None)
+        if remade is None:
+            raise InputError("parameters: this model can't be made with others")
+        # What is trained on runs says so.
+        remade({})
     if isinstance(parameters, Mapping):
-        columns = {name: _values(model, name, v, runs) for name, v in parameters.items()}
-        rows = zip(*columns.values(), strict=True)
-        return [tuple(zip(columns, values, strict=True)) for values in rows] or None
-    whole = isinstance(parameters, Sequence) and len(parameters) == runs
-    if not whole or not all(isinstance(own, Mapping) for own in parameters):
-        raise InputError(f"parameters is {quoted(parameters)}, not a mapping for each run")
-    return [
-        tuple((name, *_values(model, name, value)) for name, value in own.items())
-        for own in parameters
-    ]
+        columns = [
+            [(name, value) for value in _values(full, name, by_run, runs)]
+            for name, by_run in parameters.items()
+        ]
+        sets = [*zip(*columns, strict=True)] or [()] * runs
+    else:
+        whole = isinstance(parameters, Sequence) and len(parameters) == runs
+        if not whole or not all(isinstance(own, Mapping) for own in parameters):
+            raise InputError(f"parameters is {quoted(parameters)}, not a mapping for each run")
+        sets = [
+            tuple((name, *_values(full, name, value)) for name, value in own.items())
+            for own in parameters
+        ]
+
+    @lru_cache(MOST_SETS)
+    def made(own: tuple) -> Any:
+        try:
+            return remade(dict(own))
+        except VehiclemorError as error:
+            raise InputError(str(error)) from None
+
+    return lambda run: made(sets[run])
 
 
 def _values(model: Model, name: str, value: Any, runs: int | None = None) -> list[Any]:
@@ -303,24 +293,24 @@ def _values(model: Model, name: str, value: Any, runs: int | None = None) -> lis
     return [tuple(row) if own else row for row in rows]
 
 
-def _dataset(model: Model, names: list[str], times: np.ndarray, found: Any) -> xr.Dataset:
+def _dataset(
+    model: Model, names: list[str], times: np.ndarray, values: np.ndarray, reports: list[tuple]
+) -> xr.Dataset:
     """Runs by labels: their values (run, time, output), what else there is of them, counts."""
     import xarray as xr
 
-    values, reported, counts = found
     declared = (*model.definition.outputs, *model.definition.coordinates, *model.definition.speeds)
     units = {quantity.name: quantity.unit for quantity in reversed(declared)}
+    described = REPORTED | {name: ("1", long_name) for name, long_name in model.counts.items()}
     variables: dict[str, Any] = {
         "values": (("run", "time", "output"), values, {"long_name": "quantities"})
     }
-    for name, (_, unit, long_name) in REPORTED.items():
-        described = {"long_name": long_name} | ({"units": unit} if unit else {})
-        column = reported[name]
-        column = column.astype(str) if column.dtype == object else column
-        variables[name] = "run", column, described
+    for (name, (unit, long_name)), column in zip(
+        described.items(), zip(*reports, strict=True), strict=True
+    ):
+        further = {"units": unit} if unit else {}
+        variables[name] = "run", np.array(column), {"long_name": long_name} | further
     variables["seconds"][2]["clock"] = CLOCK
-    for k, (name, long_name) in enumerate(model.counts.items()):
-        variables[name] = "run", counts[:, k], {"units": "1", "long_name": long_name}
     unit_of = "output", [units[name] for name in names], {"long_name": "SI unit of the quantity"}
     coordinates = {
         "run": ("run", np.arange(len(values)), {"long_name": "number"}),

@@ -351,12 +351,10 @@ map ranges ranges=a[:-1] ranges=nan*a
 map moving moving.tuple=[0,2] moving.tuple=[0,-1] moving.tuple=[1,1]
 map degree degree=21 degree=-1 moving.tuple=[]|cells.coefficients=a[:,:1]
 map columns columns.tuple=a[:-1] columns.tuple=[*a[:-1],-1] columns.tuple=[*a[:-1],14]
-map cells cells.centres=a[:1] cells.scales=a[:1] cells.halves=a[:1] cells.tops=a[:1]
+map cells cells.centres=a[:1] cells.scales=a[:1]
 map cells cells.centres=nan*a cells.scales=nan*a
 map cells cells.coefficients=a[:-1] cells.coefficients=a.astype(int)
 map coefficients cells.coefficients=a[:,:-1] cells.coefficients=a[:,:,:-1]
-map tops cells.tops=a+1.0
-map halves cells.halves=a+1.0
 map numbers cells.numbers=-a cells.numbers=1.0*a
 pod spaces spaces.edges=a[:-1] spaces.means=a[:-1] spaces.means=a[:,:-1]
 pod spaces spaces.test_basis=a[:-1] spaces.test_basis=a[:,:,:-1] spaces.trial_basis=a[:-1]
@@ -373,7 +371,7 @@ replay outputs recorded.0.outputs=a[:,:-1]
 ROWS = [row.split() for row in SIZES.strip().splitlines()]
 CASES = [(file, word, change) for file, word, *row in ROWS for change in row]
 # At several places.
-BOXES = ("centres=a[:1]", "scales=a[:1]", "halves=a[:1]", "tops=a[:1]", "numbers=a[:1]")
+BOXES = ("centres=a[:1]", "scales=a[:1]", "numbers=a[:1]")
 BASES, NO_BASES = (
     ("means=a[{}]", "trial_basis=a[{}]", "test_basis=a[{}]"),
     ("ranks=a[:0]", "edges=a[:1]"),

@@ -1,7 +1,7 @@
 """Fallback to the full order.
 
-A fast model runs.  Where that tells that it leaves what it knows, the full order does the whole
-run: the fast one has mostly gone wrong before it notices.
+A fast model runs.  Where it extrapolates, the full order does the whole run: the fast one has
+mostly gone wrong before its trust indicator passes 1.
 """
 
 import tomllib
@@ -43,7 +43,7 @@ class GuardedSettings(OnlineSettings):
 
 @dataclass(frozen=True, eq=False)
 class GuardedModel(ShortRepr):
-    """Both models; it is stepped as the fast one, which tells where it is not to be trusted."""
+    """Both models; it is stepped as the fast one, whose trust indicator is to be watched."""
 
     fast: FittedModel
     safe: FittedModel

@@ -91,8 +91,8 @@ class DynamicProjection(ReducedSystem):
     Where a window starts from the full model's state, as onboard model-predictive controllers do,
     which the paper's control periods resemble (section 3.1), errors grow within it alone.  But
     projected onto the subspace of the training run (step 6) that state becomes one of that run
-    again, wherever the car is: where it is the origin of the subspace, only the change within the
-    window is in the span of the training's.
+    again, wherever the vehicle is: where it is the origin of the subspace, only the change within
+    the window is in the span of the training's.
 
     Attributes
     ----------
@@ -282,8 +282,8 @@ def _spaces(
 def speeds_per_rates(model: DynamicModel) -> np.ndarray:
     """Matrix (n, n) that turns rates of the coordinates into speeds at the first start."""
     n = len(model.coordinates)
-    places = np.hstack([np.tile(model.start()[:n], (n, 1)), np.eye(n)])
-    return np.column_stack([model.speeds_of_rates(place) for place in places])
+    states = np.hstack([np.tile(model.start()[:n], (n, 1)), np.eye(n)])
+    return np.column_stack([model.speeds_of_rates(state) for state in states])
 
 
 def _weight(
