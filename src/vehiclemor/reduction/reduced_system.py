@@ -49,7 +49,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
 
     if TYPE_CHECKING:
         model: DynamicModel
-        order: int
+        order: Any
         offline: OfflineCost
 
     @property

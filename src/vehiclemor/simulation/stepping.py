@@ -11,7 +11,7 @@ from ctypes import c_double
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from vehiclemor.errors import ConvergenceError
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.simulation.integrators.structures import Output, Spans
 from vehiclemor.simulation.kernel_derivatives import CONSTANTS, STATE, along, partial
-from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 from vehiclemor.simulation.workspaces import NO_POINTS, Drive, Solver, Workspace
@@ -70,15 +69,17 @@ class SteppedSystem:
 
     Attributes
     ----------
-    spaces
-        Formulation of the system and its subspaces; in more windows than one the time tells which.
+    system, spaces
+        A `System`, and its formulation with the subspaces, `ProjectionWindows`; in more windows
+        than one the time says which.
     solver, tolerance
         Integrator and its tolerance.
     """
 
     if TYPE_CHECKING:
-        system: System
-        spaces: ProjectionWindows
+        # Any: a field or a property.
+        system: Any
+        spaces: Any
         solver: str
         tolerance: float
 
@@ -228,12 +229,11 @@ class SteppedSystem:
         small = trial @ mass @ trial.T
         reduced = np.linalg.solve(small, trial @ force) @ trial
         free = np.linalg.solve(mass, force)
-
-        def left(accelerations: np.ndarray) -> np.ndarray:
-            return dforce - np.einsum("ijk,j->ik", dmass, accelerations)
-
-        dreduced = trial.T @ np.linalg.solve(small, trial @ left(reduced))
-        dfree = np.linalg.solve(mass, left(free))
+        dreduced = dfree = drates[:half]
+        if kernels.by is not None:
+            left = [dforce - np.einsum("ijk,j->ik", dmass, q) for q in (reduced, free)]
+            dreduced = trial.T @ np.linalg.solve(small, trial @ left[0])
+            dfree = np.linalg.solve(mass, left[1])
         # Speeds are linear in the rates, so their change is too in what projection takes away.
         change = np.concatenate([place[:half], reduced - free])
         dchange = np.vstack([dplace[:half], dreduced - dfree])
