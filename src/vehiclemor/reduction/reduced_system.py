@@ -186,9 +186,8 @@ class ReducedMechanism(ShortRepr):
         next_inputs: np.ndarray | None = None,
     ) -> np.ndarray:
         """Coordinates at the end of the step."""
-        found = self.solved(
-            time + dt, (inputs if next_inputs is None else next_inputs)[None], state
-        )
+        ends = inputs if next_inputs is None else next_inputs
+        found = self.solved(time + dt, ends[None], state)
         if found.status == "diverged":
             raise ConvergenceError(f"{self.model.name}: {found.message}", found)
         return found.coordinates[0].copy()

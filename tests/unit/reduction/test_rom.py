@@ -95,6 +95,14 @@ def test_a_step_is_a_function_of_its_arguments_alone(linear):
     np.testing.assert_array_equal(found[::-1], known)
 
 
+def test_a_state_is_that_of_its_inputs():
+    # What a prescribed rack moves at once is no part of the slow modes.
+    rom = vm.reduce("high_fidelity_vehicle", "modal_truncation", training="nominal")
+    first, other, again = (rom.state("equilibrium", [s, 0.0, 0.0]) for s in (0.0, 0.01, 0.0))
+    np.testing.assert_array_equal(again, first)
+    assert np.abs(other - first).max() > 1e-3
+
+
 def test_a_loop_may_go_on_for_ever(linear):
     state, u = linear.state(), np.zeros(1)
     for _ in range(MOST_CALLS // 3):
