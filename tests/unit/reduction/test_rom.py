@@ -227,6 +227,12 @@ def test_methods_without_a_state_say_so(wishbone):
         wishbone.rhs(wishbone.state(), [0.0, 0.0])
 
 
+def test_derivatives_that_a_reduced_model_does_not_know_are_refused(full, linear):
+    assert full.jacobian(full.state(), [0.0], "sprung_mass").shape == (len(full.states), 1)
+    with pytest.raises(InputError, match="sprung_mass"):
+        linear.jacobian(linear.state(), [0.0], "sprung_mass")
+
+
 def test_a_step_that_fails_says_when(full):
     # Upside down on a tire that is pressed by more than it can bear.
     x = full.state()
