@@ -83,3 +83,14 @@ def test_what_was_zero_in_training_is_known_as_zero_alone():
         for found in (known, replace(known, largest=0.0 * known.largest)):
             assert trust(found, model, still).indicator <= 1.0
             assert trust(found, model, moved).indicator > 1.0
+
+
+def test_a_run_that_lasts_longer_is_known_as_long_as_the_training_lasts():
+    model, run = build("independent_suspension_vehicle"), scenario("independent_suspension_vehicle")
+    maneuver = replace(run.maneuver, duration=2.0 * run.maneuver.duration)
+    known = range_of(model, run)
+    assert trust(known, model, run).indicator <= 1.0
+    found = trust(known, model, replace(run, maneuver=maneuver))
+    assert found.indicator == pytest.approx(2.0, rel=1e-5)
+    assert found.until == pytest.approx(run.maneuver.duration, rel=1e-5)
+    assert "duration" in found.reason
