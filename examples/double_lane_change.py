@@ -7,7 +7,7 @@ it through the driver, who corrects the place but sees another car.
 import numpy as np
 
 import vehiclemor as vm
-from vehiclemor.online.rom import ReducedOrderModel as Car
+from vehiclemor.reduction.reduced_model import ReducedOrderModel as Car
 
 # Ends in m of the way over to the other lane and of the way back (ISO 3888-1: sections of 15, 30,
 # 25, 25, 15 and 15 m), and distance in m between the lanes.

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 import vehiclemor as vm
-from vehiclemor.online.rom import ReducedOrderModel as Car
+from vehiclemor.reduction.reduced_model import ReducedOrderModel as Car
 
 MODEL = "independent_suspension_vehicle"
 # The steering is held for a period in s; so many periods are looked ahead.

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import vehiclemor as vm
-from vehiclemor.online.rom import ReducedOrderModel as Car
+from vehiclemor.reduction.reduced_model import ReducedOrderModel as Car
 
 # Of the column, seen at the wheels: inertia (kg m^2), damping (N m s/rad), and the trail (m) at
 # which the tires' side force turns it back.

@@ -152,7 +152,7 @@ def stored_files(source: str, folder: Path) -> list[Path]:
 
 def origin(source: str, dataset: xr.Dataset, files: list[Path]) -> dict[str, str]:
     """What gave the numbers of a source, and when."""
-    from vehiclemor.study.provenance import machine, versions
+    from vehiclemor.provenance import machine, versions
 
     kind = source.partition(" ")[0]
     commands = {"costs": "vehiclemor compare", "benchmark": "tox -e bench", "published": ""}

@@ -26,8 +26,8 @@ from named_values import Values, measured_values
 
 import vehiclemor as vm
 from vehiclemor.codegen.loops import Prepared
-from vehiclemor.online.rom import ReducedOrderModel as Car
-from vehiclemor.online.rom import shipped_folder
+from vehiclemor.reduction.reduced_model import ReducedOrderModel as Car
+from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.registry import component
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.files import make_folder
-from vehiclemor.study.netcdf_file import read_dataset, write_dataset
-from vehiclemor.study.provenance import attributes
+from vehiclemor.netcdf_file import read_dataset, write_dataset
+from vehiclemor.provenance import attributes
 
 if TYPE_CHECKING:
     import xarray as xr

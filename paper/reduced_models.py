@@ -18,16 +18,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vehiclemor import VehiclemorError
-from vehiclemor.api import RESULTS
+from vehiclemor.api import RESULTS, reduce
 from vehiclemor.errors import FileError
 from vehiclemor.files import make_folder
-from vehiclemor.online.model_file import content
-from vehiclemor.online.rom import ReducedOrderModel, load, reduce, shipped_folder
+from vehiclemor.provenance import code_digest
+from vehiclemor.reduction.model_file import content
+from vehiclemor.reduction.reduced_model import ReducedOrderModel, load, shipped_folder
 from vehiclemor.resources import data_folder
 from vehiclemor.study.experiment import Settings
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.scenario import Scenario, parameters_of, start_of
 
 COMMAND = "python paper/reduced_models.py"

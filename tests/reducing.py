@@ -7,7 +7,7 @@ import numpy as np
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.steering import lane_change, rack_lane_change
 from vehiclemor.metrics import rms
-from vehiclemor.reduction.interface import ReducedModel
+from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
@@ -37,7 +37,7 @@ def fitted(
     method: str,
     policy: str = "matched",
     **settings: object,
-) -> ReducedModel:
+) -> FittedModel:
     """Reduced model by a registered method, its recommended preset and these settings."""
     definition = component("method", method)
     complete = validated(definition, model.kind, settings)
@@ -51,7 +51,7 @@ def figure_errors(model: AlgebraicModel, outputs: np.ndarray, reference: Traject
     return rms(outputs - reference.outputs)[columns]
 
 
-def floor_errors(model: AlgebraicModel, reduced: ReducedModel, reference: Trajectory) -> np.ndarray:
+def floor_errors(model: AlgebraicModel, reduced: FittedModel, reference: Trajectory) -> np.ndarray:
     """The same of the best approximation in the reduced model's subspaces."""
     best = reduced.best_approximation(reference.states)
     assert best is not None

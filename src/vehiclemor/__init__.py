@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import model as model
     from vehiclemor.api import models as models
     from vehiclemor.api import plot as plot
+    from vehiclemor.api import reduce as reduce
     from vehiclemor.api import run_study as run_study
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import status as status
@@ -24,20 +25,19 @@ if TYPE_CHECKING:
     from vehiclemor.inputs.maneuver import maneuver as maneuver
     from vehiclemor.inputs.signal import Signal as Signal
     from vehiclemor.inputs.signal import many_signals as many_signals
-    from vehiclemor.online.batches import simulate_many as simulate_many
-    from vehiclemor.online.rom import load as load
-    from vehiclemor.online.rom import reduce as reduce
-    from vehiclemor.online.rom import rom as rom
+    from vehiclemor.reduction.reduced_model import load as load
+    from vehiclemor.reduction.reduced_model import rom as rom
     from vehiclemor.report.comparison import compare as compare
     from vehiclemor.report.page import write_report as write_report
     from vehiclemor.report.regenerate import figures as figures
     from vehiclemor.report.study_formats import convert as convert
+    from vehiclemor.simulation.batches import simulate_many as simulate_many
 
 __version__ = "0.1.0"
 # Name -> module that defines it.
 _DEFINED_IN = {
     **dict.fromkeys(
-        ("describe", "errors", "maneuvers", "methods", "model", "models", "plot"),
+        ("describe", "errors", "maneuvers", "methods", "model", "models", "plot", "reduce"),
         "vehiclemor.api",
     ),
     **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
@@ -50,9 +50,8 @@ _DEFINED_IN = {
     "maneuver": "vehiclemor.inputs.maneuver",
     "many_signals": "vehiclemor.inputs.signal",
     "write_report": "vehiclemor.report.page",
-    "reduce": "vehiclemor.online.rom",
-    **dict.fromkeys(("load", "rom"), "vehiclemor.online.rom"),
-    "simulate_many": "vehiclemor.online.batches",
+    **dict.fromkeys(("load", "rom"), "vehiclemor.reduction.reduced_model"),
+    "simulate_many": "vehiclemor.simulation.batches",
 }
 __all__ = [
     "Signal",

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from vehiclemor.inputs.maneuver import Maneuver
+    from vehiclemor.reduction.reduced_model import ReducedOrderModel
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start, Trajectory
     from vehiclemor.study.plans.training import Given
@@ -113,6 +114,58 @@ def model(
 
     path = None if parameter_file is None else file_path("parameter_file", parameter_file)
     return build(name, path, parameters)
+
+
+def reduce(
+    model: str | Model,
+    method: str,
+    *,
+    training: Given | None = None,
+    preset: str = "recommended",
+    **settings: object,
+) -> ReducedOrderModel:
+    """Reduce a model: fit a method to training runs of the full model.
+
+    Parameters
+    ----------
+    model
+        Registered name, or a model made by `model()`.
+    method
+        Registered name, see `methods()`; `full_order` gives the full model with the same names.
+    training
+        `nominal`: the model's own maneuver from its first start.  `protocol`: the training set of
+        the model's own protocol, which is the default of the methods that compete there.  Or the
+        name of a maneuver, a maneuver, a signal, a scenario, or a list of these.
+    preset, **settings
+        Of the method; see `describe()`.
+
+    Raises
+    ------
+    VehiclemorError
+        If a name or value is wrong, or the method can't reduce the model.
+    """
+    from vehiclemor.progress import first_use
+    from vehiclemor.reduction.reduced_model import ReducedOrderModel
+    from vehiclemor.reduction.validation import checked_settings, fitted, validated
+    from vehiclemor.simulation.build import build
+    from vehiclemor.simulation.model import Model
+    from vehiclemor.simulation.run_timer import one_thread
+    from vehiclemor.study.evaluate import known_inputs
+    from vehiclemor.study.plans.training import training_set
+    from vehiclemor.study.scenario import training_run
+
+    ready = model if isinstance(model, Model) else build(model)
+    definition = component("method", method)
+    if reason := definition.accepts(ready)[1]:
+        raise InputError(reason)
+    complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
+    checked_settings(definition, ready, complete)
+    scenarios = training_set(ready, method, training)
+    with first_use(f"{ready.name} with {method}"), one_thread():
+        runs = [training_run(ready, scenario) for scenario in scenarios]
+        reduced = fitted(definition, ready, runs, complete)
+    known = known_inputs(ready, scenarios, definition.follows_time)
+    return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, reduced, known)
 
 
 def simulate(
@@ -213,13 +266,10 @@ def _scenario(
 
     chosen = model.definition.maneuver if maneuver is None else maneuver
     base = checked_maneuver(chosen, model.definition)
-    if start is None:
-        start = model.starts[0]
+    start = model.starts[0] if start is None else start
     own = start if isinstance(start, str) else tuple(model.start(start).tolist())
-    scaled = [
-        checked_factor(name, factor) * getattr(base, f"{name}_factor")
-        for name, factor in zip(FACTORS, factors, strict=True)
-    ]
+    pairs = zip(FACTORS, factors, strict=True)
+    scaled = [checked_factor(name, f) * getattr(base, f"{name}_factor") for name, f in pairs]
     scenario = Scenario(base.perturbed(*scaled), own)
     check(model, scenario)
     return scenario

@@ -121,5 +121,5 @@ def check_method(name: str, model_name: str) -> None:
             same = np.array_equal(first.states, again.states, equal_nan=True)
             assert same, f"{where}: two runs differ"
             assert first.counts == again.counts, f"{where}: the counts of two runs differ"
-            assert reduced.effective_rank >= 0, f"{where}: negative rank"
+            assert reduced.order >= 0, f"{where}: negative rank"
             assert reduced.offline.seconds >= 0.0, f"{where}: negative offline cost"

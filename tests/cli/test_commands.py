@@ -12,11 +12,11 @@ from vehiclemor.cli import main
 from vehiclemor.cli.app import COMMANDS
 from vehiclemor.cli.options import key_values
 from vehiclemor.codegen import cache, derivation
+from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component, names
 from vehiclemor.report.description import SCHEMAS
 from vehiclemor.resources import data_names, handbook_folder
-from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.toml_files import FileSchema

@@ -81,7 +81,7 @@ def altered(alter):
         def simulate(*arguments):
             return alter(reduced.simulate(*arguments), next(runs))
 
-        return SimpleNamespace(simulate=simulate, effective_rank=0, offline=reduced.offline)
+        return SimpleNamespace(simulate=simulate, order=0, offline=reduced.offline)
 
     return replace(method, fit=fit)
 

@@ -153,7 +153,7 @@ def ramp(samples: int) -> Maneuver:
 def test_all_modes_of_a_linear_model_give_its_exact_solution(car):
     start = car.start("dropped")
     reduced, few = fitted(car, fastest=1e4), fitted(car, fastest=20.0)
-    assert (reduced.effective_rank, few.effective_rank) == (4, 2)
+    assert (reduced.order, few.order) == (4, 2)
     run = reduced.simulate(ramp(201), start)
     # An input that is linear between the output times.
     expected = exact(car, start, np.array([[0.0, 0.3], [0.0, 0.0]]), run.time)

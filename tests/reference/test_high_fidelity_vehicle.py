@@ -12,7 +12,6 @@ from tests.oracles import high_fidelity_pinocchio as pinocchio
 from tests.oracles import high_fidelity_vehicle as oracle
 from tests.oracles.high_fidelity_data import PARAMETERS, design, mirror
 from tests.oracles.projected_simulation import projected_state
-from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 
@@ -252,7 +251,7 @@ def test_the_dropped_start_is_the_equilibrium_raised_and_pitched(vehicle):
 def straight(vehicle) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian of straight running at 20 m/s, and Phi_q."""
     x = vehicle.start()
-    return linearisation.jacobian(vehicle, x, REST), vehicle.descriptor(x, REST)[2]
+    return vehicle.system.jacobian(x, REST), vehicle.descriptor(x, REST)[2]
 
 
 def test_linear_violations_are_free_of_the_vehicles_motion(straight):
@@ -302,7 +301,7 @@ def heading(q: np.ndarray, corner: int) -> float:
 def steady_turn(model: DynamicModel, speed: float) -> tuple[float, float]:
     """Yaw rate and angle of the front wheels per displacement of the rack, 1/(m s) and rad/m."""
     x, h = model.start(), 1e-5
-    jacobian = linearisation.jacobian(model, x, REST)
+    jacobian = model.system.jacobian(x, REST)
     # In axes that turn with the vehicle its lateral speed can be steady.
     jacobian[N + 1, N + 3] -= speed
     sides = (model.derivative(x, np.array([sign * h, 0.0, 0.0])) for sign in (1, -1))

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
-from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.projection_windows import whole_space
@@ -275,7 +274,7 @@ def test_yaw_gain_is_the_single_track_vehicles(vehicle):
     x = vehicle.start()
     h = 1e-5
     by_steer = (vehicle.derivative(x, h) - vehicle.derivative(x, -h)) / (2 * h)
-    jacobian = linearisation.jacobian(vehicle, x, 0.0)
+    jacobian = vehicle.system.jacobian(x, np.zeros(1))
     # Lateral motions are the ones that the mirror reverses; cyclic states play no part.
     reverse = (np.eye(28) - np.array([oracle.mirror(e) for e in np.eye(28)])) / 2
     lateral = [4 + 1, *range(6, 10), *range(14, 28)]
@@ -291,7 +290,7 @@ def test_eigenvalues_are_those_of_the_exact_jacobian(vehicle):
     x = vehicle.start()
     active = vehicle.active
     exact = oracle.jacobian(x, 0.0)
-    found = np.linalg.eigvals(linearisation.jacobian(vehicle, x, 0.0))
+    found = np.linalg.eigvals(vehicle.system.jacobian(x, np.zeros(1)))
     expected = np.linalg.eigvals(exact)
     assert np.sum(np.abs(expected) < 1e-5) == 8
     distance = np.abs(found[:, None] - expected)

@@ -10,7 +10,7 @@ from pydantic import Field
 from vehiclemor import registry
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.multibody.definition import KINDS
-from vehiclemor.reduction.interface import Method, Offline
+from vehiclemor.reduction.interface import Method, OfflineCost
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.simulation.trajectory import Trust
 
@@ -30,8 +30,8 @@ class Ending:
 
     model: Any
     settings: EndSettings
-    offline: Offline
-    effective_rank: int = 1
+    offline: OfflineCost
+    order: int = 1
 
     def simulate(self, maneuver, start):
         """The full-order run, spoiled."""
@@ -62,7 +62,7 @@ def fit(model, training, settings):
     del training
     if settings.end == "rejected":
         raise InputError("it is told to refuse")
-    return Ending(model, settings, Offline())
+    return Ending(model, settings, OfflineCost())
 
 
 METHOD = Method("endings", "ends as it is told", dict.fromkeys(KINDS, EndSettings), fit)

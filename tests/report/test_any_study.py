@@ -10,12 +10,12 @@ import pytest
 import vehiclemor as vm
 from tests.report.figure_texts import checked
 from vehiclemor.cli import main
+from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.theme import styled
 from vehiclemor.report.frames import frame, grid_rows
 from vehiclemor.report.page import error_table
-from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")

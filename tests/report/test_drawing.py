@@ -11,11 +11,11 @@ from tests.report import endings
 from tests.report.figure_texts import checked, varied
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
+from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.report.figures import result_plot, theme
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.runs import PATH
 from vehiclemor.report.labels import readable_unit
-from vehiclemor.study.netcdf_file import read_dataset
 
 ENDS = ("ok", "untrusted", "diverged", "rejected", "unreachable", "error", "exact")
 CURVE = "frequency_factor = [0.8, 1.0, 1.25]"

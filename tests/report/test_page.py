@@ -10,9 +10,9 @@ import pytest
 
 import vehiclemor as vm
 from vehiclemor.cli import main
+from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.report import page
 from vehiclemor.report.unseen import method_rows, protocol_of, target_rows
-from vehiclemor.study.netcdf_file import read_dataset
 
 HOSTILE = "</title></script><script>alert(1)</script> & \"x\" 'y' --> <!-- ${z} {{ 1 + 1 }}"
 STUDY = f"""

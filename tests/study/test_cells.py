@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from vehiclemor import provenance
 from vehiclemor.codegen import cache
 from vehiclemor.errors import InputError
 from vehiclemor.inputs.signal import Signal
@@ -14,7 +15,6 @@ from vehiclemor.reduction.methods import pod, slow_manifold
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
-from vehiclemor.study import provenance
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vehiclemor.reduction.trust import input_range
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import complete_settings, make_experiment
-from vehiclemor.study.input_range import input_range
-from vehiclemor.study.scenario import Scenario
+from vehiclemor.study.scenario import Scenario, speed_of
 
 MODELS = {
     "independent_suspension_vehicle": "lane_change",
@@ -25,13 +25,24 @@ def scenario(model, frequency=1.0, amplitude=1.0, speed=20.0):
     return Scenario(maneuver, "equilibrium", speed)
 
 
+def range_of(model, *training):
+    return input_range(model, [(run.maneuver, speed_of(model, run)) for run in training])
+
+
+def trust(known, model, run):
+    return known.trust(model, run.maneuver, speed_of(model, run))
+
+
 @pytest.mark.parametrize("model", MODELS)
 @settings(max_examples=20)
 @given(frequency=st.floats(0.5, 2.0), amplitude=st.floats(-2.0, 2.0), speed=st.floats(15.0, 25.0))
 def test_a_run_is_trusted_exactly_within_the_range(model, frequency, amplitude, speed):
     training = (scenario(model, 1.0, 1.2, 18.0), scenario(model, 1.3, -0.8, 22.0))
-    known = input_range(build(model), training)
-    found = known.trust(build(model), scenario(model, frequency, amplitude, speed))
+    found = trust(
+        range_of(build(model), *training),
+        build(model),
+        scenario(model, frequency, amplitude, speed),
+    )
     if abs(amplitude) > 1.201 or not 17.99 < speed < 22.01:
         assert found.indicator > 1.0
         assert found.reason
@@ -66,9 +77,20 @@ def test_what_was_zero_in_training_is_known_as_zero_alone():
         build("independent_suspension_vehicle"),
         *(Scenario.of("lane_change", (1.0, amplitude), "equilibrium") for amplitude in (0.0, 1.0)),
     )
-    known = input_range(model, (still,))
+    known = range_of(model, still)
     with np.errstate(all="raise"):
         # As in a file that was written by hand.
         for found in (known, replace(known, largest=0.0 * known.largest)):
-            assert found.trust(model, still).indicator <= 1.0
-            assert found.trust(model, moved).indicator > 1.0
+            assert trust(found, model, still).indicator <= 1.0
+            assert trust(found, model, moved).indicator > 1.0
+
+
+def test_a_run_that_lasts_longer_is_known_as_long_as_the_training_lasts():
+    model, run = build("independent_suspension_vehicle"), scenario("independent_suspension_vehicle")
+    maneuver = replace(run.maneuver, duration=2.0 * run.maneuver.duration)
+    known = range_of(model, run)
+    assert trust(known, model, run).indicator <= 1.0
+    found = trust(known, model, replace(run, maneuver=maneuver))
+    assert found.indicator == pytest.approx(2.0, rel=1e-5)
+    assert found.until == pytest.approx(run.maneuver.duration, rel=1e-5)
+    assert "duration" in found.reason

@@ -20,10 +20,10 @@ from vehiclemor.errors import (
     MachineError,
     UnreachableError,
 )
+from vehiclemor.failure import Failure, attempt
 from vehiclemor.progress import listening
-from vehiclemor.reduction.methods import fixed_basis
+from vehiclemor.reduction.methods import pod
 from vehiclemor.study import cell_file, evaluate, timing, workers
-from vehiclemor.study.failure import Failure, attempt
 from vehiclemor.study.run import run_studies
 
 GRID = 'keep = "metrics"\ngrid = { rank = [2, 3] }\n'
@@ -66,7 +66,7 @@ def breaking(patch: pytest.MonkeyPatch, error: BaseException, part: str = "fit")
     if part == "errors":
         patch.setattr(evaluate, "result_dataset", broken)
     else:
-        patch.setattr(fixed_basis, "METHOD", replace(fixed_basis.METHOD, **{part: broken}))
+        patch.setattr(pod, "FIXED_BASIS", replace(pod.FIXED_BASIS, **{part: broken}))
 
 
 # Results

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor.reduction.methods import fixed_basis
+from vehiclemor.reduction.methods import pod
 from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.screens import comparison_text
 from vehiclemor.report.unseen import method_rows, protocol_of, target_rows
@@ -126,7 +126,7 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
         seen.append(maneuver.at(TIMES).tobytes() in inputs)
         return simulate(self, maneuver, *arguments, **named)
 
-    def recorded_fit(model, training, settings, fit=fixed_basis.fit):
+    def recorded_fit(model, training, settings, fit=pod.fit):
         trained.extend(run.maneuver.at(TIMES).tobytes() for run in training)
         return fit(model, training, settings)
 
@@ -135,8 +135,8 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
         return choose(results)
 
     monkeypatch.setattr(AlgebraicModel, "simulate", recorded)
-    changed = replace(fixed_basis.METHOD, fit=recorded_fit)
-    monkeypatch.setattr(fixed_basis, "METHOD", changed)
+    changed = replace(pod.FIXED_BASIS, fit=recorded_fit)
+    monkeypatch.setattr(pod, "FIXED_BASIS", changed)
     monkeypatch.setattr("vehiclemor.study.plans.protocol_run.choose", recorded_choice)
     monkeypatch.setattr("vehiclemor.study.plans.protocol_run.timed_rows", no_timing)
     run_studies(study, tmp_path)

@@ -12,7 +12,7 @@ import xarray as xr
 
 from tests.study.small import assert_same, small_study
 from vehiclemor.files import TEMPORARY, temporary_path
-from vehiclemor.study.netcdf_file import write_dataset
+from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.study.run import run_studies
 
 GRID = """

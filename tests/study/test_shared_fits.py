@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import ConvergenceError
+from vehiclemor.failure import Failure
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study.evaluate import fresh_fit, kept_fit
 from vehiclemor.study.experiment import complete_settings, make_experiment
-from vehiclemor.study.failure import Failure
 from vehiclemor.study.scenario import Scenario, input_hash
 
 FAILING = 3
@@ -56,7 +56,7 @@ def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(veh
     alone = kept_fit(vehicle, experiment(vehicle, "slow_manifold", terms=2, sweeps=0))
     both = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
     assert len(fits) == 1
-    assert both.ahead.tolerance == 5e-3
+    assert both.fast.tolerance == 5e-3
     assert both.fast.coefficients is alone.coefficients
     assert both.offline.seconds == pytest.approx(alone.offline.seconds)
     # What a user fits is fitted for itself, and is the same.

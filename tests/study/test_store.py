@@ -11,10 +11,11 @@ import pytest
 import xarray as xr
 
 from tests.study.small import TIMED, small_study
+from vehiclemor import netcdf_file
 from vehiclemor.errors import InputError, SpoiledError
+from vehiclemor.netcdf_file import read_dataset, write_dataset
 from vehiclemor.report.result_selection import stored_result
-from vehiclemor.study import cell_file, netcdf_file, workers
-from vehiclemor.study.netcdf_file import read_dataset, write_dataset
+from vehiclemor.study import cell_file, workers
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.store import ASIDE, read_cell, write_cell
 

@@ -4,7 +4,7 @@ import numpy as np
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import vehiclemor as vm
-from vehiclemor.study.evaluate import one_thread
+from vehiclemor.simulation.run_timer import one_thread
 
 
 def threads() -> set[int]:

@@ -5,7 +5,7 @@ from itertools import accumulate, count
 
 import numpy as np
 
-from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.reduction.methods.full_order import FullOrder
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
@@ -55,12 +55,12 @@ def test_speed_ups_are_against_names_wherever_they_stand():
 
 
 def test_what_a_model_tells_of_its_own_time_decides_nothing(monkeypatch):
-    honest = FullOrderModel.simulate
+    honest = FullOrder.simulate
 
     def flattering(self, maneuver, start):
         return replace(honest(self, maneuver, start), seconds=0.0)
 
-    monkeypatch.setattr(FullOrderModel, "simulate", flattering)
+    monkeypatch.setattr(FullOrder, "simulate", flattering)
     # A clock that tells how often it has been read: twice more inside of a call.
     monkeypatch.setattr(run_timer, "clock", count(0.0, 1e-3).__next__)
     data = timed_cases(cases("strongest", "baseline"), 2)
@@ -72,7 +72,7 @@ def test_what_a_model_tells_of_its_own_time_decides_nothing(monkeypatch):
 
 def test_no_row_is_timed_cold_whatever_ran_before_it(monkeypatch):
     now, last, seen = [0.0], [], set()
-    honest = FullOrderModel.simulate
+    honest = FullOrder.simulate
 
     def simulate(self, maneuver, start):
         # A run of a new input is long, and one after another model's finds its caches cold.
@@ -81,7 +81,7 @@ def test_no_row_is_timed_cold_whatever_ran_before_it(monkeypatch):
         last[:] = [self]
         return honest(self, maneuver, start)
 
-    monkeypatch.setattr(FullOrderModel, "simulate", simulate)
+    monkeypatch.setattr(FullOrder, "simulate", simulate)
     monkeypatch.setattr(run_timer, "clock", lambda: now[0])
     data = timed_tests(cases("strongest", "baseline"), np.ones((2, 1), dtype=bool), 4)
     np.testing.assert_allclose(data["seconds"], 1e-4)

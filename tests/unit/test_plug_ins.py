@@ -98,10 +98,10 @@ REPLAY = """
 from dataclasses import replace
 import signal, time
 import numpy as np
-from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods import replay
 class Reduced:
-    offline, effective_rank = Offline(), 0
+    offline, order = OfflineCost(), 0
     def __init__(self, inner): self.inner = inner
     def simulate(self, *given): return self.inner.simulate(*given)
     def best_approximation(self, states): return None
@@ -155,7 +155,7 @@ def faulty(plug_in):
         ("Reduced.simulate = lambda *_: None", "simulate gives None"),
         ("Reduced.best_approximation = lambda _, s: s[:3]", "(3, 8)"),
         ("Reduced.best_approximation = ends(SystemExit(0))", "approximation: SystemExit: 0 (/"),
-        ("Reduced.effective_rank = 'x'", "effective_rank is 'x'"),
+        ("Reduced.order = 'x'", "order is 'x'"),
         ("Reduced.offline = None", "offline is None"),
         ("del Reduced.offline", "has no offline"),
         ("altered(outputs=lambda o: o[1:])", "outputs (1000, 6)"),

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 from scipy.linalg import expm, schur
 
-from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.settings import Settings
 
 
@@ -27,8 +27,8 @@ class Modal:
     left: np.ndarray
     right: np.ndarray
     equations: tuple[np.ndarray, np.ndarray, np.ndarray]
-    offline: Offline
-    effective_rank: int
+    offline: OfflineCost
+    order: int
 
     def simulate(self, maneuver, start):
         """The run at the maneuver's output times, from a start's name or a full state."""

@@ -95,7 +95,7 @@ def new_file(option: str, path: Path, endings: Sequence[str]) -> Path:
 
 def result_file(option: str, path: Path) -> Path:
     """As `new_file`, of a result: one that stands there is replaced, but nothing else."""
-    from vehiclemor.study.netcdf_file import read_dataset
+    from vehiclemor.netcdf_file import read_dataset
 
     if new_file(option, path, (".nc",)).exists():
         read_dataset(path, "source", "vehiclemor")

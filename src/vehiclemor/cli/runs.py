@@ -87,9 +87,9 @@ def simulate(
     how: dict[str, Any] = {"maneuver": maneuver, "start": start, "preset": preset}
     how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
     dataset = vm.simulate(ready, method, **how, **chosen)
+    from vehiclemor.netcdf_file import write_dataset
     from vehiclemor.report.printing import simulation_text
     from vehiclemor.report.shown import tabled_outputs
-    from vehiclemor.study.netcdf_file import write_dataset
 
     shown = ready.outputs if all_outputs else tabled_outputs(ready.definition)
     print(simulation_text(dataset, shown, ready.counts))

@@ -81,7 +81,8 @@ class BareKernel(NamedTuple):
 
     def __call__(self, x: np.ndarray, u: np.ndarray, result: np.ndarray) -> None:
         """Write the result at a state and inputs."""
-        first, second, last = [addressof(c_char.from_buffer(array)) for array in (x, u, result)]
+        arrays: Any = x, u, result
+        first, second, last = [addressof(c_char.from_buffer(array)) for array in arrays]
         self.function(first, second, self.constants_address, last)
 
 

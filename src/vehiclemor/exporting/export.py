@@ -16,7 +16,7 @@ from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
     from vehiclemor.exporting.system import ExportedSystem
-    from vehiclemor.online.rom import ReducedOrderModel
+    from vehiclemor.reduction.reduced_model import ReducedOrderModel
     from vehiclemor.simulation.model import Model
 
 # What a file, or a folder, is written for; the others are objects alone.
@@ -130,7 +130,7 @@ def name_of(model: str, method: str | None) -> str:
 def system_of(model: Model | ReducedOrderModel) -> ExportedSystem:
     """The system that a model is exported as."""
     from vehiclemor.exporting.exported import exported_system
-    from vehiclemor.online.rom import ReducedOrderModel
+    from vehiclemor.reduction.reduced_model import ReducedOrderModel
     from vehiclemor.simulation.model import Model
 
     if isinstance(model, ReducedOrderModel):

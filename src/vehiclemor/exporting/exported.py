@@ -8,7 +8,7 @@ from vehiclemor.exporting.equations_of_motion import full_system, reduced_system
 from vehiclemor.exporting.mechanism import mechanism_system
 from vehiclemor.exporting.path_map import map_system
 from vehiclemor.exporting.system import ExportedSystem
-from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.reduction.methods.full_order import FullOrder
 from vehiclemor.reduction.methods.guarded import GuardedModel
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.reduction.reduced_system import ReducedSystem
@@ -35,7 +35,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
             return full_system(what, name)
         case AlgebraicModel():
             return mechanism_system(what, name)
-        case FullOrderModel():
+        case FullOrder():
             return exported_system(what.model, name)
         case GuardedModel():
             return exported_system(what.fast, name)
@@ -44,7 +44,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
         case ReducedVehicle():
             text, constants = what.lift.text(0)
             lift = kernel_sources(text)["full_state"], constants
-            return reduced_system(what.equations, name, lift)
+            return reduced_system(what, name, lift)
         case ReducedSystem() if what.spaces.formulation == "full":
             if what.states == what.model.definition.states:
                 return reduced_system(what, name, None)

@@ -25,7 +25,7 @@ Presets = Mapping[str, Mapping[str, Value]]
 
 
 @dataclass(frozen=True)
-class Offline:
+class OfflineCost:
     """Cost of making a reduced model, compilation not included.
 
     Attributes
@@ -45,22 +45,26 @@ class Offline:
 
 def offline_cost(
     began: float, model: Model, runs: Sequence[Trajectory] = (), further: int = 0
-) -> Offline:
+) -> OfflineCost:
     """Seconds since `began` (`time.process_time()`), evaluations of the runs and `further` ones."""
     evaluations = sum(run.counts[model.evaluations] for run in runs) + further
-    return Offline(time.process_time() - began, evaluations)
+    return OfflineCost(time.process_time() - began, evaluations)
 
 
-class ReducedModel(Protocol):
-    """What `fit` returns."""
+class FittedModel(Protocol):
+    """What `fit` returns: whole runs.
+
+    One that can be stepped too is a `ReducedSystem` or a `ReducedMechanism`, or has `states`,
+    `begin`, `step`, `rates`, `derivatives`, `decode` and `trust` as these do.
+    """
 
     @property
-    def offline(self) -> Offline:
+    def offline(self) -> OfflineCost:
         """Cost of making it."""
         ...
 
     @property
-    def effective_rank(self) -> int:
+    def order(self) -> int:
         """Largest number of reduced coordinates in any window; n for a full-order model."""
         ...
 
@@ -77,7 +81,7 @@ class ReducedModel(Protocol):
 
 
 def simulated(
-    reduced: ReducedModel, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None
+    reduced: FittedModel, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None
 ) -> Trajectory:
     """A run of a reduced model, with some outputs alone."""
     if outputs is None:
@@ -94,7 +98,7 @@ def _selects(kind: type) -> bool:
 
 
 # Gives the method of a name with its settings, fitted to the same training runs.
-FitOther = Callable[[str, Any], ReducedModel]
+FitOther = Callable[[str, Any], FittedModel]
 
 
 def never_refused(model: Any) -> str:  # noqa: ARG001
@@ -128,8 +132,8 @@ class Method(ShortRepr):
         What `fit` looks at: `runs` of the model that it reduces; of runs the `inputs` at most, so
         that nothing is learnt of the model's parameters.
     own_limits
-        Whether its runs tell themselves when they leave what the model knows, or it knows no
-        bounds; else a run beyond the inputs of the training runs is not trusted.
+        Whether its runs have a trust indicator of their own, or it knows no bounds; else a run
+        beyond the inputs of the training runs is not trusted.
     follows_time
         Whether what it fits belongs to the times of the training runs, as a basis for each control
         period does: then a run is known where its inputs are those of a training run.
@@ -150,7 +154,7 @@ class Method(ShortRepr):
     name: str
     summary: str
     settings: Mapping[str, type[Settings]]
-    fit: Callable[..., ReducedModel]
+    fit: Callable[..., FittedModel]
     reference: str = ""
     refusal: Callable[[Any], str] = never_refused
     check: Callable[[Any, Any], None] = fits_all

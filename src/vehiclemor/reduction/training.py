@@ -14,8 +14,10 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 HISTORIES = ("time", "inputs", "states", "coordinates", "speeds", "outputs", "counts")
+# Parameter with the speed (m/s) at which a vehicle starts.
+SPEED = "initial_speed"
 # Parameters that say how a run starts, not which model it is of.
-OF_STARTS = ("initial_speed", *DROP)
+OF_STARTS = (SPEED, *DROP)
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,12 @@ class TrainingRun(ShortRepr):
 
 
 Training = Sequence[TrainingRun]
+
+
+def own_speed(model: Model) -> float | None:
+    """Initial speed (m/s) of a model's parameter set, if it has one."""
+    entry = model.parameters.entries.get(SPEED)
+    return None if entry is None else float(np.asarray(entry.value))
 
 
 def difference(model: Model, other: Model) -> str:

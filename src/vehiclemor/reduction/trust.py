@@ -1,17 +1,32 @@
-"""What a reduced model knows: how far a run goes in the ranges that it has been made for."""
+"""What a reduced model knows: how far a run goes in the ranges that it has been made for.
+
+All that can be exceeded is a range with a name: states or features along a run (`trust_of`), inputs
+as whole signals, initial speeds and durations (`InputRange`).  Each tells how much of it a run uses
+and since when it is beyond, and `trust_in` makes one trust of all.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.input_polynomials import extent_of
+from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
+from vehiclemor.sizes import shaped
 
 # One part in a million is rounding.
 EDGE = 1.0 + 1e-6
 # An input that was zero in training may be nothing else.
 NOTHING = 1e-12
+# Least part of the speed by which a run may start faster or slower.
+SPEED_SLACK = 0.01
+# Part of the largest input by which one may differ from that of a training run at the same time,
+# where the model follows the times of its training.
+CLOSE = 0.01
 
 
 def trust_of(times: np.ndarray, used: np.ndarray, names: Sequence[str]) -> Trust:
@@ -47,3 +62,105 @@ def largest_inputs(maneuvers: Sequence[Maneuver]) -> np.ndarray:
 def inputs_beyond(maneuver: Maneuver, known: np.ndarray) -> np.ndarray:
     """Times (inputs,) in s at which inputs pass what is known of them (3, inputs) first."""
     return extent_of(maneuver, np.array([-known[0], *known])).since
+
+
+@dataclass(frozen=True)
+class InputRange:
+    """Inputs, initial speeds and durations of the training runs: a method's least claim.
+
+    Attributes
+    ----------
+    largest
+        Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a dynamic
+        model sizes of whole signals (3, inputs), see `Extent`.
+    speed, reach
+        Middle of the initial speeds in m/s, and how far they lie from it.
+    longest
+        Duration of the longest run in s; a kinematic model has no memory, and any is known.
+    histories
+        Inputs of the training runs (runs, samples, inputs) at equidistant times of the first, where
+        the model follows the times of its training; else none.
+    """
+
+    largest: np.ndarray
+    speed: float
+    reach: float
+    longest: float
+    histories: np.ndarray | None = None
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the magnitudes are no table of floats."""
+        shaped("largest", (self.largest, len(self.largest), *self.largest.shape[1:2]))
+
+    @property
+    def _sizes(self) -> np.ndarray:
+        # In a file that was written by hand they may be zero.
+        return np.maximum(self.largest, NOTHING)
+
+    def trust(self, model: Model, maneuver: Maneuver, speed: float) -> Trust:
+        """How far a run with an initial speed in m/s goes in the range."""
+        maneuver = maneuver.for_inputs(model.inputs)
+        if model.kind == "ae":
+            return self.trust_of_inputs(model.inputs, maneuver.at(maneuver.times), maneuver.times)
+        used = extent_of(maneuver).largest / self._sizes
+        since = np.full(len(model.inputs), np.inf)
+        if (used > 1.0).any():
+            since = inputs_beyond(maneuver, self.largest)
+        ranges = {}
+        for name, (further, *quicker), time in zip(model.inputs, used.T, since, strict=True):
+            what = f"input {name}" + " above 2 Hz" * bool(further <= 1.0 < max(quicker))
+            ranges[what] = float(max(further, *quicker)), float(time)
+        off = abs(speed - self.speed) / self.reach
+        ranges["initial speed"] = off, 0.0 if off > 1.0 else np.inf
+        lasts = maneuver.duration / self.longest
+        ranges["duration"] = lasts, self.longest if lasts > 1.0 else np.inf
+        if self.histories is not None:
+            ranges["difference from the inputs of training runs"] = self._unlike(maneuver)
+        return trust_in(ranges)
+
+    def _unlike(self, maneuver: Maneuver) -> tuple[float, float]:
+        """How far inputs are from those of the nearest training run, and since when (s)."""
+        assert self.histories is not None
+        times = maneuver.times[maneuver.times <= self.longest]
+        known = np.linspace(0.0, self.longest / EDGE, self.histories.shape[1])
+        inputs, off = maneuver.at(times), []
+        for history in self.histories:
+            then = [np.interp(times, known, column) for column in history.T]
+            off.append(np.abs((inputs - np.transpose(then)) / self._sizes[0]).max(axis=1) / CLOSE)
+        nearest = min(off, key=np.max)
+        beyond = np.flatnonzero(nearest > 1.0)
+        return float(nearest.max()), float(times[beyond[0]]) if len(beyond) else np.inf
+
+    def trust_of_inputs(
+        self, names: Sequence[str], inputs: np.ndarray, times: np.ndarray | None = None
+    ) -> Trust:
+        """How far inputs (samples, inputs) go in the range, each for itself."""
+        times = np.zeros(len(inputs)) if times is None else times
+        return trust_of(times, inputs / self._sizes[0], [f"input {name}" for name in names])
+
+
+def input_range(
+    model: Model, runs: Sequence[tuple[Maneuver, float]], follows_time: bool = False
+) -> InputRange:
+    """Range of some training runs, each a maneuver and an initial speed in m/s.
+
+    Parameters
+    ----------
+    follows_time
+        Whether the method follows the times of its training, see `Method`.
+    """
+    maneuvers = [maneuver.for_inputs(model.inputs) for maneuver, _ in runs]
+    speeds = [speed for _, speed in runs]
+    low, high = min(speeds), max(speeds)
+    middle = 0.5 * (low + high)
+    reach = EDGE * (max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0)
+    if model.kind == "ae":
+        values = [np.abs(m.at(m.times)).max(axis=0) for m in maneuvers]
+        largest = EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
+        return InputRange(largest, middle, reach, np.inf)
+    longest = max(maneuver.duration for maneuver in maneuvers)
+    histories = None
+    if follows_time:
+        times = np.linspace(0.0, longest, maneuvers[0].samples)
+        histories = np.array([maneuver.at(times) for maneuver in maneuvers])
+    return InputRange(largest_inputs(maneuvers), middle, reach, longest * EDGE, histories)

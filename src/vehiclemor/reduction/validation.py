@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError, PlugInError, blamed, printable
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel
+from vehiclemor.reduction.interface import FitOther, FittedModel, Method, OfflineCost
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
 from vehiclemor.reduction.training import Training, difference
 from vehiclemor.registry import choice
@@ -58,7 +58,7 @@ def checked_settings(method: Method, model: Model, settings: Any) -> None:
 
 def fitted(
     method: Method, model: Model, training: Training, settings: Any, others: FitOther | None = None
-) -> ReducedModel:
+) -> FittedModel:
     """What a method's `fit` gives, checked.
 
     `InputError` if it learns from runs and one of these is of another model, or `fit` refuses.
@@ -74,7 +74,7 @@ def fitted(
         return checked_fit(method.name, method.fit(model, training, settings, *more))
 
 
-def for_model(method: Method, reduced: ReducedModel, model: Model, settings: Any) -> ReducedModel:
+def for_model(method: Method, reduced: FittedModel, model: Model, settings: Any) -> FittedModel:
     """What a method gives of a model with other parameters; `InputError` if it learns from runs."""
     if method.learns_from != "inputs":
         raise InputError(
@@ -88,14 +88,15 @@ def for_model(method: Method, reduced: ReducedModel, model: Model, settings: Any
 
 def checked_fit(method: str, reduced: Any) -> Any:
     """A reduced model; `PlugInError` if what `fit` gave is none."""
-    for name in ("simulate", "best_approximation", "offline", "effective_rank"):
+    for name in ("simulate", "best_approximation", "offline", "order"):
         if not hasattr(reduced, name):
             raise PlugInError(f"method {method!r}: fit: {quoted(reduced)} has no {name}")
-    if not isinstance(reduced.offline, Offline):
-        raise PlugInError(f"method {method!r}: offline is {quoted(reduced.offline)}, no Offline")
-    if not isinstance(reduced.effective_rank, int | np.integer):
-        rank = quoted(reduced.effective_rank)
-        raise PlugInError(f"method {method!r}: effective_rank is {rank}, no whole number")
+    if not isinstance(reduced.offline, OfflineCost):
+        raise PlugInError(
+            f"method {method!r}: offline is {quoted(reduced.offline)}, no OfflineCost"
+        )
+    if not isinstance(reduced.order, int | np.integer):
+        raise PlugInError(f"method {method!r}: order is {quoted(reduced.order)}, no whole number")
     return reduced
 
 

@@ -14,7 +14,9 @@ from matplotlib.figure import Figure
 
 from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
 from vehiclemor.errors import FileError, InputError
+from vehiclemor.failure import attempt_apart
 from vehiclemor.files import write_text
+from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
 from vehiclemor.report.comparison import paper_comparison
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
@@ -28,8 +30,6 @@ from vehiclemor.report.printing import Table
 from vehiclemor.report.result_selection import drawn
 from vehiclemor.report.screens import Part, claim_parts, paper_parts, study_parts
 from vehiclemor.report.unseen import protocol_rows
-from vehiclemor.study.failure import attempt_apart
-from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
 
 # More runs of a study are not listed.

@@ -8,10 +8,10 @@ import xarray as xr
 
 from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
 from vehiclemor.errors import InputError
+from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder, write_text
+from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.report.figures import catalogue, theme
-from vehiclemor.study.failure import attempt_apart
-from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.run import run_studies
 
 

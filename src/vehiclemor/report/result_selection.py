@@ -10,9 +10,9 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
+from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_names
-from vehiclemor.study.netcdf_file import read_dataset
 from vehiclemor.study.plans.loading import content_hash, load_studies
 from vehiclemor.study.plans.study_file import FACTORS
 from vehiclemor.study.store import combined_path, result_path

@@ -159,9 +159,9 @@ class DynamicModel(Model):
         times: np.ndarray | None = None,
         solver: str | None = None,
         tolerance: float | None = None,
+        outputs: Names = None,
         longest_step: float | None = None,
         begin: float = 0.0,
-        outputs: Names = None,
     ) -> Trajectory:
         """Full-order trajectory at the given times (the maneuver's output times by default).
 
@@ -181,13 +181,13 @@ class DynamicModel(Model):
             method of order up to 6.
         tolerance
             Largest local error of a state relative to its typical size plus its own.
+        outputs
+            Names of outputs, coordinates or speeds to keep, see `Trajectory.chosen`; only these
+            are computed.
         longest_step
             In s; unlimited by default.
         begin
             Time in s at which the run begins with the start, in mid-maneuver if it isn't 0.
-        outputs
-            Names of outputs, coordinates or speeds to keep, see `Trajectory.chosen`; only these
-            are computed.
 
         Raises
         ------

@@ -1,8 +1,15 @@
-"""Time that a compiled loop takes by its own account; studies take whole calls, see `timing`."""
+"""How runs are timed by their own account (studies take whole calls), and in how many threads."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
 from time import thread_time
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 Result = TypeVar("Result")
 CLOCK = "CPU time of the thread"
@@ -14,3 +21,23 @@ def timed(run: Callable[[], Result]) -> tuple[Result, float]:
     began = clock()
     result = run()
     return result, clock() - began
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Pin the linear algebra of NumPy and SciPy to one thread of this process.
+
+    How many threads add up a sum decides how it is rounded: results are then the same to the bit,
+    whatever the number of cores, jobs or limits set outside.
+    """
+    with _libraries().limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    # SciPy brings a library of its own, which is limited only once it is loaded.
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -1,6 +1,7 @@
-"""Steps of a system from one time to another, each of them one call of the compiled time loop.
+"""Steps, rates and their sensitivities of a system at single states.
 
-What the loop reads lies in arrays that are overwritten from step to step: nothing is packed anew.
+A step is one call of the compiled time loop.  What the loop reads lies in arrays that are
+overwritten from step to step: nothing is packed anew.
 """
 
 from __future__ import annotations
@@ -8,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from ctypes import c_double
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,14 +19,22 @@ from vehiclemor.codegen.loops import ready
 from vehiclemor.errors import ConvergenceError
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.simulation.integrators.structures import Output, Spans
-from vehiclemor.simulation.projection_windows import ProjectionWindows
-from vehiclemor.simulation.rate_derivatives import Along, rate_derivatives
+from vehiclemor.simulation.kernel_derivatives import CONSTANTS, STATE, along, partial
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 from vehiclemor.simulation.workspaces import NO_POINTS, Drive, Solver, Workspace
 
 # Shortest step in s: the time loop takes times that differ by less for one.
 SHORTEST = 1e-9
+# A value (n,), and its sensitivities (n, columns).
+Varied = tuple[np.ndarray, np.ndarray]
+
+
+class Sensitivity(NamedTuple):
+    """What derivatives are taken by: an argument of the kernels, of the constants directions."""
+
+    place: int
+    directions: np.ndarray = np.zeros((0, 0))
 
 
 class StepSpace(NamedTuple):
@@ -35,7 +45,7 @@ class StepSpace(NamedTuple):
     times
         Arrays that end with the length of the step.
     window
-        Number (1,) of the projection window.
+        Index (1,) of the projection window.
     coefficients
         Of the inputs (1, inputs, 6).
     means
@@ -52,32 +62,31 @@ class StepSpace(NamedTuple):
     first: c_double
 
 
-class Stepper:
+class SteppedSystem:
     """A system as a function of a state, the inputs and a length of time.
 
     Steps are independent of one another: the same arguments give the same state, in any thread.
 
-    Parameters
+    Attributes
     ----------
-    windows
-        Formulation of the system and its subspaces; in more windows than one the time tells which.
+    system, spaces
+        A `System`, and its formulation with the subspaces, `ProjectionWindows`; in more windows
+        than one the time says which.
     solver, tolerance
         Integrator and its tolerance.
-    moved
-        Whether the state at the beginning is the origin of the window's subspace.
     """
 
-    def __init__(
-        self,
-        system: System,
-        windows: ProjectionWindows,
-        solver: str,
-        tolerance: float,
-        moved: bool = False,
-    ) -> None:
-        self.system, self.windows, self.moved = system, windows, moved
-        self.solver = Solver(solver, tolerance)
-        self._spare: list[StepSpace] = []
+    if TYPE_CHECKING:
+        # Any: a field or a property.
+        system: Any
+        spaces: Any
+        solver: str
+        tolerance: float
+
+    @property
+    def moved(self) -> bool:
+        """Whether the state at the beginning is the origin of the window's subspace."""
+        return False
 
     def step(
         self,
@@ -124,9 +133,13 @@ class Stepper:
         self._spare.append(held)
         return found
 
+    @cached_property
+    def _spare(self) -> list[StepSpace]:
+        return []
+
     def _parts(self, time: float, dt: float) -> Iterator[tuple[float, float, int]]:
         """Parts of a step in one window each: beginning after `time`, length, window."""
-        edges = self.windows.edges
+        edges = self.spaces.edges
         if len(edges) == 2:
             yield 0.0, dt, 0
             return
@@ -142,13 +155,12 @@ class Stepper:
         counts, one = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64), np.array([0, 1])
         signal = ready(Pieces(edges, one, np.empty(0), coefficients))
         spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
-        path = np.empty((1, len(self.system.error_scale)))
-        windows = self.windows
+        path, windows = np.empty((1, len(self.system.error_scale))), self.spaces
         if self.moved:
             windows = replace(windows, means=windows.means.copy())
         drive = Drive(signal, spans, NO_POINTS[0])
         output = Output(sample, path, counts, *NO_POINTS, np.inf)
-        space = self.system.packed(windows, self.solver, drive, output)
+        space = self.system.packed(windows, Solver(self.solver, self.tolerance), drive, output)
         words = space.call.words
         first = c_double.from_buffer(words, 8 * space.call.address("control.first"))
         times = edges, span, sample
@@ -156,54 +168,114 @@ class Stepper:
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """Time derivative (n,) of a state; of a projected one where its subspace is nearest."""
-        n, half = len(state), len(state) // 2
-        place = self.projected(state, inputs, time)
-        rates = self._evaluated("derivative", place, inputs, n)
-        if self.windows.formulation == "full":
-            return rates
-        _, trial, test = self._subspace(state, time)
-        if self.windows.formulation == "state":
-            return test @ rates @ trial
-        q, moved = place[:half], test @ rates[:half] @ trial
-        table = self._evaluated("second_order", place, inputs, half * (half + 1))
-        mass, force = np.split(table.reshape(half, half + 1), [half], axis=1)
-        projected = np.linalg.solve(trial @ mass @ trial.T, trial @ force)[:, 0] @ trial
-        # Speeds are linear in the rates, so their change is too in what projection takes away.
-        change = np.concatenate([q, projected - np.linalg.solve(mass, force)[:, 0]])
-        change = self._evaluated("speeds", change, inputs, half)
-        return np.concatenate([moved, rates[half:] + change])
+        if self.spaces.formulation == "full":
+            return _Kernels(self.system, inputs).value("derivative", state, len(state))
+        return self._projected_rates(_Kernels(self.system, inputs), state, time)[0]
+
+    def rate_sensitivities(
+        self, state: np.ndarray, inputs: np.ndarray, time: float, by: Sensitivity
+    ) -> np.ndarray:
+        """Analytic derivatives (n, columns) of the rates."""
+        kernels = _Kernels(self.system, inputs, by)
+        if self.spaces.formulation == "full":
+            return kernels.own("derivative", state, len(state))
+        return self._projected_rates(kernels, state, time)[1]
 
     def projected(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """State (n,) where the subspace of its time is nearest: there a step begins."""
-        if self.windows.formulation == "full":
+        if self.spaces.formulation == "full":
             return state
-        mean, trial, test = self._subspace(state, time)
-        n, half = len(state), trial.shape[1]
-        q = mean[:half] + test @ (state[:half] - mean[:half]) @ trial
-        if half == n:
-            return q
-        rates = test @ self._evaluated("derivative", state, inputs, n)[:half] @ trial
-        moved = np.concatenate([q, rates])
-        return np.concatenate([q, self._evaluated("speeds", moved, inputs, half)])
+        return self._nearest(_Kernels(self.system, inputs), state, self._subspace(time))[0]
 
-    def _subspace(self, state: np.ndarray, time: float) -> tuple[np.ndarray, ...]:
-        """Origin (n,) and bases by rows: of states (r, n), or of coordinates (r / 2, n / 2)."""
-        spaces, window = self.windows, next(self._parts(time, 2.0 * SHORTEST))[2]
-        rows, columns = int(spaces.ranks[window]), len(state)
+    def _subspace(self, time: float) -> tuple[np.ndarray, ...]:
+        """Mean (n,) and bases by rows: of states (r, n), or of coordinates (r / 2, n / 2)."""
+        spaces, window = self.spaces, next(self._parts(time, 2.0 * SHORTEST))[2]
+        rows, columns = int(spaces.ranks[window]), spaces.means.shape[1]
         if spaces.formulation == "coordinates":
             rows, columns = rows // 2, columns // 2
-        mean = state if self.moved else spaces.means[window]
         trial, test = (b[window, :rows, :columns] for b in (spaces.trial_basis, spaces.test_basis))
-        return mean, trial, test
+        return spaces.means[window, :columns], trial, test
 
-    def derivatives(
-        self, state: np.ndarray, inputs: np.ndarray, time: float, by: Along
-    ) -> np.ndarray:
-        """Analytic derivatives (n, columns) of the rates."""
-        window = next(self._parts(time, 2.0 * SHORTEST))[2]
-        return rate_derivatives(self.system, self.windows, window, state, inputs, by, self.moved)
+    def _nearest(
+        self, kernels: _Kernels, state: np.ndarray, subspace: tuple[np.ndarray, ...]
+    ) -> Varied:
+        """State where a subspace is nearest."""
+        (mean, trial, test), (n, half) = subspace, (len(state), subspace[1].shape[1])
+        change = kernels.seeds(n)
+        q, dq = state[:half], change[:half]
+        # Where the state itself is the origin, it lies in the subspace.
+        if not self.moved:
+            q, dq = mean + test @ (q - mean) @ trial, trial.T @ (test @ dq)
+        if half == n:
+            return q, dq
+        rates, drates = kernels.of("derivative", state, change, n)
+        rates, drates = test @ rates[:half] @ trial, trial.T @ (test @ drates[:half])
+        turned = np.concatenate([q, rates]), np.vstack([dq, drates])
+        speeds, dspeeds = kernels.of("speeds", *turned, half)
+        return np.concatenate([q, speeds]), np.vstack([dq, dspeeds])
 
-    def _evaluated(
-        self, kernel: str, state: np.ndarray, inputs: np.ndarray, size: int
-    ) -> np.ndarray:
-        return self.system.along(kernel, state[None], inputs[None], size)[0]
+    def _projected_rates(self, kernels: _Kernels, state: np.ndarray, time: float) -> Varied:
+        """Rates of the projected equations."""
+        n, subspace = len(state), self._subspace(time)
+        (_, trial, test), half = subspace, n // 2
+        place, dplace = self._nearest(kernels, state, subspace)
+        rates, drates = kernels.of("derivative", place, dplace, n)
+        if self.spaces.formulation == "state":
+            return test @ rates @ trial, trial.T @ (test @ drates)
+        size = half * (half + 1)
+        table, dtable = kernels.of("second_order", place, dplace, size)
+        table, dtable = table.reshape(half, half + 1), dtable.reshape(half, half + 1, -1)
+        mass, force, dmass, dforce = table[:, :-1], table[:, -1], dtable[:, :-1], dtable[:, -1]
+        small = trial @ mass @ trial.T
+        reduced = np.linalg.solve(small, trial @ force) @ trial
+        free = np.linalg.solve(mass, force)
+        dreduced = dfree = drates[:half]
+        if kernels.by is not None:
+            left = [dforce - np.einsum("ijk,j->ik", dmass, q) for q in (reduced, free)]
+            dreduced = trial.T @ np.linalg.solve(small, trial @ left[0])
+            dfree = np.linalg.solve(mass, left[1])
+        # Speeds are linear in the rates, so their change is too in what projection takes away.
+        change = np.concatenate([place[:half], reduced - free])
+        dchange = np.vstack([dplace[:half], dreduced - dfree])
+        lost, dlost = kernels.of("speeds", change, dchange, half)
+        moved, dmoved = test @ rates[:half] @ trial, trial.T @ (test @ drates[:half])
+        return (
+            np.concatenate([moved, rates[half:] + lost]),
+            np.vstack([dmoved, drates[half:] + dlost]),
+        )
+
+
+class _Kernels(NamedTuple):
+    """Kernels of a system at states that vary; without `by` sensitivities have no columns."""
+
+    system: System
+    inputs: np.ndarray
+    by: Sensitivity | None = None
+
+    def seeds(self, n: int) -> np.ndarray:
+        """Sensitivities (n, columns) of the state that is given."""
+        if self.by is None or self.by.place == STATE:
+            return np.eye(n, n if self.by else 0)
+        constants = self.by.place == CONSTANTS
+        return np.zeros((n, len(self.by.directions if constants else self.inputs)))
+
+    def value(self, name: str, x: np.ndarray, size: int) -> np.ndarray:
+        """Result (size,) of a kernel."""
+        return self.system.along(name, x[None], self.inputs[None], size)[0]
+
+    def own(self, name: str, x: np.ndarray, size: int) -> np.ndarray:
+        """Sensitivities (size, columns) at a state that doesn't vary but by itself."""
+        assert self.by is not None
+        arrays = x, self.inputs, self.system.constants
+        if self.by.place == CONSTANTS:
+            return along(self.system.kernels, name, arrays, size, *self.by).T
+        return partial(self.system.kernels, name, arrays, size, self.by.place)
+
+    def of(self, name: str, x: np.ndarray, dx: np.ndarray, size: int) -> Varied:
+        """Result of a kernel with its sensitivities, at a state with its own (n, columns)."""
+        value = self.value(name, x, size)
+        if self.by is None:
+            return value, np.zeros((size, 0))
+        arrays, seeds = (x, self.inputs, self.system.constants), np.ascontiguousarray(dx.T)
+        found = along(self.system.kernels, name, arrays, size, STATE, seeds).T
+        return value, found if self.by.place == STATE else found + self.own(name, x, size)

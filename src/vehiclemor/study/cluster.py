@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, Any
 from vehiclemor.codegen.cache import once
 from vehiclemor.errors import InputError, MachineError, one_line
 from vehiclemor.files import temporary_path
+from vehiclemor.provenance import code_digest
 from vehiclemor.study.evaluate import model_of
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.store import cell_path, prepare_folder
 from vehiclemor.study.workers import LARGEST, Done, Engine, Groups, evaluate_and_store, in_batches
 

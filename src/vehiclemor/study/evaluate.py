@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from vehiclemor.errors import ConvergenceError, InputError, PlugInError, blamed
+from vehiclemor.failure import Failure, attempt
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
-from vehiclemor.reduction.interface import FitOther, Method, ReducedModel
+from vehiclemor.reduction.interface import FitOther, FittedModel, Method
 from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.trust import InputRange, input_range
 from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.experiment import Experiment, default_settings, for_method
-from vehiclemor.study.failure import Failure, attempt
-from vehiclemor.study.input_range import input_range
 from vehiclemor.study.result import Outcome, result_dataset
 from vehiclemor.study.scenario import (
     Overrides,
     Scenario,
     car_of,
     in_training,
+    speed_of,
     start_of,
     training_run,
     with_parameters,
@@ -37,7 +38,6 @@ from vehiclemor.study.scenario import (
 
 if TYPE_CHECKING:
     import xarray as xr
-    from threadpoolctl import ThreadpoolController
 
 
 # How a fitted model is integrated: experiments that differ in these alone are fitted once.
@@ -74,7 +74,7 @@ class Fit(NamedTuple):
 class Fitted:
     """A fit, and whether it has been run before."""
 
-    reduced: ReducedModel | Failure
+    reduced: FittedModel | Failure
     warm: bool = False
 
 
@@ -106,26 +106,6 @@ def evaluate(
             # A bug has ended it.
             found = result_dataset(own, experiment, [found] * len(experiment.test), found)
     return found
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Pin the linear algebra of NumPy and SciPy to one thread of this process.
-
-    How many threads add up a sum decides how it is rounded: results are then the same to the bit,
-    whatever the number of cores, jobs or limits set outside.
-    """
-    with _libraries().limit(limits=1, user_api="blas"):
-        yield
-
-
-@cache
-def _libraries() -> ThreadpoolController:
-    # SciPy brings a library of its own, which is limited only once it is loaded.
-    import scipy.linalg  # noqa: F401
-    from threadpoolctl import ThreadpoolController
-
-    return ThreadpoolController()
 
 
 def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> xr.Dataset:
@@ -192,12 +172,12 @@ def _wanted(model: Model, experiment: Experiment) -> Fit:
     return Fit(model, car, method, settings, experiment.training, experiment.code, function)
 
 
-def fresh_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
+def fresh_fit(model: Model, experiment: Experiment) -> FittedModel | Failure:
     """Fit the method on the training scenarios, and on nothing else."""
     return _fit(_wanted(model, experiment))
 
 
-def kept_fit(model: Model, experiment: Experiment) -> ReducedModel | Failure:
+def kept_fit(model: Model, experiment: Experiment) -> FittedModel | Failure:
     """As `fresh_fit`, but what was fitted before is used again."""
     return _shared(_wanted(model, experiment)).reduced
 
@@ -216,7 +196,7 @@ def _shared(fit: Fit) -> Fitted:
     return found
 
 
-def _made(fit: Fit) -> ReducedModel | Failure:
+def _made(fit: Fit) -> FittedModel | Failure:
     """A fit; one that differs from another in its integration alone shares what that has fitted."""
     settings = json.loads(fit.settings)
     defaults = default_settings(fit.model, fit.method)
@@ -229,7 +209,7 @@ def _made(fit: Fit) -> ReducedModel | Failure:
         if all(hasattr(found, name) for name in online):
             return replace(found, **online)
 
-    def other(name: str, given: Any) -> ReducedModel:
+    def other(name: str, given: Any) -> FittedModel:
         content, function = _text(given.model_dump()), component("method", name).fit
         shared = _shared(fit._replace(method=name, settings=content, function=function)).reduced
         if isinstance(shared, Failure):
@@ -240,10 +220,10 @@ def _made(fit: Fit) -> ReducedModel | Failure:
     return _fit(fit, other)
 
 
-def _fit(fit: Fit, others: FitOther | None = None) -> ReducedModel | Failure:
+def _fit(fit: Fit, others: FitOther | None = None) -> FittedModel | Failure:
     method: Method = component("method", fit.method)
 
-    def made() -> ReducedModel:
+    def made() -> FittedModel:
         complete = for_method(fit.model, fit.method, json.loads(fit.settings))
         return fitted(method, *_given(fit), complete, others)
 
@@ -319,5 +299,12 @@ def _judged(model: Model, experiment: Experiment, test: Scenario, run: Trajector
     method: Method = component("method", experiment.method)
     if run.trust or method.own_limits:
         return run
-    known = input_range(model, experiment.training, method.follows_time)
-    return run.judged(known.trust(model, test))
+    known = known_inputs(model, experiment.training, method.follows_time)
+    return run.judged(known.trust(model, test.maneuver, speed_of(model, test)))
+
+
+@lru_cache(maxsize=64)
+def known_inputs(model: Model, training: tuple[Scenario, ...], follows_time: bool) -> InputRange:
+    """Range of the inputs of training scenarios, see `input_range`."""
+    runs = [(scenario.maneuver, speed_of(model, scenario)) for scenario in training]
+    return input_range(model, runs, follows_time)

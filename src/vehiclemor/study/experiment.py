@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
+from vehiclemor.provenance import code_digest
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.provenance import code_digest
 from vehiclemor.study.scenario import Scenario, Values, parameters_of, scenario_text
 
 Settings = dict[str, Value]

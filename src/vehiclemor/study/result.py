@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.failure import Failure
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.metrics import max_abs, rms, signal_range
-from vehiclemor.reduction.interface import ReducedModel
+from vehiclemor.provenance import attributes
+from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.registry import component
 from vehiclemor.resources import data_folder
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset, with_units
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.failure import Failure
-from vehiclemor.study.provenance import attributes
 from vehiclemor.study.scenario import Scenario
 from vehiclemor.toml_files import FileSchema, read_toml
 
@@ -85,7 +85,7 @@ def result_dataset(
     model: Model,
     experiment: Experiment,
     outcomes: Sequence[Outcome | Failure],
-    reduced: ReducedModel | Failure,
+    reduced: FittedModel | Failure,
     in_training: bool = False,
 ) -> xr.Dataset:
     """Result of an experiment.
@@ -204,11 +204,11 @@ def _of_one_run(model: Model, outcome: Outcome) -> dict[str, object]:
     return found
 
 
-def fit_cost(reduced: ReducedModel | Failure) -> dict[str, object]:
+def fit_cost(reduced: FittedModel | Failure) -> dict[str, object]:
     """Rank of a fit, and what it has cost; zero and missing of one that has failed."""
     failed = isinstance(reduced, Failure)
     return {
-        "effective_rank": 0 if failed else reduced.effective_rank,
+        "effective_rank": 0 if failed else reduced.order,
         "offline_seconds": np.nan if failed else reduced.offline.seconds,
         "offline_evaluations": 0 if failed else reduced.offline.evaluations,
     }

@@ -13,15 +13,13 @@ import numpy as np
 from vehiclemor.errors import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.signal import Signal
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.training import SPEED, TrainingRun, own_speed
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.maneuver_checks import check_resolved, checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
 
-# Parameter with the speed (m/s) at which a vehicle starts.
-SPEED = "initial_speed"
 # Parameter name (of a component of a point such as `tie_rod_inner.z`) and value in SI units.
 Overrides = tuple[tuple[str, float | tuple[float, ...]], ...]
 # Difference of inputs, as part of the largest, that rounding explains: of a table with its samples.
@@ -155,12 +153,6 @@ def input_hash(maneuver: Maneuver) -> str:
     return hashlib.sha256(times.tobytes() + inputs.tobytes()).hexdigest()[:16]
 
 
-def own_speed(model: Model) -> float | None:
-    """Initial speed (m/s) of a model's parameter set, if it has one."""
-    entry = model.parameters.entries.get(SPEED)
-    return None if entry is None else float(np.asarray(entry.value))
-
-
 class Values(dict[str, Any]):
     """Values by name that many experiments share: their canonical JSON text is made once."""
 
@@ -208,6 +200,11 @@ def _car(model: Model, parameters: Overrides) -> Model:
 @lru_cache(maxsize=4096)
 def _state_at(model: Model, parameters: Overrides, start: Start) -> np.ndarray:
     return reparametrised(model, dict(parameters)).start(start)
+
+
+def speed_of(model: Model, scenario: Scenario) -> float:
+    """Initial speed in m/s; zero of a model that has none."""
+    return scenario.speed or own_speed(car_of(model, scenario)) or 0.0
 
 
 def training_run(model: Model, scenario: Scenario) -> TrainingRun:

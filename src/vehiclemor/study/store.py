@@ -23,8 +23,8 @@ from vehiclemor.files import (
     remove_leftovers,
     write_whole,
 )
+from vehiclemor.netcdf_file import global_attributes, read_dataset, write_dataset
 from vehiclemor.study import cell_file
-from vehiclemor.study.netcdf_file import global_attributes, read_dataset, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -21,15 +21,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.codegen.cache import compiler_identity
+from vehiclemor.failure import Failure, attempt
 from vehiclemor.progress import tell
-from vehiclemor.reduction.interface import ReducedModel
+from vehiclemor.provenance import attributes, machine
+from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, timed
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.failure import Failure, attempt
-from vehiclemor.study.provenance import attributes, machine
 from vehiclemor.study.result import variables
 from vehiclemor.study.scenario import start_of
 from vehiclemor.study.store import stored
@@ -241,7 +241,7 @@ def _delivered(run: Callable[[], Trajectory]) -> Trajectory:
 
 def _warm_fit(
     model: Model, experiment: Experiment, needed: bool
-) -> tuple[ReducedModel | None, float]:
+) -> tuple[FittedModel | None, float]:
     """A fitted model, and the median seconds of fits that found their machine code loaded."""
     fitted = kept_fit(model, experiment)
     if isinstance(fitted, Failure):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import vehiclemor as vm
-from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.reduction.reduced_model import ReducedOrderModel
 
 # Strict, and quick to compile.
 FLAGS = ("-std=c99", "-Wall", "-Werror", "-pedantic", "-O0")

@@ -8,7 +8,7 @@ import vehiclemor as vm
 from tests.reducing import fitted
 from vehiclemor.cli import main
 from vehiclemor.exporting import packages
-from vehiclemor.online.rom import ReducedOrderModel
+from vehiclemor.reduction.reduced_model import ReducedOrderModel
 
 CAR = "independent_suspension_vehicle"
 

@@ -36,8 +36,8 @@ def test_singular_values_beyond_the_fourth_are_rounding(model, nominal):
         assert basis.singular_values[3] > 1e-6
         assert np.all(basis.singular_values[4:] < 1e-14)
     # So the rank cut leaves four of six coordinates; without it all six stay.
-    assert fitted(model, nominal, "pod", rank=6).effective_rank == 4
-    assert fitted(model, nominal, "pod", rank=6, rank_tolerance=0.0).effective_rank == 6
+    assert fitted(model, nominal, "pod", rank=6).order == 4
+    assert fitted(model, nominal, "pod", rank=6, rank_tolerance=0.0).order == 6
 
 
 @pytest.mark.parametrize("galerkin", [False, True])
@@ -86,7 +86,7 @@ def test_replay_returns_its_training_run(model, nominal, full):
         assert set(run.counts.values()) == {0}
         assert run.seconds == 0.0
         np.testing.assert_array_equal(run.inputs, maneuver.at(maneuver.times))
-    assert replay.effective_rank == 0
+    assert replay.order == 0
     assert replay.best_approximation(full.states) is None
 
 

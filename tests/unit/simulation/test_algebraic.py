@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
-from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.reduction.methods.full_order import FullOrderMechanism
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 
@@ -106,7 +106,7 @@ def test_a_run_that_diverges_tells_its_counts(model, nominal, full, solver):
     assert run.status == "diverged"
     assert run.counts["iterations"] > 100
     assert run.counts["linear_solves"] == run.counts["iterations"]
-    diverged = FullOrderModel(model, solver, 1e-30).simulate(nominal, "equilibrium")
+    diverged = FullOrderMechanism(model, solver, 1e-30).simulate(nominal, "equilibrium")
     assert (diverged.status, diverged.counts) == (run.status, run.counts)
 
 

@@ -9,8 +9,8 @@ from pydantic import Field
 
 from vehiclemor.errors import ConvergenceError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import Method, Offline, Presets
-from vehiclemor.reduction.reduced_system import KinematicStates, ReducedSystem, StateSpace
+from vehiclemor.reduction.interface import Method, OfflineCost, Presets
+from vehiclemor.reduction.reduced_system import ReducedMechanism, ReducedSystem
 from vehiclemor.reduction.settings import (
     AnyIntegrator,
     OnlineSettings,
@@ -19,11 +19,12 @@ from vehiclemor.reduction.settings import (
     Tolerance,
 )
 from vehiclemor.reduction.training import Training
-from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
@@ -53,20 +54,20 @@ def _strongest(solver: str, tolerance: float) -> Presets:
     return {"strongest": {"solver": solver, "tolerance": tolerance}}
 
 
-@dataclass(frozen=True)
-class FullOrderModel(ShortRepr):
-    """The full-order model behind the interface of a reduced model."""
+@dataclass(frozen=True, eq=False)
+class FullOrder:
+    """The full-order model in the place of a reduced one."""
 
     model: Model
     solver: str
     tolerance: float
-    offline: Offline = field(default_factory=Offline)
+    offline: OfflineCost = field(default_factory=OfflineCost)
 
     def check_sizes(self) -> None:
         """There are none."""
 
     @property
-    def effective_rank(self) -> int:
+    def order(self) -> int:
         """Number of coordinates."""
         return len(self.model.coordinates)
 
@@ -82,32 +83,50 @@ class FullOrderModel(ShortRepr):
                 raise
             return error.trajectory
 
-    @cached_property
-    def state_space(self) -> StateSpace:
-        """The model's own states."""
-        model = self.model
-        if isinstance(model, AlgebraicModel):
-            how = self.solver, self.tolerance
-            return KinematicStates(
-                model,
-                lambda time, u, _: model.solve_path(np.array([time]), u, *how),
-                model.jacobian,
-            )
-        assert isinstance(model, DynamicModel)
-        n, whole = len(model.coordinates), whole_space(2 * len(model.coordinates))
-        how = self.solver, self.tolerance
-        return ReducedSystem(model, model.system, whole, n, self.offline, *how)
-
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """The states themselves: the full space holds them."""
         return states
 
 
+@dataclass(frozen=True, eq=False)
+class FullOrderSystem(FullOrder, ReducedSystem):
+    """A dynamic model."""
+
+    model: DynamicModel
+
+    @property
+    def system(self) -> System:
+        """The model's own."""
+        return self.model.system
+
+    @cached_property
+    def spaces(self) -> ProjectionWindows:
+        """The whole space."""
+        return whole_space(2 * len(self.model.coordinates))
+
+
+@dataclass(frozen=True, eq=False)
+class FullOrderMechanism(FullOrder, ReducedMechanism):
+    """A kinematic model."""
+
+    model: AlgebraicModel
+
+    def solved(self, time: float, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+        """Solution at one time, on the branch of the design position."""
+        del state
+        return self.model.solve_path(np.array([time]), inputs, self.solver, self.tolerance)
+
+    def slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
+        """Those of the model."""
+        return self.model.jacobian(state, inputs, by, of)
+
+
 def fit(
     model: Model, training: Training, settings: AlgebraicSettings | DynamicSettings
-) -> FullOrderModel:
+) -> FullOrder:
     """Nothing is fitted, and no training run is looked at."""
-    return FullOrderModel(model, settings.solver, settings.tolerance)
+    kind = FullOrderSystem if isinstance(model, DynamicModel) else FullOrderMechanism
+    return kind(model, settings.solver, settings.tolerance)  # type: ignore[arg-type]
 
 
 METHOD = Method(

@@ -1,12 +1,11 @@
-"""A fast model with the full order behind it.
+"""Fallback to the full order.
 
-The fast model runs.  If it tells that it leaves what it knows, the full order does the whole run:
-the fast one has mostly gone wrong before it notices.
+A fast model runs.  Where it extrapolates, the full order does the whole run: the fast one has
+mostly gone wrong before its trust indicator passes 1.
 """
 
 import tomllib
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,9 +13,8 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import FitOther, Method, Offline, ReducedModel, simulated
-from vehiclemor.reduction.reduced_system import StateSpace
-from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
+from vehiclemor.reduction.interface import FitOther, FittedModel, Method, OfflineCost, simulated
+from vehiclemor.reduction.settings import OnlineSettings, Settings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.validation import checked_fit, checked_settings, fitted, validated
 from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
@@ -26,7 +24,8 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 NAME, SAFE = "guarded", "full_order"
-ONLINE = ("solver", "tolerance")
+# What of the fast model a user steps and asks.
+STEPPED = ("states", "begin", "step", "rates", "derivatives", "decode", "trust")
 
 
 class GuardedSettings(OnlineSettings):
@@ -44,58 +43,48 @@ class GuardedSettings(OnlineSettings):
 
 @dataclass(frozen=True, eq=False)
 class GuardedModel(ShortRepr):
-    """Both models; solver and tolerance are the fast model's, if it has them."""
+    """Both models; it is stepped as the fast one, whose trust indicator is to be watched."""
 
-    fast: ReducedModel
-    safe: ReducedModel
-    offline: Offline
-    solver: str
-    tolerance: float
+    fast: FittedModel
+    safe: FittedModel
+    offline: OfflineCost
 
     def check_sizes(self) -> None:
         """Raise `PlugInError` if one of them is no reduced model."""
         checked_fit(NAME, self.fast)
         checked_fit(NAME, self.safe)
 
+    def __getattr__(self, name: str) -> Any:
+        if name not in STEPPED:
+            raise AttributeError(f"a guarded model has no {name}")
+        return getattr(self.fast, name)
+
     @property
-    def effective_rank(self) -> int:
-        """Rank of the fast model."""
-        return self.fast.effective_rank
+    def order(self) -> int:
+        """Order of the fast model."""
+        return self.fast.order
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """Best approximation of the fast model."""
         return self.fast.best_approximation(states)
 
-    @cached_property
-    def ahead(self) -> ReducedModel:
-        """The fast model as it is integrated."""
-        online = {name: getattr(self, name) for name in ONLINE}
-        if any(getattr(self.fast, name, value) != value for name, value in online.items()):
-            return replace(self.fast, **online)  # type: ignore[type-var]
-        return self.fast
-
-    @property
-    def state_space(self) -> StateSpace:
-        """That of the fast model, which tells where it is not to be trusted any more."""
-        return self.ahead.state_space  # type: ignore[attr-defined]
-
     def simulate(
         self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """The fast run; where it can't be trusted, the safe one."""
-        run = simulated(self.ahead, maneuver, start, outputs)
+        run = simulated(self.fast, maneuver, start, outputs)
         if run.status == "ok" and run.trust:
             return run
-        # A model that does not judge itself is trusted nowhere.
+        # A model without ranges of its own is trusted nowhere.
         silent = run.message or "the fast model does not judge itself"
         trust = run.trust or Trust(np.inf, 0.0, silent)
         safe = simulated(self.safe, maneuver, start, outputs)
-        told = f"from t = 0 s on by {SAFE}: {trust.reason or run.message}"
+        why = f"from t = 0 s on by {SAFE}: {trust.reason or run.message}"
         return replace(
             safe,
             counts={name: count + safe.counts[name] for name, count in run.counts.items()},
             seconds=run.seconds + safe.seconds,
-            remark="; ".join(part for part in (told, safe.remark) if part),
+            remark="; ".join(part for part in (why, safe.remark) if part),
             trust=trust,
         )
 
@@ -108,47 +97,39 @@ def fit(
 ) -> GuardedModel:
     """Fit both, by `others` if it is given."""
     made = others or (lambda name, own: fitted(component("method", name), model, training, own))
-    fast = made(settings.fast, _of_fast(model, settings))
-    safe = made(SAFE, _of_safe(model, settings))
+    fast, safe = (made(name, own) for name, own in _settings_of_both(model, settings))
     first, second = fast.offline, safe.offline
-    cost = Offline(first.seconds + second.seconds, first.evaluations + second.evaluations)
-    return GuardedModel(fast, safe, cost, settings.solver, settings.tolerance)
+    cost = OfflineCost(first.seconds + second.seconds, first.evaluations + second.evaluations)
+    return GuardedModel(fast, safe, cost)
 
 
 def check(model: DynamicModel, settings: GuardedSettings) -> None:
     """Raise `InputError` if a method or its settings don't fit the model."""
-    method: Method = component("method", settings.fast)
-    accepted, reason = method.accepts(model)
+    accepted, reason = component("method", settings.fast).accepts(model)
     if not accepted or settings.fast == NAME:
-        told = reason or "it would guard itself"
-        raise InputError(f"{NAME}: fast can't be {settings.fast!r}: {told}")
-    checked_settings(method, model, _of_fast(model, settings))
-    checked_settings(component("method", SAFE), model, _of_safe(model, settings))
+        reason = reason or "it would guard itself"
+        raise InputError(f"{NAME}: fast can't be {settings.fast!r}: {reason}")
+    for name, own in _settings_of_both(model, settings):
+        checked_settings(component("method", name), model, own)
 
 
-def _of_fast(model: DynamicModel, settings: GuardedSettings) -> Any:
-    """Settings of the fast model."""
+def _settings_of_both(model: DynamicModel, settings: GuardedSettings) -> list[tuple[str, Settings]]:
+    """Methods of the fast and of the safe model with their settings."""
     method: Method = component("method", settings.fast)
     lines = [line.strip(" ,") for line in settings.fast_settings.splitlines()]
     try:
-        read = tomllib.loads(f"given = {{ {', '.join(filter(None, lines))} }}")
+        given = tomllib.loads(f"given = {{ {', '.join(filter(None, lines))} }}")["given"]
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{NAME}: fast_settings: {error}") from None
-    given = read.pop("given")
-    if read or any(isinstance(value, dict | list) for value in given.values()):
-        raise InputError(f"{NAME}: fast_settings are names with one value each, not tables")
-    known = method.names_of(model.kind)
-    online = {name: getattr(settings, name) for name in ONLINE if name in known}
-    for name in online:
-        if name in given:
-            raise InputError(f"{NAME}: fast_settings has {name}, which is a setting of its own")
-    return validated(method, model.kind, online | given)
-
-
-def _of_safe(model: DynamicModel, settings: GuardedSettings) -> Any:
-    """Settings of the safe model."""
-    online = {"solver": settings.safe_solver, "tolerance": settings.safe_tolerance}
-    return validated(component("method", SAFE), model.kind, online)
+    known = {*method.names_of(model.kind)}
+    online = {name: getattr(settings, name) for name in ("solver", "tolerance") if name in known}
+    if twice := [name for name in online if name in given]:
+        raise InputError(f"{NAME}: fast_settings has {twice[0]}, which is a setting of its own")
+    safe = {"solver": settings.safe_solver, "tolerance": settings.safe_tolerance}
+    return [
+        (settings.fast, validated(method, model.kind, online | given)),
+        (SAFE, validated(component("method", SAFE), model.kind, safe)),
+    ]
 
 
 METHOD = Method(

@@ -25,12 +25,11 @@ from vehiclemor.codegen.tangent import Tangent, tangent
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import Method, Offline, offline_cost
-from vehiclemor.reduction.polynomials.map_loops import TOLD, Cells
-from vehiclemor.reduction.reduced_system import KinematicStates
+from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
+from vehiclemor.reduction.map_loops import REPORTED, Cells
+from vehiclemor.reduction.reduced_system import ReducedMechanism
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
-from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.kernel_derivatives import By
@@ -68,12 +67,12 @@ def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -
     The variables are the moving inputs; several results may share a column of the coefficients.
     """
     every = monomials(len(moving), degree)
-    places = {term: place for place, term in enumerate(every)}
+    indices = {term: index for index, term in enumerate(every)}
     lines = [f"x{j} = _x[{i}]" for j, i in enumerate(moving)]
     lines.append("m0 = 1.0")
-    lines += [f"m{places[term]} = m{places[term[:-1]]} * x{term[-1]}" for term in every[1:]]
+    lines += [f"m{indices[term]} = m{indices[term[:-1]]} * x{term[-1]}" for term in every[1:]]
     values = ", ".join(f"v{i}" for i in range(max(columns) + 1))
-    powers = ", ".join(f"m{place}" for place in range(len(every)))
+    powers = ", ".join(f"m{index}" for index in range(len(every)))
     lines.append(f"({values},) = weighted_sums(_coefficients, 0, ({powers},))")
     lines += [f"_result[{i}] = v{column}" for i, column in enumerate(columns)]
     return "\n    ".join(["def polynomials(_x, _coefficients, _result):", *lines]) + "\n"
@@ -83,7 +82,7 @@ def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -
 def map_loop(inputs: int, moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> Loop:
     """Compiled loop of polynomials of that total degree in those of the inputs that move."""
     sizes = {"INPUTS": inputs, "QUANTITIES": len(columns)}
-    modules = "simulation.newton_loops", "reduction.polynomials.map_loops"
+    modules = "simulation.newton_loops", "reduction.map_loops"
     kernels = {"polynomials": map_kernel(moving, degree, columns)}
     return loops(modules, ("map_path",), kernels, sizes)["map_path"]
 
@@ -101,7 +100,7 @@ class PathMapSettings(Settings):
 
 
 @dataclass(frozen=True)
-class PathMapModel(ShortRepr):
+class PathMapModel(ReducedMechanism):
     """Coordinates and outputs as polynomials, of that total degree, of the inputs that move.
 
     Attributes
@@ -121,7 +120,7 @@ class PathMapModel(ShortRepr):
     cells: Cells
     columns: tuple[int, ...]
     stops: bool
-    offline: Offline
+    offline: OfflineCost
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if the loop would read beyond inputs, cells or columns."""
@@ -142,7 +141,7 @@ class PathMapModel(ShortRepr):
         require(bool(self.moving) and terms * width <= MOST_SIZE, "degree")
 
     @property
-    def effective_rank(self) -> int:
+    def order(self) -> int:
         """Number of inputs that move."""
         return len(self.moving)
 
@@ -151,15 +150,11 @@ class PathMapModel(ShortRepr):
         return map_loop(len(self.ranges), self.moving, self.degree, self.columns)
 
     @cached_property
-    def _counts(self) -> dict[str, int]:
-        return dict.fromkeys(self.model.counts, 0)
-
-    @cached_property
     def _spare(self) -> Spare[Prepared]:
         return Spare()
 
     def _packed(self, given: Ready, size: int) -> Prepared:
-        """The loop for some inputs, to be given space of so many numbers."""
+        """The loop for some inputs, to be given space of that size."""
         call = self._loop.prepared(given, self.cells, np.empty(0))
         call.words[call.address("space") + 1] = size
         return call
@@ -167,49 +162,45 @@ class PathMapModel(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Polynomials at the maneuver's output times."""
         self.model.check_start(start)
-        return self._along(*self.model.sampled(maneuver))
+        return self._evaluated(*self.model.sampled(maneuver))
 
-    @property
-    def state_space(self) -> KinematicStates:
-        """The coordinates; a step is an evaluation."""
-
-        def solved(time: float, inputs: np.ndarray, _: np.ndarray) -> Trajectory:
-            return self._along(np.array([time]), inputs, ready(Samples(inputs)))
-
-        return KinematicStates(self.model, solved, self._slopes)
+    def solved(self, time: float, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+        """Polynomials at one time: a step is an evaluation."""
+        del state
+        return self._evaluated(np.array([time]), inputs, ready(Samples(inputs)))
 
     @cached_property
     def _tangent(self) -> Tangent:
         (source,) = kernel_sources(map_kernel(self.moving, self.degree, self.columns)).values()
         return tangent(source, source.arguments[0], len(self.columns), len(self.ranges))
 
-    def _slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
+    def slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
         """Derivatives of coordinates, or of the model's outputs there, by the inputs."""
         if by != "inputs" or of not in ("coordinates", "outputs"):
             raise InputError("path_map: derivatives are of coordinates or outputs, by inputs")
         cells = self.cells
-        place = ((inputs - cells.centres) * cells.scales + 1.0) * cells.halves
-        numbers = np.clip(place, 0.0, cells.tops).astype(int)
-        cell = np.ravel_multi_index(tuple(numbers), tuple(cells.numbers))
-        arrays = 2.0 * (place - numbers) - 1.0, cells.coefficients[cell].ravel()
+        within = ((inputs - cells.centres) * cells.scales + 1.0) * cells.halves
+        indices = np.clip(within, 0.0, cells.tops).astype(int)
+        cell = np.ravel_multi_index(tuple(indices), tuple(cells.numbers))
+        arrays = 2.0 * (within - indices) - 1.0, cells.coefficients[cell].ravel()
         table = self._tangent.jacobian(arrays) * (2.0 * cells.halves * cells.scales)
         moved = table[: len(self.model.coordinates)]
         if of == "coordinates":
             return moved
-        own, along = (self.model.derivatives(of, state, inputs, by) for by in ("inputs", "state"))
-        return own + along @ moved
+        own, slopes = (self.model.derivatives(of, state, inputs, by) for by in ("inputs", "state"))
+        return own + slopes @ moved
 
-    def _along(self, times: np.ndarray, inputs: np.ndarray, given: Ready) -> Trajectory:
+    def _evaluated(self, times: np.ndarray, inputs: np.ndarray, given: Ready) -> Trajectory:
         """Polynomials at inputs (samples, inputs), also as the loop takes them."""
         model, samples = self.model, len(times)
         size = samples * len(self.columns)
-        space = np.empty(size + TOLD + inputs.shape[1])
+        space = np.empty(size + REPORTED + inputs.shape[1])
         call = self._spare.taken(given, lambda: self._packed(given, len(space)))
         call.words[call.address("space")] = address_of_array(space)
         _, seconds = timed(call)
         self._spare.give_back(given, call)
         table = space[:size].reshape(samples, -1)
-        indicator, left = space[size : size + TOLD].tolist()
+        indicator, left = space[size : size + REPORTED].tolist()
         status, message, until, reason = "ok", "", np.inf, ""
         if left < samples:
             left = int(left)
@@ -225,7 +216,7 @@ class PathMapModel(ShortRepr):
             coordinates=table[:, :n],
             speeds=table[:, :0],
             outputs=table[:, n:],
-            counts=self._counts.copy(),
+            counts=dict.fromkeys(model.counts, 0),
             seconds=seconds,
             status=status,
             message=message,
@@ -244,10 +235,6 @@ class PathMapModel(ShortRepr):
         """The map of another mechanism, between the same inputs."""
         number = int(self.cells.numbers.max())
         return _mapped(model, self.ranges, self.degree, number, self.stops)
-
-    def best_approximation(self, states: np.ndarray) -> None:
-        """There is no subspace to project onto."""
-        del states
 
 
 def _named(model: AlgebraicModel, values: np.ndarray) -> str:
@@ -293,8 +280,7 @@ def _mapped(
     moving = np.flatnonzero(widths > RESTING)
     if not len(moving):
         raise InputError("path_map: no input moves in training")
-    places = np.arange(number)[:, None] + 0.5 + 0.5 * _nodes(degree)
-    shares = places.ravel() / number
+    shares = (np.arange(number)[:, None] + 0.5 + 0.5 * _nodes(degree)).ravel() / number
     grid = [low + shares * (high - low) for low, high in ranges[moving]]
     inputs = np.tile(centres, (len(grid[0]) ** len(grid), 1))
     inputs[:, moving] = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, len(grid))
@@ -308,8 +294,6 @@ def _mapped(
     cells = Cells(
         centres,
         1.0 / np.maximum(0.5 * widths, RESTING),
-        0.5 * numbers,
-        numbers - 1.0,
         numbers,
         _coefficients(values, len(moving), number, degree),
     )

@@ -1,27 +1,32 @@
-"""POD in control periods: the paper's method.
+"""POD: in control periods, which is the paper's method, or with one basis for the whole run.
 
 R. Masoudi, T. Uchida, J. McPhee, Reduction of Multibody Dynamic Models in Automotive Systems Using
 the Proper Orthogonal Decomposition, J. Comput. Nonlinear Dyn. 10(3), 031007 (2015), section 3.
+L. Sirovich, Turbulence and the dynamics of coherent structures, Quart. Appl. Math. 45 (1987).
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, create_model
 
 from vehiclemor.errors import InputError
-from vehiclemor.reduction.interface import Method, ReducedModel
-from vehiclemor.reduction.projection.algebraic import AlgebraicPodSettings
-from vehiclemor.reduction.projection.bases import window_edges
-from vehiclemor.reduction.projection.dynamic import (
-    ConstrainedPodSettings,
-    DynamicPodSettings,
-    RestartedProjection,
-)
-from vehiclemor.reduction.projection.subspaces import PRESETS, check_subspaces, fit_subspaces
+from vehiclemor.reduction.interface import FittedModel, Method
+from vehiclemor.reduction.projection import algebraic, dynamic
+from vehiclemor.reduction.projection.bases import Snapshots, window_edges
+from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 
-# Shortest control period in s by kind of model: no motion of a vehicle happens in less.
+PROJECTIONS = {"ae": algebraic, "ode": dynamic, "dae": dynamic}
+SETTINGS: dict[str, type[Settings]] = {
+    "ae": algebraic.AlgebraicPodSettings,
+    "ode": dynamic.DynamicPodSettings,
+    "dae": dynamic.ConstrainedPodSettings,
+}
+# Lengths in s of the paper's control periods, and the shortest: no motion of a vehicle happens in
+# less.
+PERIODS = {"ae": 5.0, "ode": 0.5, "dae": 0.1}
 SHORTEST_PERIOD = {"ae": 1e-3, "ode": 1e-2, "dae": 1e-2}
 ControlPeriod = Annotated[float, Field(gt=0.0, description="length of a control period in s")]
 Restart = Annotated[
@@ -33,56 +38,62 @@ Restart = Annotated[
         "model-predictive controller; the full model runs beside both"
     ),
 ]
+# As many snapshots of one basis as the paper's control periods have together.
+SNAPSHOTS = {"ae": 20, "ode": 500, "dae": 500}
+DYNAMIC_LITERAL = {"formulation": "state", "inner_product": "euclidean", "rank_tolerance": 0.0}
+# `literal` takes the paper's words literally.
+PRESETS = {
+    "ae": {"literal": {"test_space": "galerkin", "rank_tolerance": 0.0}},
+    "ode": {"literal": DYNAMIC_LITERAL},
+    "dae": {"literal": DYNAMIC_LITERAL},
+}
 
 
-# Lengths of the control periods are the paper's.
-class AlgebraicSettings(AlgebraicPodSettings):
-    """Settings for algebraic equations."""
-
-    control_period: ControlPeriod = 5.0
-
-
-class DynamicSettings(DynamicPodSettings):
-    """Settings for ordinary differential equations."""
-
-    control_period: ControlPeriod = 0.5
-    restart: Restart = "own"
+def _in_periods(kind: str) -> type[Settings]:
+    """Settings of POD in control periods."""
+    fields: dict[str, Any] = {"control_period": (ControlPeriod, PERIODS[kind])}
+    if kind != "ae":
+        fields["restart"] = Restart, "own"
+    return create_model("PodSettings", __base__=SETTINGS[kind], **fields)
 
 
-class ConstrainedSettings(ConstrainedPodSettings):
-    """Settings for equations with constraints."""
-
-    control_period: ControlPeriod = 0.1
-    restart: Restart = "own"
-
-
-PodSettings = AlgebraicSettings | DynamicSettings | ConstrainedSettings
+def _of_one_basis(kind: str) -> type[Settings]:
+    """Settings of POD with one basis."""
+    fields: dict[str, Any] = {"snapshots": (Snapshots, SNAPSHOTS[kind])}
+    return create_model("FixedBasisSettings", __base__=SETTINGS[kind], **fields)
 
 
-def check(model: Model, settings: PodSettings) -> None:
+def check(model: Model, settings: Any) -> None:
     """Raise `InputError` if the settings don't fit the model."""
-    check_subspaces(model, settings)
-    shortest = SHORTEST_PERIOD[model.kind]
-    if settings.control_period < shortest:
+    PROJECTIONS[model.kind].check_subspace(model, settings)
+    period, shortest = getattr(settings, "control_period", np.inf), SHORTEST_PERIOD[model.kind]
+    if period < shortest:
         raise InputError(f"control_period is below {shortest:g} s")
 
 
-def fit(model: Model, training: Training, settings: PodSettings) -> ReducedModel:
-    """One POD subspace for each control period of the training runs."""
-    edges = window_edges(training[0].maneuver.duration, settings.control_period)
-    reduced = fit_subspaces(model, training, edges, settings)
-    if isinstance(settings, AlgebraicSettings) or settings.restart == "own":
-        return reduced
-    return RestartedProjection(**vars(reduced), moved=settings.restart == "full_model")
+def fit(model: Model, training: Training, settings: Any) -> FittedModel:
+    """One POD subspace for each control period of the training runs, or for the whole of them."""
+    duration = training[0].maneuver.duration
+    edges = window_edges(duration, getattr(settings, "control_period", duration))
+    return PROJECTIONS[model.kind].fit_windows(model, training, edges, settings)
 
 
 METHOD = Method(
     name="pod",
     summary="POD with its own mean and basis in each control period (the paper's method)",
     reference="10.1115/1.4029390",
-    settings={"ae": AlgebraicSettings, "ode": DynamicSettings, "dae": ConstrainedSettings},
+    settings={kind: _in_periods(kind) for kind in SETTINGS},
     presets=PRESETS,
     check=check,
     fit=fit,
     follows_time=True,
+)
+FIXED_BASIS = Method(
+    name="fixed_basis",
+    summary="POD with one mean and basis for the whole run",
+    reference="10.1090/qam/910462",
+    settings={kind: _of_one_basis(kind) for kind in SETTINGS},
+    presets=PRESETS,
+    check=check,
+    fit=fit,
 )

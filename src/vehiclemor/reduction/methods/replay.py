@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import KINDS
-from vehiclemor.reduction.interface import Method, Offline, offline_cost
+from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
@@ -26,7 +26,7 @@ class ReplayModel(ShortRepr):
 
     model: Model
     recorded: tuple[Trajectory, ...]
-    offline: Offline
+    offline: OfflineCost
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if a run is none of this model."""
@@ -35,7 +35,7 @@ class ReplayModel(ShortRepr):
             require(all(getattr(r, name).shape[1] == columns for r in self.recorded), name)
 
     @property
-    def effective_rank(self) -> int:
+    def order(self) -> int:
         """No coordinates are solved for."""
         return 0
 
@@ -88,10 +88,8 @@ def _resampled(before: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.
 
 def fit(model: Model, training: Training, settings: Settings) -> ReplayModel:
     """Record the training runs at the output times."""
-    began = time.process_time()
-    recorded = tuple(run.recorded() for run in training)
-    cost = offline_cost(began, model, recorded)
-    return ReplayModel(model, recorded, cost)
+    began, recorded = time.process_time(), tuple(run.recorded() for run in training)
+    return ReplayModel(model, recorded, offline_cost(began, model, recorded))
 
 
 METHOD = Method(

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import Offline, offline_cost
+from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
 from vehiclemor.reduction.projection.bases import (
     Basis,
@@ -23,10 +23,9 @@ from vehiclemor.reduction.projection.bases import (
     pod_basis,
     project,
 )
-from vehiclemor.reduction.reduced_system import KinematicStates
+from vehiclemor.reduction.reduced_system import ReducedMechanism
 from vehiclemor.reduction.settings import Settings, StepTolerance
 from vehiclemor.reduction.training import Training
-from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel, new_counts
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import SAMPLE, Iteration, Solution
@@ -68,7 +67,7 @@ class AlgebraicPodSettings(Settings):
 
 
 @dataclass(frozen=True)
-class AlgebraicProjection(ShortRepr):
+class AlgebraicProjection(ReducedMechanism):
     """Reduced model on affine subspaces, one in each window between edges (windows + 1,) in s.
 
     Test bases (n, r) of the windows are none for least squares; the tolerance is the largest step
@@ -79,7 +78,7 @@ class AlgebraicProjection(ShortRepr):
     edges: np.ndarray
     bases: tuple[Basis, ...]
     tests: tuple[np.ndarray, ...] | None
-    offline: Offline
+    offline: OfflineCost
     tolerance: float
 
     def check_sizes(self) -> None:
@@ -89,11 +88,11 @@ class AlgebraicProjection(ShortRepr):
         require(all(len(basis.mean) == n for basis in self.bases), "bases")
 
     @property
-    def effective_rank(self) -> int:
+    def order(self) -> int:
         """Largest number of reduced coordinates in any window."""
         return max(basis.rank for basis in self.bases)
 
-    def solved(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+    def solved_along(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
         """Solve the reduced equations at some times, beginning at a state (n,)."""
         model = self.model
         n, windows = len(model.coordinates), len(self.bases)
@@ -122,14 +121,11 @@ class AlgebraicProjection(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Solve the reduced equations at the maneuver's output times."""
         times, inputs, _ = self.model.sampled(maneuver)
-        return self.solved(times, inputs, self.model.start(start))
+        return self.solved_along(times, inputs, self.model.start(start))
 
-    @property
-    def state_space(self) -> KinematicStates:
-        """The coordinates; those of the window that the time is in."""
-        return KinematicStates(
-            self.model, lambda time, u, state: self.solved(np.array([time]), u, state)
-        )
+    def solved(self, time: float, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+        """Solution at one time, in the window that it is in."""
+        return self.solved_along(np.array([time]), inputs, state)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""

@@ -25,7 +25,7 @@ from vehiclemor.simulation.newton_loops import (
 
 # Number of entries of the Jacobian that are no structural zeros.
 ENTRIES = 0
-INLINED = ("weighted", "lift", "tangent_product", "enter_window")
+INLINED = ("weighted", "decode", "tangent_product", "enter_window")
 
 
 class Windows(NamedTuple):
@@ -66,7 +66,7 @@ def weighted(test, k, product, j):
     return total
 
 
-def lift(mean, basis, qh, r, q):
+def decode(mean, basis, qh, r, q):
     """Full coordinates mean + qh basis into q."""
     for i in range(N):
         total = mean[i]
@@ -89,7 +89,7 @@ def enter_window(mean, basis, r, q, qh):
         qh[j] = 0.0
         for i in range(N):
             qh[j] += basis[j, i] * (q[i] - mean[i])
-    lift(mean, basis, qh, r, q)
+    decode(mean, basis, qh, r, q)
 
 
 def projected_path(
@@ -144,7 +144,7 @@ def projected_path(
                 for j in range(r):
                     step[j] = reduced[j, N]
                     qh[j] -= step[j]
-                lift(mean, basis, qh, r, q)
+                decode(mean, basis, qh, r, q)
                 if all_below(step, r, iteration.tolerance):
                     converged = True
                     break

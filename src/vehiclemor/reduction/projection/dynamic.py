@@ -17,7 +17,8 @@ from pydantic import Field
 
 from vehiclemor.errors import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import offline_cost
+from vehiclemor.inputs.sample_loops import Pieces
+from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.bases import (
     Basis,
     Rank,
@@ -30,12 +31,15 @@ from vehiclemor.reduction.projection.bases import (
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import ProjectedSettings, Tolerance
 from vehiclemor.reduction.training import Training
-from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.integrators import catalogue
+from vehiclemor.simulation.integrators.loop import scratch_end
+from vehiclemor.simulation.integrators.structures import Place
 from vehiclemor.simulation.projection_windows import ProjectionWindows
-from vehiclemor.simulation.stepping import Stepper
+from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 from vehiclemor.simulation.workspaces import Solver
+from vehiclemor.sizes import require
 
 # A state whose range is below this share of the largest one is noise, not motion.
 SMALLEST_RANGE = 1e-6
@@ -84,15 +88,78 @@ class ConstrainedPodSettings(DynamicPodSettings):
 class DynamicProjection(ReducedSystem):
     """Projected equations of motion on affine subspaces, one in each window.
 
+    Where a window starts from the full model's state, as onboard model-predictive controllers do,
+    which the paper's control periods resemble (section 3.1), errors grow within it alone.  But
+    projected onto the subspace of the training run (step 6) that state becomes one of that run
+    again, wherever the vehicle is: where it is the origin of the subspace, only the change within
+    the window is in the span of the training's.
+
     Attributes
     ----------
     bases
         Basis of each window, orthonormal in its inner product: of the states for `state`, else of
-        the coordinates; `spaces` are the same for the compiled loops.  Each window starts where the
-        one before has ended.
+        the coordinates; `spaces` are the same for the compiled loops.
+    restart
+        Where a window starts, as in the settings of `pod`.
     """
 
+    model: DynamicModel
+    spaces: ProjectionWindows
+    offline: OfflineCost
+    solver: str
+    tolerance: float
     bases: tuple[Basis, ...] = ()
+    restart: str = "own"
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the subspaces are of other states than the model's."""
+        require(self.spaces.formulation != "full", "formulation")
+        require(self.spaces.means.shape[1] == 2 * len(self.model.coordinates), "spaces")
+
+    @property
+    def system(self) -> System:
+        """The model's own."""
+        return self.model.system
+
+    @property
+    def order(self) -> int:
+        """Largest number of basis vectors in any window."""
+        return max(basis.rank for basis in self.bases)
+
+    @property
+    def moved(self) -> bool:
+        """Whether the state at the beginning of a window is the origin of its subspace."""
+        return self.restart == "full_model"
+
+    def simulate(
+        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
+        """Each window from where the one before has ended, or from the state of the full model.
+
+        That runs first, and counts and seconds are of both.  A sample at the edge of two windows is
+        the end of the first one.
+        """
+        if self.restart == "own":
+            return super().simulate(maneuver, start, outputs)
+        model, times = self.model, maneuver.times
+        edges = np.array([0.0, *self.spaces.edges[1:-1], times[-1]])
+        edges = np.unique(edges[edges <= times[-1]])
+        full = model.simulate(maneuver, start, edges, self.solver, self.tolerance)
+        counts = np.array([full.counts[name] for name in DYNAMIC_COUNTS])
+        states = np.full((len(times), full.states.shape[1]), np.nan)
+        first, seconds, failure, spaces = 0, full.seconds, "", self.spaces
+        for (left, right), state in zip(pairwise(edges), full.states, strict=False):
+            end = int(np.searchsorted(times, right + 1e-9 * (right - left)))
+            if end == first or failure:
+                continue
+            if self.moved:
+                spaces = replace(spaces, means=np.tile(state, (len(spaces.means), 1)))
+            how = Solver(self.solver, self.tolerance, times[first:end], begin=left)
+            run = self.system.run(maneuver, state, spaces, how)
+            states[first:end], failure = run.whole, run.failure
+            counts, seconds, first = counts + run.counts, seconds + run.seconds, end
+        found = model.trajectory(times, maneuver.at(times), states, counts, seconds, failure)
+        return found if outputs is None else found.chosen(outputs)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, 2 n) onto the subspaces."""
@@ -132,61 +199,28 @@ class DynamicProjection(ReducedSystem):
                 (of_mean,) = model.derivatives_at(spaces.means[k : k + 1], no_input)
                 of_mean[len(model.coordinates) :] = 0.0
                 y[rank:] = spaces.test_basis[k, :rank, :] @ of_mean
-            jacobian = linearisation.reduced_jacobian(model, spaces, k, y)
-            rates[k] = np.linalg.eigvals(jacobian).real.max()
+            rates[k] = np.linalg.eigvals(self.reduced_jacobian(k, y)).real.max()
         return rates
+
+    def reduced_jacobian(self, window: int, y: np.ndarray) -> np.ndarray:
+        """Jacobian of one window's reduced system at y (dim,) by differences, all inputs zero."""
+        n, inputs, spaces = 2 * len(self.model.coordinates), len(self.model.inputs), self.spaces
+        nothing = np.zeros((1, inputs, 6))
+        signal = Pieces(np.array([0.0, 1.0]), np.array([0, 1]), np.empty(0), nothing)
+        loop = catalogue.rhs_loop(spaces.formulation)
+        equations, place = self.system.called(spaces.formulation), Place(0.0, 0, window)
+        buffer, columns = np.empty(scratch_end(n, inputs)), []
+        for step in 1e-6 * np.maximum(1.0, np.abs(y)) * np.eye(len(y)):
+            sides = np.empty((2, len(y)))
+            for side, shifted in zip(sides, (y + step, y - step), strict=True):
+                loop(shifted, equations, signal, spaces.subspaces, place, buffer, side)
+            columns.append((sides[0] - sides[1]) / (2.0 * step.sum()))
+        return np.column_stack(columns)
 
     @property
     def spectral_abscissa(self) -> float:
         """Largest spectral abscissa in any window, 1/s; NaN if all windows are at rest."""
         return float(np.fmax.reduce(self.spectral_abscissas))
-
-
-@dataclass(frozen=True, eq=False)
-class RestartedProjection(DynamicProjection):
-    """The same subspaces; the state at the beginning of each window is the full model's.
-
-    So onboard model-predictive controllers, which the paper's control periods resemble (section
-    3.1), update at regular intervals, and errors grow within a window alone.  But projected onto
-    the subspace of the training run (step 6) the state becomes one of that run again, wherever the
-    car is: where it is `moved`, only the change within the window is in the span of the training's.
-
-    Attributes
-    ----------
-    moved
-        Whether this state is the origin of the window's subspace, and not the training's mean.
-    """
-
-    moved: bool = True
-
-    @cached_property
-    def stepper(self) -> Stepper:
-        """Steps from any state that is given, as at the beginning of a window."""
-        return Stepper(self.system, self.spaces, self.solver, self.tolerance, self.moved)
-
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """Run the full model, then each window from its state: counts and seconds are of both.
-
-        A sample at the edge of two windows is the end of the first one.
-        """
-        model, times = self.model, maneuver.times
-        edges = np.array([0.0, *self.spaces.edges[1:-1], times[-1]])
-        edges = np.unique(edges[edges <= times[-1]])
-        full = model.simulate(maneuver, start, edges, self.solver, self.tolerance)
-        counts = np.array([full.counts[name] for name in DYNAMIC_COUNTS])
-        states = np.full((len(times), full.states.shape[1]), np.nan)
-        first, seconds, failure, spaces = 0, full.seconds, "", self.spaces
-        for (left, right), state in zip(pairwise(edges), full.states, strict=False):
-            end = int(np.searchsorted(times, right + 1e-9 * (right - left)))
-            if end == first or failure:
-                continue
-            if self.moved:
-                spaces = replace(spaces, means=np.tile(state, (len(spaces.means), 1)))
-            how = Solver(self.solver, self.tolerance, times[first:end], begin=left)
-            run = self.system.run(maneuver, state, spaces, how)
-            states[first:end], failure = run.whole, run.failure
-            counts, seconds, first = counts + run.counts, seconds + run.seconds, end
-        return model.trajectory(times, maneuver.at(times), states, counts, seconds, failure)
 
 
 def fit_windows(
@@ -204,9 +238,9 @@ def fit_windows(
     count = settings.snapshots
     moments = np.concatenate([np.linspace(a, b, count) for a, b in pairwise(edges)])
     # The same time twice, at inner edges, needs one sample.
-    unique, places = np.unique(moments, return_inverse=True)
+    unique, indices = np.unique(moments, return_inverse=True)
     histories = [run.at(unique) for run in training]
-    states = np.array([history.states[places] for history in histories])
+    states = np.array([history.states[indices] for history in histories])
     weight = _weight(model, settings, states.reshape(-1, states.shape[-1]), edges)
     windows = [slice(k * count, (k + 1) * count) for k in range(len(edges) - 1)]
     snapshots = [states[:, window].reshape(-1, states.shape[-1]) for window in windows]
@@ -217,9 +251,9 @@ def fit_windows(
         bases.append(Basis(part.mean(axis=0), vectors, scaled.singular_values))
     means = np.array([part.mean(axis=0) for part in snapshots])
     spaces = _spaces(model, edges, means, bases, (weight, settings.formulation))
-    rank, offline = max(basis.rank for basis in bases), offline_cost(began, model, histories)
-    how = settings.solver, settings.tolerance
-    return DynamicProjection(model, model.system, spaces, rank, offline, *how, bases=tuple(bases))
+    offline = offline_cost(began, model, histories)
+    how = settings.solver, settings.tolerance, tuple(bases), getattr(settings, "restart", "own")
+    return DynamicProjection(model, spaces, offline, *how)
 
 
 def _spaces(
@@ -235,11 +269,7 @@ def _spaces(
     trial, test = np.zeros((windows, rows, 2 * n)), np.zeros((windows, rows, 2 * n))
     ranks = np.empty(windows, dtype=np.int64)
     # The speeds that go with rates of the coordinates, where angles are small.
-    turn = (
-        linearisation.speeds_per_rates(model, model.start())
-        if formulation == "paired"
-        else np.eye(n)
-    )
+    turn = speeds_per_rates(model) if formulation == "paired" else np.eye(n)
     back = np.linalg.inv(turn)
     for k, basis in enumerate(bases):
         r, width = basis.rank, len(weight)
@@ -250,6 +280,13 @@ def _spaces(
         ranks[k] = r if formulation == "state" else 2 * r
     form = "coordinates" if formulation == "coordinates" else "state"
     return ProjectionWindows(form, edges, means, trial, test, ranks)
+
+
+def speeds_per_rates(model: DynamicModel) -> np.ndarray:
+    """Matrix (n, n) that turns rates of the coordinates into speeds at the first start."""
+    n = len(model.coordinates)
+    states = np.hstack([np.tile(model.start()[:n], (n, 1)), np.eye(n)])
+    return np.column_stack([model.speeds_of_rates(state) for state in states])
 
 
 def _weight(
@@ -273,7 +310,7 @@ def _weight(
         return mass
     weight = np.zeros((2 * n, 2 * n))
     weight[:n, :n] = mass / float(edges[1] - edges[0]) ** 2
-    inverse = np.linalg.inv(linearisation.speeds_per_rates(model, model.start()))
+    inverse = np.linalg.inv(speeds_per_rates(model))
     weight[n:, n:] = inverse.T @ mass @ inverse
     return weight
 

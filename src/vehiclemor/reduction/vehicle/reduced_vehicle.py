@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import Offline
+from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.vehicle.features import (
@@ -21,36 +21,36 @@ from vehiclemor.reduction.vehicle.features import (
 from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach
-from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.maneuver_checks import checked_maneuver
-from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
-from vehiclemor.simulation.workspaces import Run
 from vehiclemor.sizes import require, shaped
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
 NOTHING_EXCITED = np.empty((2, 0, 2))
-NO_COST = Offline()
+NO_COST = OfflineCost()
 
 
 class KnownStart(NamedTuple):
-    """A full state as a start: what of the transient it excites, and until when (s).
+    """A full state as a start, its reduced state, what of the transient it excites, until when (s).
 
     Of it is `told` when (s) this is as in training runs; how much else it leaves, 1 at the edge of
     what they leave; 1.
     """
 
     state: np.ndarray
+    encoded: np.ndarray
     excited: np.ndarray
     until: float
     told: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class ReducedVehicle(ShortRepr):
+class ReducedVehicle(ReducedSystem):
     """A vehicle whose reduced equations are linear in features, see `features`.
 
     Attributes
@@ -86,7 +86,7 @@ class ReducedVehicle(ShortRepr):
     encoding: np.ndarray
     feedthrough: np.ndarray
     error_scale: np.ndarray
-    offline: Offline = NO_COST
+    offline: OfflineCost = NO_COST
     solver: str = "dopri5"
     tolerance: float = 1e-6
     transient: Transient = NO_TRANSIENT
@@ -115,7 +115,7 @@ class ReducedVehicle(ShortRepr):
             require(known == (2 * lifted.lateral, modes, n), "lasted")
 
     @property
-    def effective_rank(self) -> int:
+    def order(self) -> int:
         """Number of integrated states, heading and place included."""
         return self.features.states + PLANAR
 
@@ -131,41 +131,42 @@ class ReducedVehicle(ShortRepr):
         return float(np.linalg.eigvals(jacobian).real.max())
 
     @cached_property
-    def equations(self) -> ReducedSystem:
-        """The compiled equations with the ways there and back."""
-        x, y, heading = self.model.definition.planar
+    def system(self) -> System:
+        """The compiled equations."""
         arrays = self.parameters, self.coefficients, self.error_scale
-        system = feature_system(self.features, *arrays, np.zeros(self.features.states))
-        return ReducedSystem(
-            self.model,
-            system,
-            whole_space(self.effective_rank),
-            self.effective_rank,
-            self.offline,
-            self.solver,
-            self.tolerance,
-            self.encoded,
-            self._lifted,
-            self._judged,
-            slopes=self.lift.slopes,
-            names=(*(f"z{i}" for i in range(self.features.states)), heading, x, y),
-        )
+        return feature_system(self.features, *arrays, np.zeros(self.features.states))
 
     @property
-    def state_space(self) -> ReducedSystem:
-        """The reduced equations: a state tells nothing of what has decayed after the start."""
-        return self.equations
+    def spaces(self) -> ProjectionWindows:
+        """The whole space of the reduced states."""
+        return whole_space(self.order)
 
-    def _lifted(self, run: Run, inputs: np.ndarray) -> np.ndarray:
-        return self.lift.states(run.times, run.path, inputs, NOTHING_EXCITED)[0]
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the reduced states: they tell nothing of what has decayed after the start."""
+        x, y, heading = self.model.definition.planar
+        return (*(f"z{i}" for i in range(self.features.states)), heading, x, y)
 
-    def _judged(self, run: Run, inputs: np.ndarray) -> Trust | None:
+    def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Full states (samples, 2 n) of reduced ones."""
+        return self._decoded(states, inputs)[:, : 2 * len(self.model.coordinates)]
+
+    def _decoded(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        return self.lift.states(np.zeros(len(states)), states, inputs, NOTHING_EXCITED)[0]
+
+    def decoder_slopes(
+        self, state: np.ndarray, inputs: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the full state by the reduced one and by the inputs."""
+        return self.lift.slopes(state, inputs)
+
+    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
         """Of states one by one: they tell neither how long a run has lasted nor of its start."""
-        watched = self.lift.features.watched
-        used = self._lifted(run, inputs)[:, self.lift.layout.size :]
-        return trust_of(run.times, used, [name for _, name in watched]) if watched else None
+        names = [name for _, name in self.lift.features.watched]
+        used = self._decoded(states, inputs)[:, self.lift.layout.size :]
+        return trust_of(np.zeros(len(states)), used, names) if names else None
 
-    def encoded(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    def encode(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
         return self.encoded_path(state[None], inputs[None])[0]
 
@@ -187,7 +188,9 @@ class ReducedVehicle(ShortRepr):
         self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None
     ) -> np.ndarray | None:
         """Reduced states (samples, states + 3), if the run comes to its end."""
-        run = self.equations.run(maneuver, start, times)
+        maneuver = checked_maneuver(maneuver, self.model.definition)
+        state = self.encode(self.model.start(start), recorded_inputs(maneuver)[1][0])
+        run = self.run(maneuver, state, times)
         return None if run.failure or not np.isfinite(run.path).all() else run.path
 
     def simulate(
@@ -196,7 +199,7 @@ class ReducedVehicle(ShortRepr):
         """Integrate the reduced equations, then lift to states at the maneuver's output times."""
         maneuver, inputs, driven = self._driven(maneuver)
         known = self.known(start, inputs[0])
-        run = self.equations.run(maneuver, start, direct_until=known.until)
+        run = self.run(maneuver, known.encoded, direct_until=known.until)
         states, trust = self.lift.of_run(run, inputs, known.excited, (*known.told, *driven))
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
@@ -227,25 +230,13 @@ class ReducedVehicle(ShortRepr):
         lifted, _ = self.lift.states(np.zeros(len(path)), path, inputs, excited)
         return self.shape.of(states) - self.shape.of(lifted[:, : states.shape[1]])
 
-    def known(self, start: Start, inputs: np.ndarray) -> KnownStart:
-        """A start with what it excites, at inputs; kept by its name or its numbers."""
-        name = start if isinstance(start, str) else self.model.start(start).tobytes()
-        key = name, inputs.tobytes()
-        found = self._starts.get(key)
-        if found is None:
-            state = self.model.start(start)
-            excited = self.excited(state)
-            unlike = self.reach.unlike(self.remainder(state[None], inputs[None], excited)[0])
-            if len(self._starts) >= MOST_STARTS:
-                self._starts.clear()
-            told = self.reach.settled(excited), unlike, 1.0
-            found = self._starts[key] = KnownStart(state, excited, decayed(excited), told)
-        return found
+    def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
+        """Reduced state of a start."""
+        return self.known(start, inputs).encoded.copy()
 
-    @cached_property
-    def _starts(self) -> dict[tuple[str | bytes, bytes], KnownStart]:
-        return {}
-
-    def best_approximation(self, states: np.ndarray) -> None:  # noqa: ARG002
-        """Lifted shapes lie on no subspace."""
-        return
+    def prepared(self, state: np.ndarray, inputs: np.ndarray) -> KnownStart:
+        """A start with what it excites, at inputs."""
+        excited = self.excited(state)
+        unlike = self.reach.unlike(self.remainder(state[None], inputs[None], excited)[0])
+        told, encoded = (self.reach.settled(excited), unlike, 1.0), self.encode(state, inputs)
+        return KnownStart(state, encoded, excited, decayed(excited), told)

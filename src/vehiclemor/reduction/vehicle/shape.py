@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.multibody.quantities import WHEELS
-from vehiclemor.reduction.interface import Offline, offline_cost
+from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.vehicle.features import Layout
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
@@ -183,6 +183,6 @@ def shape_samples(shape: VehicleShape, runs: Sequence[Trajectory]) -> ShapeSampl
     return ShapeSamples(inputs, shapes - shape.reference, *shape.motion(shapes, inputs))
 
 
-def linearisation_cost(shape: VehicleShape, began: float) -> Offline:
+def linearisation_cost(shape: VehicleShape, began: float) -> OfflineCost:
     """Seconds since `began`; two evaluations for every state and input."""
     return offline_cost(began, shape.model, further=2 * sum(shape.linearised.b.shape))

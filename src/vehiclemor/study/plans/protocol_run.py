@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.errors import FileError, InputError
+from vehiclemor.provenance import layout_digest
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
@@ -37,7 +38,6 @@ from vehiclemor.study.plans.protocol import (
 )
 from vehiclemor.study.plans.results import judged_set, protocol_dataset
 from vehiclemor.study.plans.study_file import DRAWN, StudyFile
-from vehiclemor.study.provenance import layout_digest
 from vehiclemor.study.store import cell_path, combined_path, stored
 from vehiclemor.study.workers import Engine, Workers
 

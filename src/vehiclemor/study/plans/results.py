@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.parameters import AXES, parameter_and_axis
+from vehiclemor.provenance import attributes, layout_digest, versions
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.choice import Row
 from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.plans.protocol import Protocol
 from vehiclemor.study.plans.study_file import PARAMETER, StudyFile
-from vehiclemor.study.provenance import attributes, layout_digest, versions
 from vehiclemor.study.result import meaning_of, variables
 from vehiclemor.study.store import read_cell
 

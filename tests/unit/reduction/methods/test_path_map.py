@@ -99,7 +99,7 @@ def test_an_input_that_rests_costs_nothing(model, nominal, both):
     steered = travelling(lambda t: (np.full(len(t), -0.05), 0.04 * np.sin(t)), nominal)
     for maneuver in (nominal, aside, steered):
         reduced = mapped(model, maneuver, cells=4, degree=5)
-        assert reduced.effective_rank == 1
+        assert reduced.order == 1
         assert reduced.cells.coefficients.shape[:2] == (4, 6)
         assert largest_error(model, reduced, maneuver) < 1e-6
     assert mapped(model, both, cells=4, degree=5).cells.coefficients.shape[:2] == (16, 21)

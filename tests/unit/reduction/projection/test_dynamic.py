@@ -12,7 +12,6 @@ from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, _weight
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
-from vehiclemor.simulation import linearisation
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.workspaces import Solver
@@ -152,8 +151,8 @@ def test_weighted_basis_spans_what_pymor_finds(model):
 def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
     reduced = fitted(model)
     whole = in_windows(STATE, [0.0, 25.0])
-    jacobian = linearisation.reduced_jacobian(model, whole, 0, model.start())
-    expected = np.linalg.eigvals(linearisation.jacobian(model, model.start(), [0.0]))
+    jacobian = replace(reduced, spaces=whole).reduced_jacobian(0, model.start())
+    expected = np.linalg.eigvals(model.system.jacobian(model.start(), np.zeros(1)))
     found = np.linalg.eigvals(jacobian)
     fast = expected.real < -1.0
     assert np.sort(found.real)[: fast.sum()] == pytest.approx(

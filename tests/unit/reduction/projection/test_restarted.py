@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.reduction.interface import Offline
-from vehiclemor.reduction.projection.dynamic import RestartedProjection
+from vehiclemor.reduction.interface import OfflineCost
+from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.registry import component
 from vehiclemor.simulation.projection_windows import ProjectionWindows
 
@@ -42,10 +42,8 @@ def test_with_all_directions_it_is_the_full_model(car, maneuver):
     ranks, edges = np.full(windows, states), np.linspace(0.0, 4.0, windows + 1)
     spaces = ProjectionWindows("state", edges, means, eye, eye, ranks)
     full = car.simulate(maneuver)
-    for moved in (True, False):
-        reduced = RestartedProjection(
-            car, car.system, spaces, states, Offline(), "dopri5", 1e-9, moved=moved
-        )
+    for restart in ("full_model", "projected"):
+        reduced = DynamicProjection(car, spaces, OfflineCost(), "dopri5", 1e-9, restart=restart)
         run = reduced.simulate(maneuver, "equilibrium")
         np.testing.assert_allclose(run.states, full.states, rtol=1e-6, atol=1e-6)
         assert run.counts["rhs_calls"] > full.counts["rhs_calls"]
@@ -78,9 +76,13 @@ def test_steps_begin_at_the_state_that_they_are_given(car, maneuver):
 
 
 @pytest.mark.parametrize("formulation", ["coordinates", "state"])
-def test_its_jacobian_is_that_of_its_rates(car, maneuver, formulation):
+def test_its_rates_are_those_of_its_steps_and_its_jacobian_theirs(car, maneuver, formulation):
     rom = vm.reduce(car, "pod", restart="full_model", formulation=formulation)
     x, u, t = car.simulate(maneuver).states[90], maneuver.at(np.array([1.8]))[0], 1.8
+    # What comes after a step lies in the subspace.
+    y, dt = rom.step(x, u, 1e-3, t), 1e-5
+    slopes = (rom.step(y, u, dt, t) - y) / dt
+    np.testing.assert_allclose(rom.rhs(y, u, t), slopes, rtol=1e-3, atol=1e-2)
     found, columns = rom.jacobian(x, u, time=t), []
     for step in 1e-6 * np.maximum(np.abs(x), 1.0) * np.eye(len(x)):
         sides = rom.rhs(x + step, u, t) - rom.rhs(x - step, u, t)

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 import vehiclemor as vm
 from vehiclemor.errors import InputError
-from vehiclemor.online import batches
 from vehiclemor.registry import component
+from vehiclemor.simulation import batches
 from vehiclemor.simulation.trajectory import FINISHED
 
 CAR, MECHANISM = "independent_suspension_vehicle", "double_wishbone"

@@ -17,15 +17,15 @@ import reduced_models
 import xarray as xr
 
 import vehiclemor as vm
+from vehiclemor import netcdf_file
 from vehiclemor.codegen.kernels import Kernels, kernel_sources
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.online import parts
-from vehiclemor.online.parts import Reader, Writer
-from vehiclemor.online.rom import shipped_folder
+from vehiclemor.netcdf_file import write_dataset
+from vehiclemor.reduction import parts
+from vehiclemor.reduction.parts import Reader, Writer
+from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.build import build
-from vehiclemor.study import netcdf_file
-from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.protocol import protocol_names
 from vehiclemor.study.scenario import start_of
 
@@ -118,7 +118,7 @@ def refusal(path):
 def refused_untouched(path):
     """Why a file is refused of which nothing is compiled, run or left in its folder."""
     before = [*path.parent.iterdir()]
-    places = "codegen.kernels.fetched", "codegen.loops.fetched", "online.model_file.response"
+    places = "codegen.kernels.fetched", "codegen.loops.fetched", "reduction.model_file.response"
     with ExitStack() as stack:
         stack.enter_context(chdir(path.parent))
         mocks = [stack.enter_context(mock.patch(f"vehiclemor.{place}")) for place in places]
@@ -246,8 +246,8 @@ def test_another_version_that_makes_the_same_of_it_is_not(car, saved, monkeypatc
     rewritten(saved, lambda dataset, _: dataset.attrs.update(vehiclemor="9.0"))
     np.testing.assert_array_equal(vm.load(saved).simulate().outputs, car.simulate().outputs)
     # What the same numbers are taken for has changed.
-    encoded = ReducedVehicle.encoded
-    monkeypatch.setattr(ReducedVehicle, "encoded", lambda *given: encoded(*given) + 0.01)
+    encode = ReducedVehicle.encode
+    monkeypatch.setattr(ReducedVehicle, "encode", lambda *given: encode(*given) + 0.01)
     assert "linear_single_track makes something else of these numbers" in refusal(saved)
 
 
@@ -276,12 +276,12 @@ ROOM = "vehiclemor.reduction"
 VECTOR = {"array": "reduced.error_scale", "type": "float64", "shape": [6], "turned": False}
 SHAPES = ([-1], [5, -1], [True, 6], [2, 3], [1, 6], [10**9], [6.0], 6, None, "6")
 # Types are checked whatever else a part says of itself.
-HIDDEN = {"model": "none", "class": f"{ROOM}.interface:Offline", "fields": {"seconds": "long"}}
+HIDDEN = {"model": "none", "class": f"{ROOM}.interface:OfflineCost", "fields": {"seconds": "long"}}
 NAN = {"tuple": [{"tuple": [{"tuple": [math.nan]}, {"tuple": [1]}]}]}
 KERNEL = {"kernels": "def derivative(_x, _result):\n    _result[9] = _x[9]\n"}
 # Of the bicycle: place -> what is no part that may stand there.
 PARTS = [
-    *(("known", None), ("known", {"tuple": [1.0]}), ("known", {"same": "reduced.offline"})),
+    *(("input_range", wrong) for wrong in (None, {"tuple": [1.0]}, {"same": "reduced.offline"})),
     *(("class", f"{ROOM}.vehicle.features:monomials"), ("fields", {}), ("offline", HIDDEN)),
     *(("offline", {"function": f"{ROOM}.trust:trust_of"}), ("offline", {"code": HARM})),
     *(("offline", KERNEL), ("offline", {"method": "encoded", "of": {"same": "reduced"}})),
@@ -300,14 +300,14 @@ PARTS = [
 
 @pytest.mark.parametrize(("place", "value"), PARTS)
 def test_parts_that_would_do_harm_are_refused(saved, place, value):
-    whole = place if place == "known" else f"reduced.{place}"
+    whole = place if place == "input_range" else f"reduced.{place}"
     refused_untouched(rewritten(saved, replaced({whole: value})))
 
 
 NAMES = [
     *("os:system", "builtins:eval", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
     *("vehiclemor.simulation.dynamic:DynamicModel", "vehiclemor.simulation.build:build"),
-    *("vehiclemor.simulation.system:System", f"{ROOM}.reduced_system:KinematicStates"),
+    *("vehiclemor.simulation.system:System", f"{ROOM}.reduced_system:ReducedMechanism"),
     *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.blocks", "PLANAR")),
     # Defined elsewhere.
     f"{ROOM}.vehicle.reduced_vehicle:Features",
@@ -320,7 +320,7 @@ def test_names_of_other_things_are_refused(name):
         parts.named(name)
 
 
-OFFLINE = {"class": f"{ROOM}.interface:Offline", "fields": {}}
+OFFLINE = {"class": f"{ROOM}.interface:OfflineCost", "fields": {}}
 # File, word of the check that sees it, changes of the array a that reach beyond other parts.
 SIZES = """
 bicycle states features.states=0 features.states=101 features.inputs=-1 features.inputs=101
@@ -331,7 +331,8 @@ bicycle groups features.groups=g([0],[1,1]) features.groups=g([0],[6]) features.
 bicycle groups features.groups=g([0],[]) features.groups=g(*[[0]]*14)
 bicycle parameters parameters=a[:-1] parameters=a.astype(int) parameters=a[None]
 bicycle modes transient.rates=ones(22)|transient.left=ones([22,21])|transient.right=ones([22,21])
-bicycle largest known.largest=a[:-1] known.largest=a[:,:0] known.largest=a.astype(int)
+bicycle largest input_range.largest=a[:-1] input_range.largest=a[:,:0]
+bicycle largest input_range.largest=a.astype(int)
 car lateral features.lateral=4
 car features lifted_features.states=10 lifted_features.inputs=2
 car coefficients coefficients=a[:-1] coefficients=a[:,:-1] coefficients=a.astype(int)
@@ -350,17 +351,15 @@ map ranges ranges=a[:-1] ranges=nan*a
 map moving moving.tuple=[0,2] moving.tuple=[0,-1] moving.tuple=[1,1]
 map degree degree=21 degree=-1 moving.tuple=[]|cells.coefficients=a[:,:1]
 map columns columns.tuple=a[:-1] columns.tuple=[*a[:-1],-1] columns.tuple=[*a[:-1],14]
-map cells cells.centres=a[:1] cells.scales=a[:1] cells.halves=a[:1] cells.tops=a[:1]
+map cells cells.centres=a[:1] cells.scales=a[:1]
 map cells cells.centres=nan*a cells.scales=nan*a
 map cells cells.coefficients=a[:-1] cells.coefficients=a.astype(int)
 map coefficients cells.coefficients=a[:,:-1] cells.coefficients=a[:,:,:-1]
-map tops cells.tops=a+1.0
-map halves cells.halves=a+1.0
 map numbers cells.numbers=-a cells.numbers=1.0*a
 pod spaces spaces.edges=a[:-1] spaces.means=a[:-1] spaces.means=a[:,:-1]
 pod spaces spaces.test_basis=a[:-1] spaces.test_basis=a[:,:,:-1] spaces.trial_basis=a[:-1]
-pod formulation spaces.formulation="other"
-pod ranks spaces.formulation="full" spaces.ranks=a+99 spaces.ranks=-a spaces.ranks=1.0*a
+pod formulation spaces.formulation="other" spaces.formulation="full"
+pod ranks spaces.ranks=a+99 spaces.ranks=-a spaces.ranks=1.0*a
 windows edges edges=a[:-1]
 windows basis bases.0.mean=a[:-1] bases.0.mean=a.astype(int)
 windows bases bases.1.mean=a[:-1]|bases.1.vectors=a[:-1]
@@ -372,7 +371,7 @@ replay outputs recorded.0.outputs=a[:,:-1]
 ROWS = [row.split() for row in SIZES.strip().splitlines()]
 CASES = [(file, word, change) for file, word, *row in ROWS for change in row]
 # At several places.
-BOXES = ("centres=a[:1]", "scales=a[:1]", "halves=a[:1]", "tops=a[:1]", "numbers=a[:1]")
+BOXES = ("centres=a[:1]", "scales=a[:1]", "numbers=a[:1]")
 BASES, NO_BASES = (
     ("means=a[{}]", "trial_basis=a[{}]", "test_basis=a[{}]"),
     ("ranks=a[:0]", "edges=a[:1]"),
@@ -394,8 +393,9 @@ def changed(text):
     names = vars(np) | {"g": grouped, "OFFLINE": OFFLINE}
     pairs = [pair.split("=") for pair in text.split("|")]
     return {
-        place if place.startswith("known") else f"reduced.{place}": eval(f"lambda a: {way}", names)  # noqa: S307
-        for place, way in pairs
+        place if place.startswith("input_range") else f"reduced.{place}": way
+        for place, expression in pairs
+        for way in [eval(f"lambda a: {expression}", names)]  # noqa: S307 - own texts
     }
 
 

@@ -95,6 +95,14 @@ def test_a_step_is_a_function_of_its_arguments_alone(linear):
     np.testing.assert_array_equal(found[::-1], known)
 
 
+def test_a_state_is_that_of_its_inputs():
+    # What a prescribed rack moves at once is no part of the slow modes.
+    rom = vm.reduce("high_fidelity_vehicle", "modal_truncation", training="nominal")
+    first, other, again = (rom.state("equilibrium", [s, 0.0, 0.0]) for s in (0.0, 0.01, 0.0))
+    np.testing.assert_array_equal(again, first)
+    assert np.abs(other - first).max() > 1e-3
+
+
 def test_a_loop_may_go_on_for_ever(linear):
     state, u = linear.state(), np.zeros(1)
     for _ in range(MOST_CALLS // 3):
@@ -217,6 +225,12 @@ def test_methods_without_a_state_say_so(wishbone):
         replay.state()
     with pytest.raises(InputError, match="kinematic: its equations have no rates"):
         wishbone.rhs(wishbone.state(), [0.0, 0.0])
+
+
+def test_derivatives_that_a_reduced_model_does_not_know_are_refused(full, linear):
+    assert full.jacobian(full.state(), [0.0], "sprung_mass").shape == (len(full.states), 1)
+    with pytest.raises(InputError, match="sprung_mass"):
+        linear.jacobian(linear.state(), [0.0], "sprung_mass")
 
 
 def test_a_step_that_fails_says_when(full):

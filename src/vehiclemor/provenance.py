@@ -8,7 +8,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from vehiclemor.codegen.sources import plug_in_digest, source_digest
-from vehiclemor.reduction.interface import Method
 from vehiclemor.registry import component, names
 
 PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4")
@@ -18,9 +17,8 @@ FILES = (
     "parameters.py",
     "metrics.py",
     "study/scenario.py",
-    "study/input_range.py",
     "study/experiment.py",
-    "study/failure.py",
+    "failure.py",
     "study/evaluate.py",
     "study/result.py",
 )
@@ -80,7 +78,7 @@ def code_digest(model: str, method: str, settings: Mapping[str, object]) -> str:
     those that its settings name too.  Results computed by other source are never taken for finished
     ones.
     """
-    used: list[Method] = [component("method", method)]
+    used = [component("method", method)]
     if used[0].fits_others:
         named = sorted({*names("method")} & {v for v in settings.values() if isinstance(v, str)})
         used += [component("method", name) for name in named]

@@ -27,7 +27,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.sizes import require
 
 # Where the classes are that may be parts of reduced models.
-ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.", "vehiclemor.study.input_range")
+ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.")
 # Parts that a model may have, each counted wherever it is meant: those of this package have 20,000.
 MOST_PARTS = 500_000
 # Types of arrays, and as what they are stored.

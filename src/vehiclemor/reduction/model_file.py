@@ -18,26 +18,24 @@ import numpy as np
 
 from vehiclemor.arguments import file_path, quoted
 from vehiclemor.errors import FileError, InputError, VehiclemorError, one_line
-from vehiclemor.online.parts import Reader, Writer
+from vehiclemor.netcdf_file import INTEGRITY, opened, write_dataset
+from vehiclemor.provenance import attributes, code_digest
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.validation import checked_fit, checked_settings
+from vehiclemor.reduction.parts import Reader, Writer
+from vehiclemor.reduction.trust import InputRange
+from vehiclemor.reduction.validation import checked_fit, checked_settings, validated
 from vehiclemor.registry import component
 from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.sizes import require
-from vehiclemor.study.experiment import for_method
-from vehiclemor.study.input_range import InputRange
-from vehiclemor.study.netcdf_file import INTEGRITY, opened, write_dataset
-from vehiclemor.study.provenance import attributes, code_digest
-from vehiclemor.study.scenario import parameters_of
 
 # Of the layout of these files.
-SCHEMA = 3
+SCHEMA = 4
 # Texts beside the arrays.
 TEXTS = ("parts", "settings", "training", "parameters")
 # What is taken apart.
-PARTS = ("reduced", "known")
+PARTS = ("reduced", "input_range")
 # Bytes of all variables of a file, and characters of a text: the largest of this package's methods
 # have 3 MB and 0.3 million.
 MOST_BYTES, MOST_CHARACTERS = 1 << 28, 2_000_000
@@ -62,7 +60,7 @@ def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
         raise InputError(f"{rom.method} of {model.name}: {error}") from None
     if sum(array.nbytes for array in writer.arrays.values()) > MOST_BYTES:
         raise InputError(f"{rom.method} of {model.name}: more than {MOST_BYTES} bytes to save")
-    texts = parts, dict(rom.settings), list(state["training"]), parameters_of(model)
+    texts = parts, dict(rom.settings), list(state["training"]), _parameters(model)
     variables: dict[str, Any] = {
         name: ((), json.dumps(text)) for name, text in zip(TEXTS, texts, strict=True)
     }
@@ -93,16 +91,17 @@ def read(path: Any) -> dict[str, Any]:
         parts, settings, training, parameters = (_parsed(stored.pop(key)) for key in TEXTS)
         model = _model(name, parameters)
         reduces: Method = component("method", method)
-        checked_settings(reduces, model, for_method(model, method, settings))
+        checked_settings(reduces, model, validated(reduces, model.kind, settings))
         if not _alike(stored.pop("fingerprint"), fingerprint(model)):
             raise FileError(f"the equations of {name} have changed since")
         reader = Reader(model, stored)
         made = {name: reader.value(parts[name], name) for name in PARTS}
         checked_fit(method, made["reduced"])
-        if not isinstance(made["known"], InputRange):
-            raise TypeError(f"known is {quoted(made['known'])}, no InputRange")
+        known = made["input_range"]
+        if not isinstance(known, InputRange):
+            raise TypeError(f"input_range is {quoted(known)}, no InputRange")
         kinds = 1 if model.kind == "ae" else 3
-        require(made["known"].largest.shape == (kinds, len(model.inputs)), "largest")
+        require(known.largest.shape == (kinds, len(model.inputs)), "largest")
         if not _alike(stored["response"], response(model, made["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")
         own = {"model": model, "method": method, "settings": settings, "training": tuple(training)}
@@ -133,12 +132,12 @@ def response(model: Model, reduced: Any) -> np.ndarray:
 
     Equal for equal models, whatever version of this package has made them.
     """
-    if not hasattr(reduced, "state_space"):
+    if not hasattr(reduced, "states"):
         return np.empty(0)
-    space, u = reduced.state_space, 1e-3 * np.cos(np.arange(len(model.inputs)))
+    u = 1e-3 * np.cos(np.arange(len(model.inputs)))
     try:
-        state = space.step(space.begin(model.starts[0], u), u, None, STEP, 0.0)
-        return np.concatenate([state, space.full_states(state[None], u[None])[0]])
+        state = reduced.step(reduced.begin(model.starts[0], u), u, STEP)
+        return np.concatenate([state, reduced.decode(state[None], u[None])[0]])
     except VehiclemorError:
         return np.empty(0)
 
@@ -148,10 +147,14 @@ def _alike(then: np.ndarray, now: np.ndarray) -> bool:
     return then.shape == now.shape and np.allclose(then, now, SAME, rounding)
 
 
+def _parameters(model: Model) -> dict[str, Any]:
+    return {name: entry.value for name, entry in model.parameters.entries.items()}
+
+
 def _model(name: str, parameters: Mapping[str, Any]) -> Model:
     """The model with these parameters; those that are its file's own keep their sources."""
     model = build(name)
-    own = parameters_of(model)
+    own = _parameters(model)
     changed = {key: value for key, value in parameters.items() if own.get(key) != value}
     return build(name, overrides=changed) if changed else model
 

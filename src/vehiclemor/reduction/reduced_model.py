@@ -13,9 +13,12 @@ import numpy as np
 from vehiclemor.arguments import number
 from vehiclemor.errors import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.online import model_file
-from vehiclemor.reduction.interface import Method, ReducedModel, simulated
-from vehiclemor.reduction.reduced_system import StateSpace
+from vehiclemor.reduction import model_file
+from vehiclemor.reduction.interface import FittedModel, simulated
+from vehiclemor.reduction.settings import Value
+from vehiclemor.reduction.training import own_speed
+from vehiclemor.reduction.trust import InputRange
+from vehiclemor.reduction.validation import for_model, validated
 from vehiclemor.registry import choice, component
 from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import ShortRepr
@@ -23,10 +26,6 @@ from vehiclemor.simulation.checks import check_positive, checked_array, checked_
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
 from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, output_names
-from vehiclemor.study.experiment import Settings
-from vehiclemor.study.input_range import InputRange, input_range
-from vehiclemor.study.plans.training import Given, training_set
-from vehiclemor.study.scenario import Scenario
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,35 +40,34 @@ class ReducedOrderModel(ShortRepr):
     model, method, settings
         The full model, the registered name of the method and all of its settings.
     training
-        What it has been trained on; of a loaded model the content of each scenario.
+        Scenarios that it has been trained on; of a loaded model the content of each.
     reduced
         What the method's fit gave.
-    known
-        Range of the inputs of its training, where the runs themselves are not at hand.
+    input_range
+        Range of the inputs of its training, in which a run is known whose model has no ranges of
+        its own; none where it has learnt from nothing.
     """
 
     repr_fields = ("model", "method", "settings", "states", "inputs", "output_names")
 
     model: Model
     method: str
-    settings: Settings
-    training: tuple[Scenario | Mapping[str, Any], ...]
-    reduced: ReducedModel
-    known: InputRange | None = None
-
-    @cached_property
-    def state_space(self) -> StateSpace:
-        """The state and its steps; `InputError` if the method gives none."""
-        found = getattr(self.reduced, "state_space", None)
-        if found is None:
-            raise InputError(f"{self.method} has no state: it gives whole runs alone")
-        return found
+    settings: Mapping[str, Value]
+    training: tuple[Any, ...]
+    reduced: FittedModel
+    input_range: InputRange | None = None
 
     @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the states; empty for a method that gives whole runs alone."""
-        found = getattr(self.reduced, "state_space", None)
-        return () if found is None else tuple(found.states)
+        return tuple(getattr(self.reduced, "states", ()))
+
+    @cached_property
+    def _stepped(self) -> Any:
+        """What fit gave, as a function of states; `InputError` if it is none."""
+        if not self.states:
+            raise InputError(f"{self.method} has no state: it gives whole runs alone")
+        return self.reduced
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -112,11 +110,9 @@ class ReducedOrderModel(ShortRepr):
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
             run = simulated(self.reduced, chosen, begun, names)
-        run = run if times is None else run.chosen(times=times)
-        if run.trust or self._range is None:
-            return run
-        own = begun if isinstance(begun, str) else tuple(self.model.start(begun).tolist())
-        return run.judged(self._range.trust(self.model, Scenario(chosen, own)))
+        if not run.trust and self._range is not None:
+            run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
+        return run if times is None else run.chosen(times=times)
 
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The model with other parameters, reduced by a method that learns from no run.
@@ -131,26 +127,16 @@ class ReducedOrderModel(ShortRepr):
         VehiclemorError
             If a parameter is wrong, the model can't stand, or the method is trained on runs.
         """
-        from vehiclemor.reduction.validation import for_model
         from vehiclemor.simulation.build import reparametrised
-        from vehiclemor.study.experiment import for_method
 
         model, method = reparametrised(self.model, parameters), component("method", self.method)
-        settings = for_method(self.model, self.method, self.settings)
-        reduced = for_model(method, self.reduced, model, settings)
-        return replace(self, model=model, reduced=reduced, known=self.input_range)
+        settings = validated(method, self.model.kind, self.settings)
+        return replace(self, model=model, reduced=for_model(method, self.reduced, model, settings))
 
     @cached_property
     def _range(self) -> InputRange | None:
-        """Inputs of the training, if the model does not judge itself."""
+        """Inputs of the training, if the method has no ranges of its own."""
         return None if component("method", self.method).own_limits else self.input_range
-
-    @cached_property
-    def input_range(self) -> InputRange:
-        """Range of the inputs of the training."""
-        runs = tuple(run for run in self.training if isinstance(run, Scenario))
-        method: Method = component("method", self.method)
-        return self.known or input_range(self.model, runs, method.follows_time)
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""
@@ -172,7 +158,7 @@ class ReducedOrderModel(ShortRepr):
         """
         chosen = self.model.starts[0] if start is None else start
         u = np.zeros(len(self.inputs)) if inputs is None else self._inputs(inputs)
-        return self.state_space.begin(chosen, u)
+        return self._stepped.begin(chosen, u)
 
     def step(
         self, state: Any, inputs: Any, dt: float, time: float = 0.0, next_inputs: Any = None
@@ -202,11 +188,11 @@ class ReducedOrderModel(ShortRepr):
         check_positive("dt", dt, SHORTEST)
         number("time", time)
         ends = None if next_inputs is None else self._inputs(next_inputs, "next_inputs")
-        return self.state_space.step(self._state(state), self._inputs(inputs), ends, dt, time)
+        return self._stepped.step(self._state(state), self._inputs(inputs), dt, time, ends)
 
     def rhs(self, state: Any, inputs: Any, time: float = 0.0) -> np.ndarray:
         """Time derivative (dim,) of a state; `InputError` if it isn't finite."""
-        rates = self.state_space.rates(self._state(state), self._inputs(inputs), time)
+        rates = self._stepped.rates(self._state(state), self._inputs(inputs), time)
         if not np.isfinite(rates).all():
             raise InputError(f"the derivative of {self._name} is not finite at this state")
         return rates
@@ -237,18 +223,18 @@ class ReducedOrderModel(ShortRepr):
             If an argument is wrong, or the model has no such derivatives.
         """
         u = self._inputs(inputs)
-        return self.state_space.derivatives(self._state(state), u, time, with_respect_to, of)
+        return self._stepped.derivatives(self._state(state), u, time, with_respect_to, of)
 
     def full_state(self, state: Any, inputs: Any) -> np.ndarray:
         """State (n,) of the full model, or states (samples, n) of as many."""
         states, u, single = self._samples(state, inputs)
-        found = self.state_space.full_states(states, u)
+        found = self._stepped.decode(states, u)
         return found[0] if single else found
 
     def outputs(self, state: Any, inputs: Any) -> np.ndarray:
         """Outputs (outputs,) at a state, or (samples, outputs) along states (samples, dim)."""
         states, u, single = self._samples(state, inputs)
-        full = self.state_space.full_states(states, u)
+        full = self._stepped.decode(states, u)
         if not single:
             return self.model.along("outputs", full, u)
         found = np.empty(len(self.model.outputs))
@@ -258,12 +244,12 @@ class ReducedOrderModel(ShortRepr):
     def trust(self, state: Any, inputs: Any) -> Trust:
         """How far a state, or states (samples, dim), go in what the model knows.
 
-        A model that does not judge itself knows the inputs that it was trained on, and the full
+        A model without ranges of its own knows the inputs that it was trained on, and the full
         one the ranges of validity of inputs and outputs that it declares.  Where a run came from is
         not in a state.
         """
         states, u, _ = self._samples(state, inputs)
-        found = self.state_space.trust(states, u)
+        found = self._stepped.trust(states, u)
         if found is None and self._range is not None:
             found = self._range.trust_of_inputs(self.inputs, u)
         left = self._left_validity(states, u)
@@ -298,8 +284,8 @@ class ReducedOrderModel(ShortRepr):
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy takes along: of the training what a file keeps, a maneuver may be local."""
-        training = tuple(run.content if isinstance(run, Scenario) else run for run in self.training)
-        return super().__getstate__() | {"training": training, "known": self.input_range}
+        training = tuple(getattr(scenario, "content", scenario) for scenario in self.training)
+        return super().__getstate__() | {"training": training}
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""
@@ -318,59 +304,11 @@ class ReducedOrderModel(ShortRepr):
 
     @cached_property
     def _dim(self) -> int:
-        return len(self.state_space.states)
+        return len(self._stepped.states)
 
     @cached_property
     def _name(self) -> str:
         return f"{self.model.name} by {self.method}"
-
-
-def reduce(
-    model: str | Model,
-    method: str,
-    *,
-    training: Given | None = None,
-    preset: str = "recommended",
-    **settings: object,
-) -> ReducedOrderModel:
-    """Reduce a model: fit a method to training runs of the full model.
-
-    Parameters
-    ----------
-    model
-        Registered name, or a model made by `model()`.
-    method
-        Registered name, see `methods()`; `full_order` gives the full model with the same names.
-    training
-        `nominal`: the model's own maneuver from its first start.  `protocol`: the training set of
-        the model's own protocol, which is the default of the methods that compete there.  Or the
-        name of a maneuver, a maneuver, a signal, a scenario, or a list of these.
-    preset, **settings
-        Of the method; see `describe()`.
-
-    Raises
-    ------
-    VehiclemorError
-        If a name or value is wrong, or the method can't reduce the model.
-    """
-    from vehiclemor.progress import first_use
-    from vehiclemor.reduction.validation import checked_settings, fitted, validated
-    from vehiclemor.simulation.build import build
-    from vehiclemor.study.evaluate import one_thread
-    from vehiclemor.study.scenario import training_run
-
-    ready = model if isinstance(model, Model) else build(model)
-    definition: Method = component("method", method)
-    accepted, reason = definition.accepts(ready)
-    if not accepted:
-        raise InputError(reason)
-    complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
-    checked_settings(definition, ready, complete)
-    scenarios = training_set(ready, method, training)
-    with first_use(f"{ready.name} with {method}"), one_thread():
-        runs = [training_run(ready, scenario) for scenario in scenarios]
-        reduced = fitted(definition, ready, runs, complete)
-    return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, reduced)
 
 
 def load(path: Any) -> ReducedOrderModel:

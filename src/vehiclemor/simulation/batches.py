@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vehiclemor.arguments import MOST_JOBS, count, quoted, real_array
-from vehiclemor.errors import InputError, VehiclemorError
+from vehiclemor.errors import ConvergenceError, InputError, VehiclemorError
+from vehiclemor.failure import Failure, attempt
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.online.rom import ReducedOrderModel
 from vehiclemor.parameters import parameter_and_axis
-from vehiclemor.reduction.methods.full_order import FullOrderModel
+from vehiclemor.provenance import attributes
 from vehiclemor.registry import choice
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
-from vehiclemor.simulation.build import build
+from vehiclemor.simulation.build import build, reparametrised
 from vehiclemor.simulation.checks import checked_path
 from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.run_timer import CLOCK
-from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory
-from vehiclemor.study.evaluate import one_thread
-from vehiclemor.study.failure import Failure, attempt
-from vehiclemor.study.plans.training import training_set
-from vehiclemor.study.provenance import attributes
+from vehiclemor.simulation.run_timer import CLOCK, one_thread
+from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory, Trust
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,19 +38,19 @@ LARGEST = 4 << 30
 MOST_SETS = 32
 # Times (s) that differ by less are one.
 SAME_TIME = 1e-9
-# What is told of each run: its value before it is known, unit and meaning.
-TOLD: dict[str, tuple[str | float, str, str]] = {
-    "status": ("ok", "", f"one of {', '.join(STATUSES)}"),
-    "message": ("", "", "why the status is not ok"),
-    "remark": ("", "", "what else there is to know"),
-    "indicator": (np.nan, "1", "how far the run goes in what its model knows; 1 is the edge"),
-    "until": (np.inf, "s", "time at which the indicator has first passed 1"),
-    "seconds": (0.0, "s", "time spent in the compiled loop"),
+# What else there is of each run: unit and meaning.
+REPORTED = {
+    "status": ("", f"one of {', '.join(STATUSES)}"),
+    "message": ("", "why the status is not ok"),
+    "remark": ("", "what else there is to know"),
+    "indicator": ("1", "how far the run goes in what its model knows; 1 is the edge"),
+    "until": ("s", "time at which the indicator has first passed 1"),
+    "seconds": ("s", "time spent in the compiled loop"),
 }
 
 
 def simulate_many(
-    model: str | Model | ReducedOrderModel,
+    model: str | Model | Any,
     signals: Sequence[Maneuver],
     starts: Start | Sequence[Start] | None = None,
     parameters: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
@@ -69,7 +66,8 @@ def simulate_many(
     model
         Reduced or full model made by `reduce()`; or a full model, or its name, which is integrated
         as `Model.simulate` does by default, to be measured against: `reduce(model, "full_order",
-        solver="ros34pw2", tolerance=2e-3)` is far faster.
+        solver="ros34pw2", tolerance=2e-3)` is far faster.  Or whatever has a full `model` and a
+        function `simulate` of a maneuver and a start.
     signals
         A signal or maneuver for each run, see `many_signals`.  They have the same output times,
         unless `times` are given.
@@ -91,7 +89,7 @@ def simulate_many(
     -------
     xarray.Dataset
         `values` (run, time, output) and, by run, `status`, `message`, `remark`, `indicator` and
-        `until` (what a reduced model tells of itself), `seconds` and solver counts.  A run that has
+        `until` (of its trust), `seconds` and solver counts.  A run that has
         failed, or that the model refuses, tells so in its status, and is not a number from there
         on.
 
@@ -100,82 +98,57 @@ def simulate_many(
     InputError
         If an argument is wrong, or the result does not fit into memory.
     """
-    reduced = _model_behind(model)
-    full = reduced.model
-    runs = _count_of(signals, full)
-    chosen = _places(full, outputs)
+    given = build(model) if isinstance(model, str) else model
+    full = getattr(given, "model", given)
+    if not isinstance(full, Model):
+        raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
+    runs, columns = _count_of(signals, full), _columns(full, outputs)
     kept, rows = _kept_times(times, signals)
     begins = _starts_of(starts, runs, full)
-    sets = _parameter_sets(parameters, runs, reduced)
+    model_of = _models(given, full, parameters, runs)
     threads = _cores() if jobs is None else count("jobs", jobs, most=MOST_JOBS)
-    shape = runs, len(kept), len(chosen)
+    shape = runs, len(kept), len(columns)
     if 8 * math.prod(shape) > LARGEST:
         size = 8e-9 * math.prod(shape)
         raise InputError(f"the result would take {size:.1f} GB of memory: choose outputs=, times=")
-    values, counts = np.empty(shape), np.zeros((runs, len(full.counts)), dtype=np.int64)
-    told = {
-        name: np.full(runs, first, dtype=object if isinstance(first, str) else float)
-        for name, (first, _, _) in TOLD.items()
-    }
+    values = np.empty(shape)
 
-    @lru_cache(MOST_SETS)
-    def model_of(given: tuple) -> ReducedOrderModel | Failure:
-        try:
-            return reduced.for_parameters(dict(given))
-        except VehiclemorError as error:
-            return Failure("rejected", str(error))
-
-    def result(run: int) -> Trajectory | Failure:
-        car = reduced if sets is None else model_of(sets[run])
-        if isinstance(car, Failure):
-            return car
-        return attempt(lambda: car.simulate(signals[run], begins[run]))
-
-    def write(run: int, done: Trajectory | Failure) -> None:
-        told["status"][run], told["message"][run] = done.status, done.message
+    def report(run: int) -> tuple:
+        """What else there is of a run, whose values are written."""
+        done = attempt(lambda: _whole_run(model_of(run), signals[run], begins[run]))
         if isinstance(done, Failure):
-            values[run], told["until"][run] = np.nan, 0.0
-            return
-        for k, (_, group, number) in enumerate(chosen):
-            values[run, :, k] = getattr(done, group)[rows[run], number]
-        told["remark"][run], told["seconds"][run] = done.remark, done.seconds
-        counts[run] = list(done.counts.values())
-        if done.trust is not None:
-            told["indicator"][run], told["until"][run] = done.trust.indicator, done.trust.until
+            values[run] = np.nan
+            nothing = [0] * len(full.counts)
+            return done.status, done.message, "", np.nan, 0.0, 0.0, *nothing
+        for k, (_, group, column) in enumerate(columns):
+            values[run, :, k] = getattr(done, group)[rows[run], column]
+        trust = done.trust or Trust(np.nan)
+        own = done.status, done.message, done.remark, trust.indicator, trust.until, done.seconds
+        return *own, *done.counts.values()
 
-    def work(first: int) -> None:
-        for run in range(first, min(first + CHUNK, runs)):
-            write(run, result(run))
+    def reports(first: int) -> list[tuple]:
+        return [report(run) for run in range(first, min(first + CHUNK, runs))]
 
     with one_thread(), ThreadPoolExecutor(threads, "vehiclemor") as pool:
-        for _ in pool.map(work, range(0, runs, CHUNK)):
-            pass
-    about = attributes(
-        f"{runs} runs of {full.name}, {reduced.method}",
-        full.kernel_hash,
-        model=full.name,
-        method=reduced.method,
-        settings=repr(dict(reduced.settings)),
-    )
-    return _dataset(full, [name for name, *_ in chosen], kept, (values, told, counts)).assign_attrs(
-        about
+        found = list(itertools.chain(*pool.map(reports, range(0, runs, CHUNK))))
+    default = {"solver": "dopri5", "tolerance": REFERENCE_TOLERANCE}
+    if full.kind == "ae":
+        default = {"solver": "newton", "tolerance": NEWTON_TOLERANCE}
+    settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
+    title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}
+    return _dataset(full, [name for name, *_ in columns], kept, values, found).assign_attrs(
+        attributes(title, full.kernel_hash, **of, settings=repr(dict(settings)))
     )
 
 
-def _model_behind(model: Any) -> ReducedOrderModel:
-    """The model behind the names of a reduced one."""
-    if isinstance(model, ReducedOrderModel):
-        return model
-    full = build(model) if isinstance(model, str) else model
-    if not isinstance(full, Model):
-        raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
-    solver, tolerance = (
-        ("newton", NEWTON_TOLERANCE) if full.kind == "ae" else ("dopri5", REFERENCE_TOLERANCE)
-    )
-    settings = {"solver": solver, "tolerance": tolerance}
-    training = training_set(full, "full_order", "nominal")
-    fitted = FullOrderModel(full, **settings)
-    return ReducedOrderModel(full, "full_order", settings, training, fitted)
+def _whole_run(model: Any, signal: Maneuver, start: Start) -> Trajectory:
+    """A run, which may have diverged."""
+    try:
+        return model.simulate(signal, start)
+    except ConvergenceError as error:
+        if error.trajectory is None:
+            raise
+        return error.trajectory
 
 
 def _cores() -> int:
@@ -199,12 +172,12 @@ def _count_of(signals: Any, model: Model) -> int:
     return len(signals)
 
 
-def _places(model: Model, outputs: Any) -> list[tuple[str, str, int]]:
-    """Names of what is kept, and where a trajectory has it: its attribute, the number there."""
+def _columns(model: Model, outputs: Any) -> list[tuple[str, str, int]]:
+    """Names of what is kept, and where a trajectory has it: its attribute, the column there."""
     known = {
-        name: (name, group, number)
+        name: (name, group, column)
         for group in ("speeds", "coordinates", "outputs")
-        for number, name in enumerate(getattr(model, group))
+        for column, name in enumerate(getattr(model, group))
     }
     chosen = model.outputs if outputs is None else outputs
     chosen = (chosen,) if isinstance(chosen, str) else chosen
@@ -266,26 +239,40 @@ def _starts_of(starts: Any, runs: int, model: Model) -> Sequence[Start]:
     return [start if isinstance(start, str) else model.start(start) for start in starts]
 
 
-def _parameter_sets(
-    parameters: Any, runs: int, reduced: ReducedOrderModel
-) -> Sequence[tuple] | None:
-    """Parameters (name, value) of each run, none if all have the model's own."""
+def _models(given: Any, full: Model, parameters: Any, runs: int) -> Callable[[int], Any]:
+    """The model of each run, by its index; it raises `InputError` where there is none."""
     if parameters is None:
-        return None
-    # What is trained on runs says so.
-    reduced.for_parameters({})
-    model = reduced.model
+        return lambda _: given
+    remade = partial(reparametrised, full)
+    if given is not full:
+        remade = getattr(given, "for_parameters", None)
+        if remade is None:
+            raise InputError("parameters: this model can't be made with others")
+        # What is trained on runs says so.
+        remade({})
     if isinstance(parameters, Mapping):
-        columns = {name: _values(model, name, v, runs) for name, v in parameters.items()}
-        rows = zip(*columns.values(), strict=True)
-        return [tuple(zip(columns, values, strict=True)) for values in rows] or None
-    whole = isinstance(parameters, Sequence) and len(parameters) == runs
-    if not whole or not all(isinstance(own, Mapping) for own in parameters):
-        raise InputError(f"parameters is {quoted(parameters)}, not a mapping for each run")
-    return [
-        tuple((name, *_values(model, name, value)) for name, value in own.items())
-        for own in parameters
-    ]
+        columns = [
+            [(name, value) for value in _values(full, name, by_run, runs)]
+            for name, by_run in parameters.items()
+        ]
+        sets = [*zip(*columns, strict=True)] or [()] * runs
+    else:
+        whole = isinstance(parameters, Sequence) and len(parameters) == runs
+        if not whole or not all(isinstance(own, Mapping) for own in parameters):
+            raise InputError(f"parameters is {quoted(parameters)}, not a mapping for each run")
+        sets = [
+            tuple((name, *_values(full, name, value)) for name, value in own.items())
+            for own in parameters
+        ]
+
+    @lru_cache(MOST_SETS)
+    def made(own: tuple) -> Any:
+        try:
+            return remade(dict(own))
+        except VehiclemorError as error:
+            raise InputError(str(error)) from None
+
+    return lambda run: made(sets[run])
 
 
 def _values(model: Model, name: str, value: Any, runs: int | None = None) -> list[Any]:
@@ -306,23 +293,24 @@ def _values(model: Model, name: str, value: Any, runs: int | None = None) -> lis
     return [tuple(row) if own else row for row in rows]
 
 
-def _dataset(model: Model, names: list[str], times: np.ndarray, found: Any) -> xr.Dataset:
-    """Runs by labels: their values (run, time, output), what is told of them, and counts."""
+def _dataset(
+    model: Model, names: list[str], times: np.ndarray, values: np.ndarray, reports: list[tuple]
+) -> xr.Dataset:
+    """Runs by labels: their values (run, time, output), what else there is of them, counts."""
     import xarray as xr
 
-    values, told, counts = found
     declared = (*model.definition.outputs, *model.definition.coordinates, *model.definition.speeds)
     units = {quantity.name: quantity.unit for quantity in reversed(declared)}
+    described = REPORTED | {name: ("1", long_name) for name, long_name in model.counts.items()}
     variables: dict[str, Any] = {
         "values": (("run", "time", "output"), values, {"long_name": "quantities"})
     }
-    for name, (_, unit, long_name) in TOLD.items():
-        attributes = {"long_name": long_name} | ({"units": unit} if unit else {})
-        column = told[name].astype(str) if told[name].dtype == object else told[name]
-        variables[name] = "run", column, attributes
+    for (name, (unit, long_name)), column in zip(
+        described.items(), zip(*reports, strict=True), strict=True
+    ):
+        further = {"units": unit} if unit else {}
+        variables[name] = "run", np.array(column), {"long_name": long_name} | further
     variables["seconds"][2]["clock"] = CLOCK
-    for k, (name, long_name) in enumerate(model.counts.items()):
-        variables[name] = "run", counts[:, k], {"units": "1", "long_name": long_name}
     unit_of = "output", [units[name] for name in names], {"long_name": "SI unit of the quantity"}
     coordinates = {
         "run": ("run", np.arange(len(values)), {"long_name": "number"}),

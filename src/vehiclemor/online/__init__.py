@@ -1,1 +1,0 @@
-"""Models in use: reduced or full, stepped, saved and run in batches."""

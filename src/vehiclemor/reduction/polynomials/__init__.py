@@ -1,1 +1,0 @@
-"""Compiled polynomials for reduced mechanisms."""
