@@ -22,10 +22,18 @@ from vehiclemor.registry import choice
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.build import build, reparametrised
 from vehiclemor.simulation.checks import checked_path
-from vehiclemor.simulation.dynamic import REFERENCE_TOLERANCE
+from vehiclemor.simulation.dynamic import REFERENCE_SOLVER, REFERENCE_TOLERANCE
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
-from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory, Trust
+from vehiclemor.simulation.trajectory import (
+    STATUSES,
+    Names,
+    Start,
+    Trajectory,
+    Trust,
+    output_names,
+    sample_rows,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,8 +44,6 @@ CHUNK = 64
 LARGEST = 4 << 30
 # Parameter sets whose models are kept.
 MOST_SETS = 32
-# Times (s) that differ by less are one.
-SAME_TIME = 1e-9
 # What else there is of each run: unit and meaning.
 REPORTED = {
     "status": ("", f"one of {', '.join(STATUSES)}"),
@@ -55,7 +61,7 @@ def simulate_many(
     starts: Start | Sequence[Start] | None = None,
     parameters: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     *,
-    outputs: str | Sequence[str] | None = None,
+    outputs: Names = None,
     times: Any = None,
     jobs: int | None = None,
 ) -> xr.Dataset:
@@ -67,7 +73,7 @@ def simulate_many(
         Reduced or full model made by `reduce()`; or a full model, or its name, which is integrated
         as `Model.simulate` does by default, to be measured against: `reduce(model, "full_order",
         solver="ros34pw2", tolerance=2e-3)` is far faster.  Or whatever has a full `model` and a
-        function `simulate` of a maneuver and a start.
+        function `simulate` of a maneuver, a start and `outputs`.
     signals
         A signal or maneuver for each run, see `many_signals`.  They have the same output times,
         unless `times` are given.
@@ -102,12 +108,12 @@ def simulate_many(
     full = getattr(given, "model", given)
     if not isinstance(full, Model):
         raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
-    runs, columns = _count_of(signals, full), _columns(full, outputs)
+    runs, names = _count_of(signals, full), _names(full, outputs)
     kept, rows = _kept_times(times, signals)
     begins = _starts_of(starts, runs, full)
     model_of = _models(given, full, parameters, runs)
     threads = _cores() if jobs is None else count("jobs", jobs, most=MOST_JOBS)
-    shape = runs, len(kept), len(columns)
+    shape = runs, len(kept), len(names)
     if 8 * math.prod(shape) > LARGEST:
         size = 8e-9 * math.prod(shape)
         raise InputError(f"the result would take {size:.1f} GB of memory: choose outputs=, times=")
@@ -115,13 +121,12 @@ def simulate_many(
 
     def report(run: int) -> tuple:
         """What else there is of a run, whose values are written."""
-        done = attempt(lambda: _whole_run(model_of(run), signals[run], begins[run]))
+        done = attempt(lambda: _whole_run(model_of(run), signals[run], begins[run], names))
         if isinstance(done, Failure):
             values[run] = np.nan
             nothing = [0] * len(full.counts)
             return done.status, done.message, "", np.nan, 0.0, 0.0, *nothing
-        for k, (_, group, column) in enumerate(columns):
-            values[run, :, k] = getattr(done, group)[rows[run], column]
+        values[run] = done.outputs[rows[run]]
         trust = done.trust or Trust(np.nan)
         own = done.status, done.message, done.remark, trust.indicator, trust.until, done.seconds
         return *own, *done.counts.values()
@@ -131,20 +136,20 @@ def simulate_many(
 
     with one_thread(), ThreadPoolExecutor(threads, "vehiclemor") as pool:
         found = list(itertools.chain(*pool.map(reports, range(0, runs, CHUNK))))
-    default = {"solver": "dopri5", "tolerance": REFERENCE_TOLERANCE}
+    default = {"solver": REFERENCE_SOLVER, "tolerance": REFERENCE_TOLERANCE}
     if full.kind == "ae":
         default = {"solver": "newton", "tolerance": NEWTON_TOLERANCE}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
     title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}
-    return _dataset(full, [name for name, *_ in columns], kept, values, found).assign_attrs(
+    return _dataset(full, list(names), kept, values, found).assign_attrs(
         attributes(title, full.kernel_hash, **of, settings=repr(dict(settings)))
     )
 
 
-def _whole_run(model: Any, signal: Maneuver, start: Start) -> Trajectory:
-    """A run, which may have diverged."""
+def _whole_run(model: Any, signal: Maneuver, start: Start, names: tuple[str, ...]) -> Trajectory:
+    """A run with some outputs alone; it may have diverged."""
     try:
-        return model.simulate(signal, start)
+        return model.simulate(signal, start, outputs=names)
     except ConvergenceError as error:
         if error.trajectory is None:
             raise
@@ -172,18 +177,11 @@ def _count_of(signals: Any, model: Model) -> int:
     return len(signals)
 
 
-def _columns(model: Model, outputs: Any) -> list[tuple[str, str, int]]:
-    """Names of what is kept, and where a trajectory has it: its attribute, the column there."""
-    known = {
-        name: (name, group, column)
-        for group in ("speeds", "coordinates", "outputs")
-        for column, name in enumerate(getattr(model, group))
-    }
-    chosen = model.outputs if outputs is None else outputs
-    chosen = (chosen,) if isinstance(chosen, str) else chosen
-    if not isinstance(chosen, Sequence) or not len(chosen):
-        raise InputError(f"outputs is {quoted(outputs)}, not a list of names")
-    return [known[choice("output", name, known)] for name in chosen]
+def _names(model: Model, outputs: Names) -> tuple[str, ...]:
+    """Names of what is kept; `InputError` if the model has no such quantity."""
+    known = *model.outputs, *model.coordinates, *model.speeds
+    names = model.outputs if outputs is None else output_names(outputs)
+    return tuple(choice("output", name, known) for name in names)
 
 
 def _kept_times(
@@ -198,27 +196,15 @@ def _kept_times(
                     f"signals[{run}] has other output times than the first: choose times="
                 )
         return first.times, [slice(None)] * len(signals)
-    try:
-        times = np.atleast_1d(real_array(given))
-    except (TypeError, ValueError):
-        raise InputError(f"times is {quoted(given)}, no list of times in s") from None
-    if times.ndim != 1 or not len(times) or not np.isfinite(times).all():
-        raise InputError("times must be a list of finite times in s")
-    if (np.diff(times) <= SAME_TIME).any():
-        raise InputError("times must increase")
     known: dict[tuple[float, int], np.ndarray] = {}
     for run, signal in enumerate(signals):
         alike = signal.duration, signal.samples
         if alike not in known:
-            own = signal.times
-            rows = np.minimum(np.searchsorted(own, times - SAME_TIME), len(own) - 1)
-            missed = abs(own[rows] - times) > SAME_TIME
-            if missed.any():
-                raise InputError(
-                    f"times: {times[missed.argmax()]:g} s is no output time of signals[{run}]: "
-                    f"they go from 0 to {signal.duration:g} s by {own[1]:g} s"
-                )
-            known[alike] = rows
+            try:
+                known[alike] = sample_rows(given, signal.times)
+            except InputError as error:
+                raise InputError(f"signals[{run}]: {error}") from None
+    times = np.atleast_1d(real_array(given))
     return times, [known[signal.duration, signal.samples] for signal in signals]
 
 

@@ -1,0 +1,94 @@
+"""The interface, line by line, as the pages show it."""
+
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+
+VEHICLE = "independent_suspension_vehicle"
+
+
+@pytest.fixture(scope="module")
+def car():
+    return vm.model(VEHICLE, parameters={"sprung_mass": 900.0})
+
+
+@pytest.fixture(scope="module")
+def pod(car):
+    return vm.reduce(car, "pod", rank=3, training="lane_change")
+
+
+def test_a_full_model_and_a_reduced_one_are_run_and_compared(car, pod):
+    turn = vm.maneuver("lane_change", frequency=1.2, amplitude=-1.0)
+    full = car.simulate(turn)
+    assert full.status == "ok"
+    assert full["yaw"].shape == full.times.shape
+    np.testing.assert_array_equal(full.dataset()["outputs"].sel(output="yaw"), full["yaw"])
+    run = pod.simulate(turn, outputs=["lateral_position", "yaw"])
+    assert run.names == ("lateral_position", "yaw")
+    errors = vm.errors(run, full)
+    difference = run["yaw"] - full["yaw"]
+    expected = np.sqrt(np.mean(difference**2)), abs(difference).max()
+    of_yaw = errors.sel(output="yaw")
+    np.testing.assert_allclose((of_yaw["rms_error"], of_yaw["max_error"]), expected, rtol=1e-6)
+    assert errors["output_unit"].values.tolist() == ["m", "rad"]
+    figure = vm.plot(run, full)
+    assert {line.get_label() for axis in figure.axes for line in axis.get_lines()} > {"full order"}
+    some = pod.simulate(turn, times=full.times[::250])
+    np.testing.assert_allclose(some["yaw"], run["yaw"][::250], rtol=1e-9)
+    np.testing.assert_array_equal(some.times, full.times[::250])
+
+
+def test_a_reduced_model_is_stepped_and_saved(pod, tmp_path):
+    state = pod.step(pod.state("equilibrium"), [0.02], 0.01)
+    pod.save(tmp_path / "pod.nc")
+    loaded = vm.load(tmp_path / "pod.nc")
+    np.testing.assert_array_equal(loaded.step(loaded.state("equilibrium"), [0.02], 0.01), state)
+
+
+def test_many_inputs_are_run_at_once(pod):
+    inputs = [vm.maneuver("lane_change", amplitude=size) for size in (0.5, 1.0)]
+    many = vm.simulate_many(pod, inputs, outputs=["yaw"])
+    assert dict(many.sizes) == {"run": 2, "time": 1251, "output": 1}
+    for run, maneuver in enumerate(inputs):
+        alone = pod.simulate(maneuver, outputs=["yaw"])
+        np.testing.assert_array_equal(many["values"][run, :, 0], alone["yaw"])
+
+
+def test_a_model_that_comes_along_is_exported(tmp_path):
+    vm.export(vm.rom(VEHICLE), "fmu", tmp_path / "car.fmu")
+    assert (tmp_path / "car.fmu").stat().st_size > 1000
+
+
+def test_a_study_is_run_and_selected_by_labels(tmp_path):
+    study = tmp_path / "mine.toml"
+    study.write_text(
+        'title = "Yaw"\nmodel = "double_wishbone"\n[factors]\nfrequency = [1.0, 1.2]\n'
+        'amplitude = [1.0]\n[[methods]]\nmethod = "pod"\nlabel = "POD, r = 3"\n[methods.settings]\n'
+        "rank = 3\n"
+    )
+    result = vm.run_study(study, results=tmp_path)
+    cell = result.sel(frequency_factor=1.2, label="POD, r = 3")
+    assert float(cell["rms_error"].sel(output="spindle_y").squeeze()) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("call", "word"),
+    [
+        (lambda run: run["nothing"], "nothing"),
+        (lambda run: run.chosen("nothing"), "nothing"),
+        (lambda run: run.chosen([]), "outputs"),
+        (lambda run: run.chosen(3), "outputs"),
+        (lambda run: run.chosen("yaw")["pitch"], "pitch"),
+        (lambda run: run.chosen(times=[0.0001]), "0.0001"),
+        (lambda run: run.chosen(times=[1.0, 0.0]), "increase"),
+        (lambda run: run.chosen(times="soon"), "soon"),
+        (lambda run: vm.errors(run, 3), "full"),
+        (lambda run: vm.errors(run, run.chosen(times=[0.0])), "times"),
+        (lambda run: vm.errors(run, run.chosen("yaw")), "longitudinal_position"),
+    ],
+)
+def test_what_a_run_does_not_have_is_one_line(car, call, word):
+    run = car.simulate(vm.maneuver("lane_change"), solver="ros34pw2", tolerance=1e-3)
+    with pytest.raises(vm.VehiclemorError, match=word):
+        call(run)
