@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import model as model
     from vehiclemor.api import models as models
     from vehiclemor.api import plot as plot
+    from vehiclemor.api import reduce as reduce
     from vehiclemor.api import run_study as run_study
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import status as status
