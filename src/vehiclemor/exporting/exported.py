@@ -9,7 +9,7 @@ from vehiclemor.exporting.mechanism import mechanism_system
 from vehiclemor.exporting.path_map import map_system
 from vehiclemor.exporting.system import ExportedSystem
 from vehiclemor.reduction.methods.full_order import FullOrder
-from vehiclemor.reduction.methods.guarded import GuardedModel
+from vehiclemor.reduction.methods.guarded import FallbackModel
 from vehiclemor.reduction.methods.path_map import PathMapModel
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -37,7 +37,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
             return mechanism_system(what, name)
         case FullOrder():
             return exported_system(what.model, name)
-        case GuardedModel():
+        case FallbackModel():
             return exported_system(what.fast, name)
         case PathMapModel():
             return map_system(what, name)

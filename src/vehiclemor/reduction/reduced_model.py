@@ -60,12 +60,12 @@ class ReducedOrderModel(ShortRepr):
     @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the states; empty for a method that gives whole runs alone."""
-        return tuple(getattr(self.reduced, "states", ()))
+        return tuple(self._stepped.states) if hasattr(self.reduced, "step") else ()
 
     @cached_property
     def _stepped(self) -> Any:
         """What fit gave, as a function of states; `InputError` if it is none."""
-        if not self.states:
+        if not hasattr(self.reduced, "step"):
             raise InputError(f"{self.method} has no state: it gives whole runs alone")
         return self.reduced
 

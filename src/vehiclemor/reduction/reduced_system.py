@@ -119,10 +119,10 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         full = self.decode(state[None], inputs[None])[0]
         slopes = self.decoder_slopes(state, inputs)
         by_state = self.model.derivatives(function, full, inputs, "state")
-        if sensitivity.place == STATE:
+        if sensitivity.argument == STATE:
             return by_state @ slopes[STATE]
         found = self.model.derivatives(function, full, inputs, by)
-        return found + by_state @ slopes[INPUTS] if sensitivity.place == INPUTS else found
+        return found + by_state @ slopes[INPUTS] if sensitivity.argument == INPUTS else found
 
     def run(
         self,

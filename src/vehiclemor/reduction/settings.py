@@ -76,10 +76,3 @@ class OnlineSettings(Settings):
 
     solver: Solver = "ros34pw2"
     tolerance: Tolerance = 1e-3
-
-
-class ProjectedSettings(Settings):
-    """How a projected system is integrated."""
-
-    solver: ProjectedSolver = "dopri5"
-    tolerance: Tolerance = 1e-4

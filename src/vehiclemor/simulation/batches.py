@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache, partial
@@ -104,6 +103,8 @@ def simulate_many(
     InputError
         If an argument is wrong, or the result does not fit into memory.
     """
+    from joblib import cpu_count
+
     given = build(model) if isinstance(model, str) else model
     full = getattr(given, "model", given)
     if not isinstance(full, Model):
@@ -112,7 +113,7 @@ def simulate_many(
     kept, rows = _kept_times(times, signals)
     begins = _starts_of(starts, runs, full)
     model_of = _models(given, full, parameters, runs)
-    threads = _cores() if jobs is None else count("jobs", jobs, most=MOST_JOBS)
+    threads = cpu_count() if jobs is None else count("jobs", jobs, most=MOST_JOBS)
     shape = runs, len(kept), len(names)
     if 8 * math.prod(shape) > LARGEST:
         size = 8e-9 * math.prod(shape)
@@ -154,12 +155,6 @@ def _whole_run(model: Any, signal: Maneuver, start: Start, names: tuple[str, ...
         if error.trajectory is None:
             raise
         return error.trajectory
-
-
-def _cores() -> int:
-    """Number of cores that this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def _count_of(signals: Any, model: Model) -> int:

@@ -33,7 +33,7 @@ Varied = tuple[np.ndarray, np.ndarray]
 class Sensitivity(NamedTuple):
     """What derivatives are taken by: an argument of the kernels, of the constants directions."""
 
-    place: int
+    argument: int
     directions: np.ndarray = np.zeros((0, 0))
 
 
@@ -218,12 +218,12 @@ class SteppedSystem:
         """Rates of the projected equations."""
         n, subspace = len(state), self._subspace(time)
         (_, trial, test), half = subspace, n // 2
-        place, dplace = self._nearest(kernels, state, subspace)
-        rates, drates = kernels.of("derivative", place, dplace, n)
+        x, dx = self._nearest(kernels, state, subspace)
+        rates, drates = kernels.of("derivative", x, dx, n)
         if self.spaces.formulation == "state":
             return test @ rates @ trial, trial.T @ (test @ drates)
         size = half * (half + 1)
-        table, dtable = kernels.of("second_order", place, dplace, size)
+        table, dtable = kernels.of("second_order", x, dx, size)
         table, dtable = table.reshape(half, half + 1), dtable.reshape(half, half + 1, -1)
         mass, force, dmass, dforce = table[:, :-1], table[:, -1], dtable[:, :-1], dtable[:, -1]
         small = trial @ mass @ trial.T
@@ -235,8 +235,8 @@ class SteppedSystem:
             dreduced = trial.T @ np.linalg.solve(small, trial @ left[0])
             dfree = np.linalg.solve(mass, left[1])
         # Speeds are linear in the rates, so their change is too in what projection takes away.
-        change = np.concatenate([place[:half], reduced - free])
-        dchange = np.vstack([dplace[:half], dreduced - dfree])
+        change = np.concatenate([x[:half], reduced - free])
+        dchange = np.vstack([dx[:half], dreduced - dfree])
         lost, dlost = kernels.of("speeds", change, dchange, half)
         moved, dmoved = test @ rates[:half] @ trial, trial.T @ (test @ drates[:half])
         return (
@@ -254,9 +254,9 @@ class _Kernels(NamedTuple):
 
     def seeds(self, n: int) -> np.ndarray:
         """Sensitivities (n, columns) of the state that is given."""
-        if self.by is None or self.by.place == STATE:
+        if self.by is None or self.by.argument == STATE:
             return np.eye(n, n if self.by else 0)
-        constants = self.by.place == CONSTANTS
+        constants = self.by.argument == CONSTANTS
         return np.zeros((n, len(self.by.directions if constants else self.inputs)))
 
     def value(self, name: str, x: np.ndarray, size: int) -> np.ndarray:
@@ -267,9 +267,9 @@ class _Kernels(NamedTuple):
         """Sensitivities (size, columns) at a state that doesn't vary but by itself."""
         assert self.by is not None
         arrays = x, self.inputs, self.system.constants
-        if self.by.place == CONSTANTS:
+        if self.by.argument == CONSTANTS:
             return along(self.system.kernels, name, arrays, size, *self.by).T
-        return partial(self.system.kernels, name, arrays, size, self.by.place)
+        return partial(self.system.kernels, name, arrays, size, self.by.argument)
 
     def of(self, name: str, x: np.ndarray, dx: np.ndarray, size: int) -> Varied:
         """Result of a kernel with its sensitivities, at a state with its own (n, columns)."""
@@ -278,4 +278,4 @@ class _Kernels(NamedTuple):
             return value, np.zeros((size, 0))
         arrays, seeds = (x, self.inputs, self.system.constants), np.ascontiguousarray(dx.T)
         found = along(self.system.kernels, name, arrays, size, STATE, seeds).T
-        return value, found if self.by.place == STATE else found + self.own(name, x, size)
+        return value, found if self.by.argument == STATE else found + self.own(name, x, size)

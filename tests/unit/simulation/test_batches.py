@@ -100,19 +100,21 @@ def test_what_fails_is_a_result_beside_the_others(reduced, full):
     thrown = reduced.model.start("equilibrium")
     thrown[states.index("phi")], thrown[states.index("p")] = 0.9, 8.0
     starts = ["equilibrium", thrown, *["equilibrium"] * 3]
-    for model in (reduced, full):
+    for model in (reduced, full, full.model):
         found = vm.simulate_many(model, signals, starts, **KEPT)
         # A reduced car that comes to its end says that it does not know such a start.
-        failed = "diverged" if model is full else "untrusted"
+        failed = "untrusted" if model is reduced else "diverged"
         assert found.status.values.tolist() == ["ok", failed, "ok", "rejected", "ok"]
         assert "delta is" in found.message.item(3)
-        assert ("roll is" if model is full else "start") in found.message.item(1)
+        assert ("start" if model is reduced else "roll is") in found.message.item(1)
         assert np.isnan(found["values"][3]).all()
-        assert np.isnan(found["values"][1]).all() == (model is full)
+        assert np.isnan(found["values"][1]).all() == (model is not reduced)
+        assert (found.rhs_calls.values > 0).tolist() == [True, True, True, False, True]
         others = [0, 2, 4]
         alone = vm.simulate_many(model, vm.many_signals(TIMES, u[others], "cubic"), **KEPT)
         np.testing.assert_array_equal(found["values"][others], alone["values"])
-        check_alone(model, signals[1:2], found.isel(run=[1]).assign_coords(run=[0]), [thrown])
+        if model is not full.model:
+            check_alone(model, signals[1:2], found.isel(run=[1]).assign_coords(run=[0]), [thrown])
 
 
 def test_maneuvers_of_different_lengths_share_chosen_times(full):
@@ -165,6 +167,14 @@ def test_points_are_parameters_by_run():
     np.testing.assert_array_equal(found["values"], listed["values"])
     other = vm.model(MECHANISM, parameters={name: points[1]}).simulate(signals[1])
     np.testing.assert_array_equal(found["values"][1], other.outputs)
+
+
+def test_a_car_that_there_is_not_is_rejected_alone(full):
+    signals = vm.many_signals(TIMES, steering(2))
+    cars = [{}, {"roll_inertia": 9e3}]
+    found = vm.simulate_many(full, signals, parameters=cars, **KEPT)
+    assert found.status.values.tolist() == ["ok", "rejected"]
+    assert "moments of inertia" in found.message.item(1)
 
 
 STATE = [0.0] * 27

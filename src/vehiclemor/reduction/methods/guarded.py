@@ -42,7 +42,7 @@ class GuardedSettings(OnlineSettings):
 
 
 @dataclass(frozen=True, eq=False)
-class GuardedModel(ShortRepr):
+class FallbackModel(ShortRepr):
     """Both models; it is stepped as the fast one, whose trust indicator is to be watched."""
 
     fast: FittedModel
@@ -94,13 +94,13 @@ def fit(
     training: Training,
     settings: GuardedSettings,
     others: FitOther | None = None,
-) -> GuardedModel:
+) -> FallbackModel:
     """Fit both, by `others` if it is given."""
     made = others or (lambda name, own: fitted(component("method", name), model, training, own))
     fast, safe = (made(name, own) for name, own in _settings_of_both(model, settings))
     first, second = fast.offline, safe.offline
     cost = OfflineCost(first.seconds + second.seconds, first.evaluations + second.evaluations)
-    return GuardedModel(fast, safe, cost)
+    return FallbackModel(fast, safe, cost)
 
 
 def check(model: DynamicModel, settings: GuardedSettings) -> None:

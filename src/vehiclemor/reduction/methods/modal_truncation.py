@@ -118,15 +118,10 @@ def truncated(lateral: Lateral, fastest: float, static: bool) -> Lateral:
     )
 
 
-def check(model: DynamicModel, settings: ModalTruncationSettings) -> None:
-    """At least one mode must be kept."""
-    truncated(lateral_modes(VehicleShape(model)), settings.fastest, static=False)
-
-
 def fit(
     model: DynamicModel, training: Training, settings: ModalTruncationSettings
 ) -> ReducedVehicle:
-    """Linearise and truncate; no training run is looked at."""
+    """Linearise and truncate; no training run is looked at.  `InputError` if no mode is kept."""
     began = time.process_time()
     shape = VehicleShape(model)
     static = settings.static_correction == "yes"
@@ -170,7 +165,6 @@ METHOD = Method(
     reference="10.1109/TAC.1966.1098264",
     settings=dict.fromkeys(("ode", "dae"), ModalTruncationSettings),
     refusal=no_steered_vehicle,
-    check=check,
     fit=fit,
     learns_from="inputs",
 )

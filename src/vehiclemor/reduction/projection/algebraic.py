@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.errors import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
@@ -26,6 +25,7 @@ from vehiclemor.reduction.projection.bases import (
 from vehiclemor.reduction.reduced_system import ReducedMechanism
 from vehiclemor.reduction.settings import Settings, StepTolerance
 from vehiclemor.reduction.training import Training
+from vehiclemor.registry import choice
 from vehiclemor.simulation.algebraic import AlgebraicModel, new_counts
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import SAMPLE, Iteration, Solution
@@ -164,12 +164,8 @@ def check_subspace(model: Model, settings: AlgebraicPodSettings) -> None:
 
 
 def _reversed(model: Model, settings: AlgebraicPodSettings) -> list[int]:
-    names = [name for name in settings.reversed_coordinates.split(",") if name]
-    for name in names:
-        if name not in model.coordinates:
-            known = ", ".join(model.coordinates)
-            raise InputError(f"reversed_coordinates: {name!r} is not a coordinate; known: {known}")
-    return [model.coordinates.index(name) for name in names]
+    known, names = model.coordinates, filter(None, settings.reversed_coordinates.split(","))
+    return [known.index(choice("coordinate in reversed_coordinates", n, known)) for n in names]
 
 
 def _pairing(model: AlgebraicModel, settings: AlgebraicPodSettings) -> np.ndarray:

@@ -29,7 +29,7 @@ from vehiclemor.reduction.projection.bases import (
     pod_basis,
 )
 from vehiclemor.reduction.reduced_system import ReducedSystem
-from vehiclemor.reduction.settings import ProjectedSettings, Tolerance
+from vehiclemor.reduction.settings import ProjectedSolver, Settings, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators import catalogue
@@ -45,7 +45,7 @@ from vehiclemor.sizes import require
 SMALLEST_RANGE = 1e-6
 
 
-class DynamicPodSettings(ProjectedSettings):
+class DynamicPodSettings(Settings):
     """POD subspaces of equations of motion.
 
     The defaults are chosen by measurement, on the nominal runs that are then compared with the
@@ -53,6 +53,8 @@ class DynamicPodSettings(ProjectedSettings):
     the projected equations keep the model's energy.
     """
 
+    solver: ProjectedSolver = "dopri5"
+    tolerance: Tolerance = 1e-6
     rank: Rank = 3
     snapshots: Snapshots = 10
     rank_tolerance: RankTolerance = 1e-6
@@ -66,7 +68,6 @@ class DynamicPodSettings(ProjectedSettings):
         description="of the snapshots: euclidean, energy (mass matrix), range (each state by its "
         "range)",
     )
-    tolerance: Tolerance = 1e-6
 
 
 class ConstrainedPodSettings(DynamicPodSettings):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods.full_order import FullOrderSystem
-from vehiclemor.reduction.methods.guarded import METHOD, GuardedModel
+from vehiclemor.reduction.methods.guarded import METHOD, FallbackModel
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -53,7 +53,7 @@ def model():
 
 def guarded(fast):
     safe = FullOrderSystem(model(), "dopri5", TOLERANCE)
-    return GuardedModel(fast, safe, OfflineCost())
+    return FallbackModel(fast, safe, OfflineCost())
 
 
 @settings(max_examples=15)

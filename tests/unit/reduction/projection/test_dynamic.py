@@ -166,6 +166,8 @@ def test_a_tighter_rank_tolerance_drops_modes_of_noise(model):
     kept, cut = (fitted(model, rank=8, rank_tolerance=tolerance) for tolerance in (0.0, 1e-6))
     # Before steering begins the car runs straight: one direction, the rest is rounding.
     assert (kept.bases[0].rank, cut.bases[0].rank) == (8, 1)
+    assert (kept.order, cut.order) == (8, max(basis.rank for basis in cut.bases))
+    assert cut.order > 1
 
 
 def test_divergence_is_recorded_with_its_time(model):
