@@ -1,8 +1,8 @@
 """What the derivation of a dynamic model leaves behind, kept on disk.
 
-Deriving a vehicle symbolically takes seconds, loading its machine code does not.  So the source of
-the kernels is kept with all that describes them, under the hash of the source that it was derived
-by: the model, the symbolic layer and this one.
+Deriving a vehicle symbolically takes seconds, loading its machine code does not.  So the
+kernels' operations are kept with all that describes them, under the hash of the source that they
+were derived by: the model, the symbolic layer and this one.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from vehiclemor.codegen.cache import cache_folder, fetched
-from vehiclemor.codegen.kernels import Kernels, KernelSource, kernel_sources
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import plug_in_digest, source_digest
 from vehiclemor.short_repr import ShortRepr
 
@@ -28,7 +29,7 @@ LAYERS = ("multibody", "symbolic", "codegen")
 
 @dataclass(frozen=True)
 class Derivation(ShortRepr):
-    """What is left of a model's program: the sources of its kernels, and what describes them.
+    """What is left of a model's program: its kernels, and what describes them.
 
     Attributes
     ----------
@@ -37,25 +38,27 @@ class Derivation(ShortRepr):
     constants
         Number of hoisted constants.
     sources
-        Kernel -> its source; `constants` makes the hoisted ones from the parameters.
-    operations
-        Function -> exact counts of its operations, see `operation_counts`.
+        Name -> kernel; `constants` makes the hoisted ones from the parameters.
     """
 
     shapes: dict[str, tuple[int, ...]]
     constants: int
-    sources: dict[str, KernelSource]
-    operations: dict[str, dict[str, int]]
+    sources: dict[str, Kernel]
 
     @property
     def source(self) -> str:
-        """Text of all kernels."""
-        return "\n".join(kernel.text for kernel in self.sources.values())
+        """All kernels in one line each."""
+        return "\n".join(map(repr, self.sources.values()))
+
+    @cached_property
+    def operations(self) -> dict[str, dict[str, int]]:
+        """Function -> exact counts of its operations, see `Kernel.counts`."""
+        return {name: self.sources[name].counts for name in ("constants", *self.shapes)}
 
     @cached_property
     def kernels(self) -> Kernels:
         """The kernels, compiled when they are first used."""
-        return Kernels(self.sources)
+        return Kernels(self.sources.values())
 
 
 def derivation(name: str, derive: Callable[[], Program]) -> Derivation:
@@ -79,26 +82,18 @@ def _file(name: str, derive: Callable[[], Program]) -> str:
 
 
 def derived(program: Program) -> Derivation:
-    """Sources and description of the kernels of a program."""
+    """Kernels of a program."""
     # Only here is anything symbolic: a model that was derived before starts without it.
-    from vehiclemor.codegen.kernel_text import kernel_source, operation_counts, tangent_source
+    from vehiclemor.codegen.lowering import kernels_of
 
-    text = kernel_source(program)
-    further = tangent_source(program) if "residual_jacobian" in program.functions else ""
-    return Derivation(
-        shapes={key: function.shape for key, function in program.functions.items()},
-        constants=len(program.constant_symbols),
-        sources=kernel_sources(text + further),
-        operations=operation_counts(text),
-    )
+    shapes = {key: function.shape for key, function in program.functions.items()}
+    return Derivation(shapes, len(program.constant_symbols), kernels_of(program))
 
 
 # A derivation does not change under its digest.
 @lru_cache(maxsize=8)
 def _read(content: bytes) -> Derivation:
     written = json.loads(content)
-    written["shapes"] = {key: tuple(shape) for key, shape in written["shapes"].items()}
-    for kernel in written["sources"].values():
-        kernel |= {key: tuple(kernel[key]) for key in ("arguments", "sizes")}
-    written["sources"] = {key: KernelSource(**kernel) for key, kernel in written["sources"].items()}
-    return Derivation(**written)
+    shapes = {key: tuple(shape) for key, shape in written["shapes"].items()}
+    sources = {key: Kernel.read(kernel) for key, kernel in written["sources"].items()}
+    return Derivation(shapes, written["constants"], sources)

@@ -16,8 +16,9 @@ from typing import Any, get_args
 import numpy as np
 
 from vehiclemor.codegen.cache import compiler_identity, fetched, once
+from vehiclemor.codegen.kernels import MachineCode
 from vehiclemor.codegen.loop_types import declared_arguments
-from vehiclemor.codegen.machine_code import MachineCode
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import source_digest
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
@@ -187,7 +188,7 @@ def _flat(value: Any) -> list[Any]:
 def loops(
     modules: Sequence[str],
     entries: Sequence[str],
-    kernels: Mapping[str, str] | None = None,
+    kernels: Mapping[str, Kernel] | None = None,
     sizes: Mapping[str, int] | None = None,
 ) -> dict[str, Loop]:
     """Compiled entries of modules of loops, from the cache or compiled now.
@@ -200,7 +201,7 @@ def loops(
     entries
         Functions that Python calls, with declared types.
     kernels
-        Name -> text of kernels that are written where the loops call them.
+        Name -> kernels that are written where the loops call them.
     sizes
         Name -> value of constants that the compiler shall know.
     """
@@ -216,7 +217,7 @@ def loops(
 def _loops(
     modules: tuple[str, ...],
     entries: tuple[str, ...],
-    kernels: tuple[tuple[str, str], ...],
+    kernels: tuple[tuple[str, Kernel], ...],
     sizes: tuple[tuple[str, int], ...],
 ) -> dict[str, Loop]:
     imported = [import_module(f"vehiclemor.{name}") for name in modules]
@@ -227,7 +228,7 @@ def _loops(
         from vehiclemor.codegen.compiler import compiled_loops
         from vehiclemor.codegen.loop_intrinsics import inlined_kernel
 
-        given = {name: inlined_kernel(text) for name, text in kernels}
+        given = {name: inlined_kernel(kernel) for name, kernel in kernels}
         return compiled_loops(imported, entries, given | dict(sizes))
 
     code = MachineCode(fetched(f"loops/{modules[-1].rpartition('.')[2]}-{key}.o", make))

@@ -1,7 +1,7 @@
 """Reduced models as files: one netCDF-4 file with all that they are made of, and nothing to run.
 
-Numbers are variables by the names of the fields that they stand in; their order and the texts
-of features are JSON.  Machine code is made of these texts, or comes from the cache.
+Numbers are variables by the names of the fields that they stand in, operations of features too;
+their order is JSON.  Machine code is made of these operations, or comes from the cache.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from vehiclemor.study.provenance import attributes, code_digest
 from vehiclemor.study.scenario import parameters_of
 
 # Of the layout of these files.
-SCHEMA = 3
+SCHEMA = 4
 # Texts beside the arrays.
 TEXTS = ("parts", "settings", "training", "parameters")
 # What is taken apart.
