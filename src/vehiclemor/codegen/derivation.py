@@ -7,7 +7,6 @@ were derived by: the model, the symbolic layer and this one.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -15,7 +14,7 @@ from functools import cached_property, lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from vehiclemor.codegen.cache import cache_folder, fetched
+from vehiclemor.codegen.cache import cache_folder, digest_of, fetched
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import plug_in_digest, source_digest
@@ -25,29 +24,35 @@ if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
 
 LAYERS = ("multibody", "symbolic", "codegen")
+# Kernels beside the functions of a program.
+BESIDE = ("constants", "tangent_parts", "tangent")
 
 
 @dataclass(frozen=True)
 class Derivation(ShortRepr):
-    """What is left of a model's program: its kernels, and what describes them.
+    """What is left of a model's program: its kernels.
 
     Attributes
     ----------
-    shapes
-        Function -> shape of its result.
-    constants
-        Number of hoisted constants.
     sources
-        Name -> kernel; `constants` makes the hoisted ones from the parameters.
+        Name -> kernel; `constants` makes the hoisted constants from the parameters.
     """
 
-    shapes: dict[str, tuple[int, ...]]
-    constants: int
     sources: dict[str, Kernel]
+
+    @cached_property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Function -> shape of its result."""
+        return {name: k.shape for name, k in self.sources.items() if name not in BESIDE}
+
+    @property
+    def constants(self) -> int:
+        """Number of hoisted constants."""
+        return self.sources["constants"].shape[0]
 
     @property
     def source(self) -> str:
-        """All kernels in one line each."""
+        """All kernels, in one line each."""
         return "\n".join(map(repr, self.sources.values()))
 
     @cached_property
@@ -65,7 +70,10 @@ def derivation(name: str, derive: Callable[[], Program]) -> Derivation:
     """The derivation of a model: from disk, or made by `derive` and written there."""
 
     def make() -> bytes:
-        return json.dumps(asdict(derived(derive()))).encode()
+        # Only here is anything symbolic: a model that was derived before starts without it.
+        from vehiclemor.codegen.lowering import kernels_of
+
+        return json.dumps([asdict(kernel) for kernel in kernels_of(derive()).values()]).encode()
 
     return _read(fetched(_file(name, derive), make))
 
@@ -76,24 +84,12 @@ def is_derived(name: str, derive: Callable[[], Program]) -> bool:
 
 
 def _file(name: str, derive: Callable[[], Program]) -> str:
-    parts = [source_digest(LAYERS), plug_in_digest((derive,)), name, f"sympy {version('sympy')}"]
-    digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
-    return f"derivations/{name}_{digest}.json"
-
-
-def derived(program: Program) -> Derivation:
-    """Kernels of a program."""
-    # Only here is anything symbolic: a model that was derived before starts without it.
-    from vehiclemor.codegen.lowering import kernels_of
-
-    shapes = {key: function.shape for key, function in program.functions.items()}
-    return Derivation(shapes, len(program.constant_symbols), kernels_of(program))
+    parts = source_digest(LAYERS), plug_in_digest((derive,)), name, f"sympy {version('sympy')}"
+    return f"derivations/{name}_{digest_of(parts)}.json"
 
 
 # A derivation does not change under its digest.
 @lru_cache(maxsize=8)
 def _read(content: bytes) -> Derivation:
-    written = json.loads(content)
-    shapes = {key: tuple(shape) for key, shape in written["shapes"].items()}
-    sources = {key: Kernel.read(kernel) for key, kernel in written["sources"].items()}
-    return Derivation(shapes, written["constants"], sources)
+    kernels = map(Kernel.read, json.loads(content))
+    return Derivation({kernel.name: kernel for kernel in kernels})

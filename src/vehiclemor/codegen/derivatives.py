@@ -13,7 +13,6 @@ the norm of a vector that is zero has the derivative zero.
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -22,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.cache import fetched, once
+from vehiclemor.codegen.cache import digest_of, fetched, once
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.operations import (
     COMPARISONS,
@@ -95,16 +94,17 @@ def derivative(kernel: Kernel, arguments: Sequence[str]) -> Kernel:
     ValueError
         If the kernel has what has no derivative.
     """
-    parts = [repr(kernel), *arguments, source_digest(("codegen",))]
-    digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
-    name = f"derivatives/{kernel.name}-{digest}.json"
+
+    def make() -> bytes:
+        return json.dumps(asdict(_derived(kernel, arguments))).encode()
+
+    parts = repr(kernel), *arguments, source_digest(("codegen",))
     return Kernel.read(
-        json.loads(fetched(name, lambda: json.dumps(asdict(derived(kernel, arguments))).encode()))
+        json.loads(fetched(f"derivatives/{kernel.name}-{digest_of(parts)}.json", make))
     )
 
 
-def derived(kernel: Kernel, arguments: Sequence[str]) -> Kernel:
-    """The same, written now."""
+def _derived(kernel: Kernel, arguments: Sequence[str]) -> Kernel:
     *given, result = kernel.arguments
     if unknown := set(arguments) - set(given):
         raise ValueError(f"{kernel.name} has no argument {', '.join(sorted(unknown))}")

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.cache import compiler_identity, fetched, once
+from vehiclemor.codegen.cache import compiler_identity, digest_of, fetched, once
 from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import source_digest
 
@@ -53,7 +52,7 @@ class Kernels:
 
 def _checked(kernel: Kernel, place: int, array: Any) -> int:
     last = place == len(kernel.arguments) - 1
-    dimensions, size = 2 if last and kernel.columns else 1, kernel.sizes[place]
+    dimensions, size = len(kernel.shape) if last else 1, kernel.sizes[place]
     if not (
         isinstance(array, np.ndarray)
         and array.dtype == np.float64
@@ -105,8 +104,7 @@ def _target() -> Any:
 @once
 def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
     """Address and C function of a kernel, and what owns its machine code."""
-    parts = [repr(kernel), str(lanes), source_digest(("codegen",)), compiler_identity()]
-    key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
+    parts = repr(kernel), str(lanes), source_digest(("codegen",)), compiler_identity()
 
     def make() -> bytes:
         from vehiclemor.codegen.compiler import compiled_module
@@ -114,7 +112,7 @@ def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
 
         return compiled_module(kernel_module([kernel], lanes))
 
-    code = MachineCode(fetched(f"kernels/{kernel.name}-{key}.o", make))
+    code = MachineCode(fetched(f"kernels/{kernel.name}-{digest_of(parts)}.o", make))
     address = code.address(kernel.name)
     pointers = [ctypes.c_void_p] * len(kernel.arguments)
     return address, ctypes.CFUNCTYPE(None, *pointers)(address), code

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import inspect
 import struct
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +14,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from vehiclemor.codegen.cache import compiler_identity, fetched, once
+from vehiclemor.codegen.cache import compiler_identity, digest_of, fetched, once
 from vehiclemor.codegen.kernels import MachineCode
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.operations import Kernel
@@ -222,7 +221,7 @@ def _loops(
 ) -> dict[str, Loop]:
     imported = [import_module(f"vehiclemor.{name}") for name in modules]
     parts = [loops_digest(modules), *modules, *entries, repr(kernels), repr(sizes)]
-    key = hashlib.sha256("\n".join([*parts, compiler_identity()]).encode()).hexdigest()[:20]
+    key = digest_of([*parts, compiler_identity()])
 
     def make() -> bytes:
         from vehiclemor.codegen.compiler import compiled_loops

@@ -21,7 +21,7 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -200,20 +200,21 @@ class Kernel:
         """The kernel of what `dataclasses.asdict` has made of one, and JSON of that."""
         return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in written.items()})
 
-    @cached_property
-    def _read(self) -> tuple[list[Operation], list[int]]:
-        operations, named = json.loads(self.listed)
-        return [Operation(*map(_tuples, operation)) for operation in operations], named
-
     @property
     def operations(self) -> list[Operation]:
         """The operations in order."""
-        return self._read[0]
+        return _read(self.listed)[0]
 
     @property
     def named(self) -> list[int]:
         """Numbers of the operations that have names."""
-        return self._read[1]
+        return _read(self.listed)[1]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the result."""
+        size = self.sizes[self.arguments.index("_result")]
+        return (size // self.columns, self.columns) if self.columns else (size,)
 
     @property
     def by_row(self) -> list[str]:
@@ -253,6 +254,13 @@ class Kernel:
             elif kind == "part" and used[number] and operations[arguments[0]].kind != "sums":
                 counts["trigonometric"] += 1
         return counts | {"total": sum(counts.values())}
+
+
+# Those of a kernel are asked for a few times one after the other.
+@lru_cache(maxsize=8)
+def _read(listed: str) -> tuple[list[Operation], list[int]]:
+    operations, named = json.loads(listed)
+    return [Operation(*map(_tuples, operation)) for operation in operations], named
 
 
 def is_entry(detail: Any) -> bool:

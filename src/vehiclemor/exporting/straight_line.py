@@ -15,12 +15,11 @@ from vehiclemor.codegen.derivatives import derivative
 from vehiclemor.codegen.operations import SEED, Kernel, Listing, Operation, Value, needed, uses
 from vehiclemor.codegen.vector_lanes import padded
 
-# Functions that other systems must have, by the names of C's library.
+# Functions that other systems must have.
 FUNCTIONS = (
     *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
-    *("atan2", "fabs", "fmax", "fmin", "floor"),
+    *("atan2", "abs", "max", "min", "floor"),
 )
-RENAMED = {"abs": "fabs", "max": "fmax", "min": "fmin"}
 # Function that has batches -> what gives its results.
 PARTS = {"sincos": ("sin", "cos"), "atan": ("atan",)}
 OPERATORS: dict[str, Callable[..., Any]] = {
@@ -175,7 +174,7 @@ def evaluated(
         elif kind == "table":
             found = functions["entry"](*values, detail)
         else:
-            found = computed[RENAMED.get(kind, kind)](*values)
+            found = computed[kind](*values)
             found = let(found) if let and counts[number] > 1 else found
         known[number] = found
     return [known[number] for number in function.results]
