@@ -75,6 +75,9 @@ class _Writer:
         self._operations, self._builder = kernel.operations, builder
         self._rows, self._lanes = rows, lanes
         self._values: dict[int, Any] = {}
+        # Entries without a name are read anew wherever they are needed: registers are few.
+        entries = {n for n, op in enumerate(kernel.operations) if op.kind == "entry"}
+        self._fleeting = entries.difference(kernel.named)
         by_row = kernel.by_row
         self._single = [name for name in kernel.arguments if name not in by_row]
         # In other kernels than derivatives every value is one of the row's.
@@ -91,6 +94,8 @@ class _Writer:
                 pending += reversed(missing)
             elif (last := pending.pop()) not in self._values:
                 self._values[last] = self._written(operation)
+                for entry in self._fleeting.intersection(arguments):
+                    self._values.pop(entry, None)
         return self._values[number]
 
     def _alike(self, values: Sequence[Any]) -> list[Any]:
