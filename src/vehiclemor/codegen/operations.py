@@ -331,7 +331,7 @@ def as_arrays(operations: Sequence[Operation]) -> dict[str, np.ndarray]:
 def of_arrays(
     kinds: np.ndarray, arguments: np.ndarray, numbers: np.ndarray
 ) -> tuple[Operation, ...]:
-    """Operations from what `as_arrays` gives; `ValueError` if they are none."""
+    """Operations from what `as_arrays` gives; `ValueError` or `IndexError` if they are none."""
     n = len(kinds)
     if not (
         (kinds.dtype, arguments.dtype, numbers.dtype) == (np.int64, np.int64, np.float64)
