@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.oracles.tangent_texts import run_as_text
+from tests.oracles import complex_step
 from tests.reducing import training_runs
-from vehiclemor.codegen.tangent import Tangent
+from vehiclemor.codegen.derivatives import Sensitivity
 from vehiclemor.errors import InputError
 from vehiclemor.exporting.exported import exported_system
 from vehiclemor.inputs.maneuver import Maneuver
@@ -283,15 +283,15 @@ def test_rates_are_those_of_the_steps(pair):
     np.testing.assert_allclose((later - state) / dt, mean, rtol=1e-6, atol=1e-6)
 
 
-# Tangents of the high-fidelity vehicle's longest kernels take a quarter of a minute each to
-# compile: their texts are run here instead.  The 14-DOF vehicle's are compiled.
+# Derivatives of the high-fidelity vehicle's longest kernels take a quarter of a minute each to
+# compile: NumPy runs them here.  The 14-DOF vehicle's are compiled.
 LONG_TO_COMPILE = ("fixed_basis", "pod")
 
 
 @pytest.mark.parametrize("by", ["state", "inputs"])
 def test_jacobians_are_the_slopes_of_rates_and_outputs(pair, by, monkeypatch):
     if pair.model.kind == "dae" and pair.name in LONG_TO_COMPILE:
-        monkeypatch.setattr(Tangent, "_products", run_as_text)
+        monkeypatch.setattr(Sensitivity, "_products", complex_step.products)
     pair.space()
     rom, time = ReducedOrderModel(pair.model, pair.name, {}, (), pair.fit()), 1.63
     u = pair.maneuver.at(np.array([time]))[0]

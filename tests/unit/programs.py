@@ -1,15 +1,13 @@
 """Evaluation of tapes and generated sources, and random straight-line programs to try them on."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 
 import mpmath as mp
 import numpy as np
 import sympy as sp
 
-from vehiclemor.codegen.kernel_text import reference_source
 from vehiclemor.symbolic.elimination import Pivots
-from vehiclemor.symbolic.program import Program
+from vehiclemor.symbolic.program import Function, Program
 from vehiclemor.symbolic.tape import Tape, dependencies
 
 DIGITS = 30
@@ -46,15 +44,18 @@ def function_of(
 
 
 def run(program: Program, name: str, values: Mapping[sp.Symbol, float]) -> np.ndarray:
-    """Result of one function of a program, from its reference source in plain Python."""
-    namespace: dict = {"math": math}
-    exec(reference_source(program), namespace)  # noqa: S102 - the package's own source
-    constants = np.full(len(program.constant_symbols), np.nan)
-    namespace["constants"](np.array([values[p] for p in program.parameters]), None, constants)
-    arguments = [np.array([values[s] for s in symbols]) for symbols in program.arguments.values()]
-    result = np.full(program.functions[name].shape, np.nan)
-    namespace[name](*arguments, constants, None, result)
-    return result
+    """Result of one function of a program, in plain Python."""
+    constants = _computed(program.constants, {p: values[p] for p in program.parameters})
+    known = dict(zip(program.constant_symbols, constants, strict=True))
+    given = {s: values[s] for symbols in program.arguments.values() for s in symbols}
+    function = program.functions[name]
+    return _computed(function, given | known).reshape(function.shape)
+
+
+def _computed(function: Function, values: Mapping[sp.Symbol, float]) -> np.ndarray:
+    lines = list(function.assignments), list(function.results)
+    computed = sp.lambdify(list(values), lines[1], "math", cse=lambda _: lines)
+    return np.array(computed(*values.values()), dtype=float)
 
 
 def pivot_shares(matrix: np.ndarray, pivots: Pivots) -> list[float]:

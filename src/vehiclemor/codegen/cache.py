@@ -16,7 +16,7 @@ import platform
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from functools import cache, wraps
 from importlib.metadata import version
@@ -108,6 +108,11 @@ def _distrust(status: os.stat_result) -> str:
     if status.st_mode & OTHERS_WRITE:
         return "other users can write it, see chmod go-w"
     return ""
+
+
+def digest_of(parts: Sequence[str]) -> str:
+    """Hash of all that determines the content of a file."""
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
 
 
 def fetched(name: str, make: Callable[[], bytes]) -> bytes:

@@ -328,16 +328,15 @@ def mixed_rows(typing_context: Any, rows: Any, weights: Any, result: Any) -> Any
     return types.void(rows, weights, result), generate
 
 
-def inlined_kernel(text: str) -> Any:
+def inlined_kernel(kernel: Kernel) -> Any:
     """A kernel whose instructions are written where a loop calls it, given its arrays."""
-    kernel = Kernel(text)
 
     @intrinsic
     def execute(typing_context: Any, *arrays: Any) -> Any:
         del typing_context
         _require_plain(*arrays)
-        if len(arrays) != len(kernel.pointers):
-            raise TypingError(f"{kernel.name} takes {', '.join(kernel.pointers)}")
+        if len(arrays) != len(kernel.arguments):
+            raise TypingError(f"{kernel.name} takes {', '.join(kernel.arguments)}")
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             kinds = sig.args[0]
@@ -346,7 +345,7 @@ def inlined_kernel(text: str) -> Any:
                 Rows(context.make_array(kind)(context, builder, value).data)
                 for kind, value in zip(kinds, given, strict=True)
             ]
-            emit(kernel, builder, dict(zip(kernel.pointers, rows, strict=True)))
+            emit(kernel, builder, dict(zip(kernel.arguments, rows, strict=True)))
             return context.get_dummy_value()
 
         void: Any = types.void

@@ -1,13 +1,12 @@
 """What the derivation of a dynamic model leaves behind, kept on disk.
 
-Deriving a vehicle symbolically takes seconds, loading its machine code does not.  So the source of
-the kernels is kept with all that describes them, under the hash of the source that it was derived
-by: the model, the symbolic layer and this one.
+Deriving a vehicle symbolically takes seconds, loading its machine code does not.  So the
+kernels' operations are kept with all that describes them, under the hash of the source that they
+were derived by: the model, the symbolic layer and this one.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -15,8 +14,9 @@ from functools import cached_property, lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from vehiclemor.codegen.cache import cache_folder, fetched
-from vehiclemor.codegen.kernels import Kernels, KernelSource, kernel_sources
+from vehiclemor.codegen.cache import cache_folder, digest_of, fetched
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import plug_in_digest, source_digest
 from vehiclemor.short_repr import ShortRepr
 
@@ -24,48 +24,56 @@ if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
 
 LAYERS = ("multibody", "symbolic", "codegen")
+# Kernels beside the functions of a program.
+BESIDE = ("constants", "tangent_parts", "tangent")
 
 
 @dataclass(frozen=True)
 class Derivation(ShortRepr):
-    """What is left of a model's program: the sources of its kernels, and what describes them.
+    """What is left of a model's program: its kernels.
 
     Attributes
     ----------
-    shapes
-        Function -> shape of its result.
-    constants
-        Number of hoisted constants.
     sources
-        Kernel -> its source; `constants` makes the hoisted ones from the parameters.
-    operations
-        Function -> exact counts of its operations, see `operation_counts`.
-    copied
-        By output the number of the state that it is, -1 where it is another quantity.
+        Name -> kernel; `constants` makes the hoisted constants from the parameters.
     """
 
-    shapes: dict[str, tuple[int, ...]]
-    constants: int
-    sources: dict[str, KernelSource]
-    operations: dict[str, dict[str, int]]
-    copied: tuple[int, ...]
+    sources: dict[str, Kernel]
+
+    @cached_property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Function -> shape of its result."""
+        return {name: k.shape for name, k in self.sources.items() if name not in BESIDE}
+
+    @property
+    def constants(self) -> int:
+        """Number of hoisted constants."""
+        return self.sources["constants"].shape[0]
 
     @property
     def source(self) -> str:
-        """Text of all kernels."""
-        return "\n".join(kernel.text for kernel in self.sources.values())
+        """All kernels, in one line each."""
+        return "\n".join(map(repr, self.sources.values()))
+
+    @cached_property
+    def operations(self) -> dict[str, dict[str, int]]:
+        """Function -> exact counts of its operations, see `Kernel.counts`."""
+        return {name: self.sources[name].counts for name in ("constants", *self.shapes)}
 
     @cached_property
     def kernels(self) -> Kernels:
         """The kernels, compiled when they are first used."""
-        return Kernels(self.sources)
+        return Kernels(self.sources.values())
 
 
 def derivation(name: str, derive: Callable[[], Program]) -> Derivation:
     """The derivation of a model: from disk, or made by `derive` and written there."""
 
     def make() -> bytes:
-        return json.dumps(asdict(derived(derive()))).encode()
+        # Only here is anything symbolic: a model that was derived before starts without it.
+        from vehiclemor.codegen.lowering import kernels_of
+
+        return json.dumps([asdict(kernel) for kernel in kernels_of(derive()).values()]).encode()
 
     return _read(fetched(_file(name, derive), make))
 
@@ -76,36 +84,12 @@ def is_derived(name: str, derive: Callable[[], Program]) -> bool:
 
 
 def _file(name: str, derive: Callable[[], Program]) -> str:
-    parts = [source_digest(LAYERS), plug_in_digest((derive,)), name, f"sympy {version('sympy')}"]
-    digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
-    return f"derivations/{name}_{digest}.json"
-
-
-def derived(program: Program) -> Derivation:
-    """Sources and description of the kernels of a program."""
-    # Only here is anything symbolic: a model that was derived before starts without it.
-    from vehiclemor.codegen.kernel_text import kernel_source, operation_counts, tangent_source
-
-    text = kernel_source(program)
-    further = tangent_source(program) if "residual_jacobian" in program.functions else ""
-    states = next(iter(program.arguments.values()))
-    outputs = program.functions["outputs"].results if "outputs" in program.functions else ()
-    return Derivation(
-        shapes={key: function.shape for key, function in program.functions.items()},
-        constants=len(program.constant_symbols),
-        sources=kernel_sources(text + further),
-        operations=operation_counts(text),
-        copied=tuple(states.index(output) if output in states else -1 for output in outputs),
-    )
+    parts = source_digest(LAYERS), plug_in_digest((derive,)), name, f"sympy {version('sympy')}"
+    return f"derivations/{name}_{digest_of(parts)}.json"
 
 
 # A derivation does not change under its digest.
 @lru_cache(maxsize=8)
 def _read(content: bytes) -> Derivation:
-    written = json.loads(content)
-    written["shapes"] = {key: tuple(shape) for key, shape in written["shapes"].items()}
-    written["copied"] = tuple(written["copied"])
-    for kernel in written["sources"].values():
-        kernel |= {key: tuple(kernel[key]) for key in ("arguments", "sizes")}
-    written["sources"] = {key: KernelSource(**kernel) for key, kernel in written["sources"].items()}
-    return Derivation(**written)
+    kernels = map(Kernel.read, json.loads(content))
+    return Derivation({kernel.name: kernel for kernel in kernels})

@@ -1,58 +1,18 @@
-"""Kernels of a model or a reduced model: source, machine code, calls from Python."""
+"""Kernels of a model or a reduced model: machine code, calls from Python."""
 
 from __future__ import annotations
 
 import ctypes
-import hashlib
-import re
-from collections.abc import Mapping
+from collections.abc import Iterable
 from ctypes import addressof, c_char
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.cache import compiler_identity, fetched, once
-from vehiclemor.codegen.machine_code import MachineCode
+from vehiclemor.codegen.cache import compiler_identity, digest_of, fetched, once
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import source_digest
-
-
-@dataclass(frozen=True)
-class KernelSource:
-    """Text of a kernel, and what it wants of its arrays.
-
-    Attributes
-    ----------
-    name
-        Of the kernel.
-    text
-        Straight-line source, as `kernel_source` prints it.
-    arguments
-        Names of its arguments without scratch space, the result last.
-    sizes
-        Smallest number of floats of each argument.
-    dimensions
-        Of the result.
-    """
-
-    name: str
-    text: str
-    arguments: tuple[str, ...]
-    sizes: tuple[int, ...]
-    dimensions: int
-
-    def check(self, *lengths: int) -> None:
-        """Raise `ValueError` if the kernel reads or writes more floats than its arguments have.
-
-        Parameters
-        ----------
-        lengths
-            Of the arguments in order, as far as they are known.
-        """
-        for argument, size, length in zip(self.arguments, self.sizes, lengths, strict=False):
-            if size > length:
-                raise ValueError(f"kernel {self.name}: {argument} has {length} floats, not {size}")
 
 
 class BareKernel(NamedTuple):
@@ -87,16 +47,10 @@ class BareKernel(NamedTuple):
 
 
 class Kernels:
-    """Kernels by name, each compiled when it is first used.
+    """Kernels, each compiled when it is first used; `sources` are their operations, by name."""
 
-    Parameters
-    ----------
-    sources
-        Name -> source.
-    """
-
-    def __init__(self, sources: Mapping[str, KernelSource]) -> None:
-        self.sources = dict(sources)
+    def __init__(self, kernels: Iterable[Kernel]) -> None:
+        self.sources = {kernel.name: kernel for kernel in kernels}
 
     def __contains__(self, name: str) -> bool:
         return name in self.sources
@@ -109,9 +63,12 @@ class Kernels:
         lanes
             Samples that it takes at once, see `llvm_kernels.kernel_module`.
         results
-            Numbers of the results that it computes, in their new order; all where none are named.
+            Places of the results that it computes, in their new order; all where none are named.
         """
-        return _machine(self.sources[name], lanes, results)[0] if name in self.sources else 0
+        if name not in self.sources:
+            return 0
+        kernel = self.sources[name]
+        return _machine(_of(kernel, results) if results else kernel, lanes)[0]
 
     def bare(self, name: str, constants: np.ndarray) -> BareKernel:
         """A kernel of states and inputs without its checks."""
@@ -131,14 +88,14 @@ class Kernels:
         TypeError
             If an array is too short or of another kind.
         """
-        source = self.sources[name]
-        function = _machine(source, 1)[1]
-        function(*[_checked(source, k, array) for k, array in enumerate(arrays)])
+        kernel = self.sources[name]
+        function = _machine(kernel, 1)[1]
+        function(*[_checked(kernel, k, array) for k, array in enumerate(arrays)])
 
 
-def _checked(source: KernelSource, place: int, array: Any) -> int:
-    last = place == len(source.arguments) - 1
-    dimensions, size = source.dimensions if last else 1, source.sizes[place]
+def _checked(kernel: Kernel, place: int, array: Any) -> int:
+    last = place == len(kernel.arguments) - 1
+    dimensions, size = len(kernel.shape) if last else 1, kernel.sizes[place]
     if not (
         isinstance(array, np.ndarray)
         and array.dtype == np.float64
@@ -149,46 +106,61 @@ def _checked(source: KernelSource, place: int, array: Any) -> int:
     ):
         kind = f"{array.dtype}{array.shape}" if hasattr(array, "dtype") else type(array)
         raise TypeError(
-            f"{source.name}: {source.arguments[place].removeprefix('_')} must be a C-contiguous "
+            f"{kernel.name}: {kernel.arguments[place].removeprefix('_')} must be a C-contiguous "
             f"array of at least {size} floats with {dimensions} dimension(s), not {kind}"
         )
     return array.ctypes.data
 
 
+class MachineCode:
+    """Functions of an object file in memory, at addresses in this process.
+
+    LLVM's own loader loads it, without what has compiled it.
+    """
+
+    def __init__(self, content: bytes) -> None:
+        import llvmlite.binding as llvm
+
+        # The engine owns the memory in which the code lies, and its target machine.
+        machine = _target().create_target_machine()
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+        self._engine.finalize_object()
+
+    def address(self, name: str) -> int:
+        """Address of a function."""
+        found = self._engine.get_function_address(name)
+        if not found:
+            raise ImportError(f"the object code has no function {name}")
+        return found
+
+
 @once
-def _machine(
-    source: KernelSource, lanes: int = 1, results: tuple[int, ...] = ()
-) -> tuple[int, Any, MachineCode]:
+def _target() -> Any:
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_triple(llvm.get_process_triple())
+
+
+@lru_cache(maxsize=64)
+def _of(kernel: Kernel, results: tuple[int, ...]) -> Kernel:
+    return kernel.of(results)
+
+
+@once
+def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
     """Address and C function of a kernel, and what owns its machine code."""
-    of_results = ",".join(map(str, results))
-    parts = [source.text, str(lanes), of_results, source_digest(("codegen",)), compiler_identity()]
-    key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
+    parts = repr(kernel), str(lanes), source_digest(("codegen",)), compiler_identity()
 
     def make() -> bytes:
         from vehiclemor.codegen.compiler import compiled_module
         from vehiclemor.codegen.llvm_kernels import kernel_module
-        from vehiclemor.codegen.operations import Kernel
 
-        kernel = Kernel(source.text)
-        return compiled_module(kernel_module([kernel.of(results) if results else kernel], lanes))
+        return compiled_module(kernel_module([kernel], lanes))
 
-    code = MachineCode(fetched(f"kernels/{source.name}-{key}.o", make))
-    address = code.address(source.name)
-    pointers = [ctypes.c_void_p] * len(source.arguments)
+    code = MachineCode(fetched(f"kernels/{kernel.name}-{digest_of(parts)}.o", make))
+    address = code.address(kernel.name)
+    pointers = [ctypes.c_void_p] * len(kernel.arguments)
     return address, ctypes.CFUNCTYPE(None, *pointers)(address), code
-
-
-def kernel_sources(text: str) -> dict[str, KernelSource]:
-    """Sources of the kernels in a text, by name."""
-    parts = re.split(r"\n+(?=def )", text.strip())
-    return {source.name: source for source in (_source(f"{part}\n") for part in parts)}
-
-
-# Models with other parameters ask for the same again.
-@lru_cache(maxsize=64)
-def _source(text: str) -> KernelSource:
-    from vehiclemor.codegen.operations import Kernel
-
-    kernel = Kernel(text)
-    sizes = tuple(kernel.sizes[name] for name in kernel.pointers)
-    return KernelSource(kernel.name, text, tuple(kernel.pointers), sizes, kernel.dimensions)

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 from collections.abc import Sequence
-from functools import cache
-from types import ModuleType
 from typing import Any
 
 from llvmlite import ir
 
-from vehiclemor.codegen import arctangent, exponential, sincos
-from vehiclemor.codegen.operations import COMPARISONS, Operation, Reader
+from vehiclemor.codegen.elementary import elementary_operations
+from vehiclemor.codegen.operations import COMPARISONS
 from vehiclemor.codegen.weighted_sums import DOUBLE, FLAGS
 
 # A float plus this has no digits after the point.
 SHIFT = 1.5 * 2.0**52
 LANE = ir.IntType(32)
-# Functions of this package, whose text becomes instructions.
-ELEMENTARY: dict[str, ModuleType] = {"sincos": sincos, "atan": arctangent, "exp": exponential}
 INTRINSICS = {name: f"llvm.{name}" for name in ("sqrt", "log", "sin", "cos", "floor")} | {
     "abs": "llvm.fabs"
 }
@@ -43,7 +37,7 @@ def arithmetic(builder: Any, kind: str, arguments: Sequence[Any]) -> Any:
         return builder.fneg(*arguments, flags=FLAGS)
     if kind == "select":
         return builder.select(*arguments)
-    if kind in COMPARISONS.values():
+    if kind in COMPARISONS:
         # An inequality holds where one side is not a number; other comparisons don't.
         compare = builder.fcmp_unordered if kind == "!=" else builder.fcmp_ordered
         return compare(kind, *arguments)
@@ -64,36 +58,15 @@ def constant(kind: Any, number: float) -> ir.Constant:
 
 
 def elementary(builder: Any, name: str, argument: Any) -> tuple[Any, ...]:
-    """Results of a function of this package of a float or a vector, from its text."""
-    operations, (given, *results) = _text_of(name)
-    values: list[Any] = []
-    for number, (kind, numbers, detail) in enumerate(operations):
-        if number == given:
-            values.append(argument)
-        elif kind == "number":
+    """Results of a function of this package of a float or a vector."""
+    operations, results = elementary_operations(name)
+    values = [argument]
+    for kind, numbers, detail in operations[1:]:
+        if kind == "number":
             values.append(constant(argument.type, detail))
         else:
             values.append(arithmetic(builder, kind, [values[n] for n in numbers]))
     return tuple(values[number] for number in results)
-
-
-@cache
-def _text_of(name: str) -> tuple[list[Operation], list[int]]:
-    """Operations of an elementary function; numbers of its argument and its results."""
-    module = ELEMENTARY[name]
-    tree = ast.parse(inspect.getsource(module))
-    function = next(n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == name)
-    constants = {key: value for key, value in vars(module).items() if isinstance(value, float)}
-    argument = function.args.args[0].arg
-    reader = Reader((), constants | {argument: 0.0})
-    given = reader.value(ast.Name(argument))
-    # The first statement is the docstring.
-    *statements, last = function.body[1:]
-    for statement in statements:
-        reader.read(statement)
-    assert isinstance(last, ast.Return)
-    results = last.value.elts if isinstance(last.value, ast.Tuple) else [last.value]
-    return reader.operations, [given, *(reader.value(result) for result in results if result)]
 
 
 def _library(builder: Any, name: str, arguments: Sequence[Any]) -> Any:

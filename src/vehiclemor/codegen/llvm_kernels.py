@@ -1,10 +1,9 @@
-"""Machine code of straight-line kernels, written from their text without type inference.
+"""Machine code of straight-line kernels, written from their operations without type inference.
 
 A kernel of a vehicle has thousands of scalar operations.  The compiler spends seconds on the types
-of these, though all are floats, and once more in every loop that calls the kernel.  Here its text
-becomes LLVM instructions directly, and its machine code has one place.  Loops call it by its
-address, which they get at run time: they are compiled once for all models.  Batches of elementary
-functions become vector instructions, from the text of the same scalar functions.
+of these, though all are floats, and once more in every loop that calls the kernel.  Here they
+become LLVM instructions directly, and the machine code has one place.  Loops call it by its
+address, which they get at run time: they are compiled once for all models.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,9 +12,10 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 
 from vehiclemor.codegen import vector_statements, weighted_sums
-from vehiclemor.codegen.llvm_arithmetic import ELEMENTARY, LANE, arithmetic, constant, elementary
-from vehiclemor.codegen.operations import SEED, VECTOR_STATEMENTS, Kernel, Operation
-from vehiclemor.codegen.vector_lanes import LANES, RESULTS, WIDTH
+from vehiclemor.codegen.elementary import ELEMENTARY
+from vehiclemor.codegen.llvm_arithmetic import LANE, arithmetic, constant, elementary
+from vehiclemor.codegen.operations import SEED, VECTOR_STATEMENTS, Kernel, Operation, is_entry
+from vehiclemor.codegen.vector_lanes import LANES, WIDTH
 from vehiclemor.codegen.weighted_sums import DOUBLE, VECTOR
 
 POINTER = DOUBLE.as_pointer()
@@ -27,19 +27,19 @@ def kernel_module(kernels: Sequence[Kernel], lanes: int = 1) -> ir.Module:
     Parameters
     ----------
     lanes
-        Of how many samples a kernel computes the results at once.  If several, its arguments but
-        the constants are rows of matrices, and further arguments say how many floats from one row
-        to the next, in order.  Of a tangent it is how many directions: only seeds and results are
-        rows, and what does not depend on the direction is computed once.
+        Of how many samples a kernel computes the results at once, a SIMD batch.  If several,
+        arguments are rows of matrices as `Kernel.by_row` says, and further arguments say how many
+        floats from one row to the next, in order.  What does not depend on the row is computed
+        once.
     """
     module = ir.Module("kernels")
     for kernel in kernels:
-        strided = kernel.laned if lanes > 1 else []
-        kinds = [POINTER] * len(kernel.pointers) + [ir.IntType(64)] * len(strided)
+        strided = kernel.by_row if lanes > 1 else []
+        kinds = [POINTER] * len(kernel.arguments) + [ir.IntType(64)] * len(strided)
         function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), kernel.name)
         function.attributes.add("nounwind")
         builder = ir.IRBuilder(function.append_basic_block())
-        given = dict(zip(kernel.pointers, function.args, strict=False))
+        given = dict(zip(kernel.arguments, function.args, strict=False))
         strides = dict(zip(strided, function.args[len(given) :], strict=True))
         emit(kernel, builder, {name: Rows(given[name], strides.get(name)) for name in given}, lanes)
         builder.ret_void()
@@ -47,7 +47,7 @@ def kernel_module(kernels: Sequence[Kernel], lanes: int = 1) -> ir.Module:
 
 
 class Rows(NamedTuple):
-    """Where a kernel finds an argument: its first float, and the floats from lane to lane."""
+    """Where a kernel finds an argument: its first float, and the floats from row to row."""
 
     first: Any
     stride: Any = None
@@ -59,31 +59,43 @@ def emit(kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int = 1)
     Parameters
     ----------
     rows
-        Argument -> where it is; the scratch space is nowhere.
+        Argument -> where it is.
     lanes
         Samples at once, see `kernel_module`.
     """
     writer = _Writer(kernel, builder, rows, lanes)
-    for number in kernel.anchors:
+    for number in kernel.named:
         writer.value(number)
 
 
 class _Writer:
-    """Writes the operations of a kernel, each when it is first needed: registers are few."""
+    """Writes the operations of a kernel, each when it is first needed."""
 
     def __init__(self, kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int) -> None:
         self._operations, self._builder = kernel.operations, builder
         self._rows, self._lanes = rows, lanes
         self._values: dict[int, Any] = {}
-        laned = kernel.laned
-        self._single = [name for name in kernel.arguments if name not in laned]
-        # In other kernels than tangents every value has lanes.
-        self._mixed = any(name.startswith(SEED) for name in laned)
+        # Entries without a name are read anew wherever they are needed: registers are few.
+        entries = {n for n, op in enumerate(kernel.operations) if op.kind == "entry"}
+        self._fleeting = entries.difference(kernel.named)
+        by_row = kernel.by_row
+        self._single = [name for name in kernel.arguments if name not in by_row]
+        # In other kernels than derivatives every value is one of the row's.
+        self._mixed = any(name.startswith(SEED) for name in by_row)
 
     def value(self, number: int) -> Any:
         """The value of an operation; of several results, or none, what there is."""
-        if number not in self._values:
-            self._values[number] = self._written(self._operations[number])
+        # A stack of its own: operations of files may be deeper than Python's recursion goes.
+        pending = [number]
+        while pending:
+            kind, arguments, _ = operation = self._operations[pending[-1]]
+            missing = [n for n in arguments if n not in self._values] if kind != "sums" else []
+            if missing:
+                pending += reversed(missing)
+            elif (last := pending.pop()) not in self._values:
+                self._values[last] = self._written(operation)
+                for entry in self._fleeting.intersection(arguments):
+                    self._values.pop(entry, None)
         return self._values[number]
 
     def _alike(self, values: Sequence[Any]) -> list[Any]:
@@ -99,6 +111,9 @@ class _Writer:
 
     def _written(self, operation: Operation) -> Any:
         kind, arguments, detail = operation
+        if kind == "sums":
+            return self._sums(arguments, *detail)
+        values = [self._values[number] for number in arguments]
         match kind:
             case "number":
                 count = 1 if self._mixed else self._lanes
@@ -106,32 +121,28 @@ class _Writer:
             case "entry":
                 return self._load(*detail)
             case "store":
-                return self._store(self.value(arguments[0]), detail)
-            case "sums":
-                array, first, targets = detail
-                # One by one, each used at once: registers are few.
-                factors = (self.value(number) for number in arguments)
-                if self._lanes == 1:
-                    address = self._address(array, first)
-                    return weighted_sums.weighted_sums(self._builder, address, factors, targets)
-                values = self._alike(list(factors))
-                sums = weighted_sums.sums_of_lanes
-                if values[0].type == DOUBLE:
-                    sums = weighted_sums.weighted_sums
-                return sums(self._builder, self._address(array, first), values, targets)
+                return self._store(values[0], detail)
             case "batch":
-                return self._batch(detail, [self.value(number) for number in arguments])
+                return self._batch(detail, values)
+            case "part":
+                return values[0][detail]
             case _ if kind in VECTOR_STATEMENTS:
-                pointers = [self._address(*d) if _is_entry(d) else d for d in detail]
-                factors = [self.value(number) for number in arguments]
-                return vector_statements.write(kind, self._builder, pointers, factors)
-        values = [self.value(number) for number in arguments]
-        if kind == "part":
-            return values[0][detail]
-        if kind in ELEMENTARY:
-            results = elementary(self._builder, kind, *values)
-            return results if kind == "sincos" else results[0]
+                places = [self._address(*d) if is_entry(d) else d for d in detail]
+                return vector_statements.write(kind, self._builder, places, values)
+            case _ if kind in ELEMENTARY:
+                results = elementary(self._builder, kind, *values)
+                return results if kind == "sincos" else results[0]
         return arithmetic(self._builder, kind, self._alike(values))
+
+    def _sums(self, arguments: Sequence[int], array: str, first: int, targets: int) -> list[Any]:
+        # One by one, each used at once: registers are few.
+        factors = (self.value(number) for number in arguments)
+        address = self._address(array, first)
+        if self._lanes > 1:
+            factors = self._alike(list(factors))
+            if factors[0].type != DOUBLE:
+                return weighted_sums.sums_of_lanes(self._builder, address, factors, targets)
+        return weighted_sums.weighted_sums(self._builder, address, factors, targets)
 
     def _load(self, name: str, place: int) -> Any:
         builder = self._builder
@@ -163,27 +174,23 @@ class _Writer:
             offset = self._builder.add(self._builder.mul(self._rows[name].stride, stride), offset)
         return self._builder.gep(self._rows[name].first, [offset])
 
-    def _batch(self, name: str, lanes: Sequence[Any]) -> list[Any]:
-        """Results of an elementary function for a batch of arguments, lane by lane."""
-        builder, results, lanes = self._builder, len(RESULTS[name]), self._alike(lanes)
-        if lanes[0].type != DOUBLE:
+    def _batch(self, name: str, arguments: Sequence[Any]) -> list[Any]:
+        """Results of an elementary function for a batch of arguments, one function first."""
+        builder, arguments = self._builder, self._alike(arguments)
+        if arguments[0].type != DOUBLE:
             # Vectors already, of samples.
-            found = [elementary(builder, name, lane) for lane in lanes]
-            return [values[k] for k in range(results) for values in found]
+            found = [elementary(builder, name, argument) for argument in arguments]
+            return [value for values in zip(*found, strict=True) for value in values]
         places = [ir.Constant(ir.IntType(32), place) for place in range(WIDTH)]
         parts = []
         for first in range(0, LANES, WIDTH):
             vector = ir.Constant(VECTOR, ir.Undefined)
             for lane, place in enumerate(places):
-                vector = builder.insert_element(vector, lanes[first + lane], place)
+                vector = builder.insert_element(vector, arguments[first + lane], place)
             parts.append(elementary(builder, name, vector))
         return [
-            builder.extract_element(part[result], place)
-            for result in range(results)
-            for part in parts
+            builder.extract_element(vector, place)
+            for vectors in zip(*parts, strict=True)
+            for vector in vectors
             for place in places
         ]
-
-
-def _is_entry(detail: Any) -> bool:
-    return isinstance(detail, tuple) and bool(detail) and isinstance(detail[0], str)

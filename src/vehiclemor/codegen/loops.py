@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import inspect
 import struct
 from collections.abc import Callable, Mapping, Sequence
@@ -15,9 +14,10 @@ from typing import Any, get_args
 
 import numpy as np
 
-from vehiclemor.codegen.cache import compiler_identity, fetched, once
+from vehiclemor.codegen.cache import compiler_identity, digest_of, fetched, once
+from vehiclemor.codegen.kernels import MachineCode
 from vehiclemor.codegen.loop_types import declared_arguments
-from vehiclemor.codegen.machine_code import MachineCode
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import source_digest
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
@@ -187,7 +187,7 @@ def _flat(value: Any) -> list[Any]:
 def loops(
     modules: Sequence[str],
     entries: Sequence[str],
-    kernels: Mapping[str, str] | None = None,
+    kernels: Mapping[str, Kernel] | None = None,
     sizes: Mapping[str, int] | None = None,
 ) -> dict[str, Loop]:
     """Compiled entries of modules of loops, from the cache or compiled now.
@@ -200,7 +200,7 @@ def loops(
     entries
         Functions that Python calls, with declared types.
     kernels
-        Name -> text of kernels that are written where the loops call them.
+        Name -> kernels that are written where the loops call them.
     sizes
         Name -> value of constants that the compiler shall know.
     """
@@ -216,17 +216,17 @@ def loops(
 def _loops(
     modules: tuple[str, ...],
     entries: tuple[str, ...],
-    kernels: tuple[tuple[str, str], ...],
+    kernels: tuple[tuple[str, Kernel], ...],
     sizes: tuple[tuple[str, int], ...],
 ) -> dict[str, Loop]:
     imported = [import_module(f"vehiclemor.{name}") for name in modules]
     parts = [loops_digest(modules), *modules, *entries, repr(kernels), repr(sizes)]
-    key = hashlib.sha256("\n".join([*parts, compiler_identity()]).encode()).hexdigest()[:20]
+    key = digest_of([*parts, compiler_identity()])
 
     def make() -> bytes:
         from vehiclemor.codegen.compiler import compiled_loops, inlined_kernel
 
-        given = {name: inlined_kernel(text) for name, text in kernels}
+        given = {name: inlined_kernel(kernel) for name, kernel in kernels}
         return compiled_loops(imported, entries, given | dict(sizes))
 
     code = MachineCode(fetched(f"loops/{modules[-1].rpartition('.')[2]}-{key}.o", make))

@@ -1,310 +1,296 @@
 """Kernels as lists of operations: what compilers, printers and derivatives read.
 
-A kernel is written as a Python function of one statement after the other.  Nothing of its text is
-run: it is read here, once, and what is not one of the operations below is refused.
+A kernel takes arrays of floats and fills its result.  Its operations are executed one after the
+other; each has a kind, numbers of earlier operations whose values it takes, and details:
 
-    a = b * _x[0] - 2.0                   arithmetic of names, entries of arguments and numbers
-    a = b if c < d else e                 also with <=, >, >=, ==, !=
-    a = math.sqrt(b)                      see `FUNCTIONS`
-    sine, cosine = sincos_one(a)
-    _work[3] = a                          arguments of a batch, then
-    sincos_batch(_work, 0)                `LANES` of them at once; results stand behind them
-    (a, b,) = weighted_sums(_c, 7, (...)) see `weighted_sums`
-    combine(_result[0], 3, a, _x[0])      see `vector_statements`
-    _result[0] = a                        or _result[0, 1]
+    number            a float
+    entry             (array, place): an entry of an argument
+    add ... >=        arithmetic, comparisons and functions, see `KINDS`
+    sincos            sine and cosine of a value
+    batch             `sincos` or `atan` of `LANES` values at once: its name
+    sums              (array, first, targets): see `weighted_sums`
+    part              number of one of several results of these three
+    store             place of the result, row by row
+    combine ...       statements on whole vectors, see `vector_statements`
+
+Those that have a name are executed in order, others when one of them needs their value.
 """
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Collection, Mapping, Sequence
-from copy import copy
-from typing import Any, NamedTuple
+import json
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, ClassVar, NamedTuple
 
-from vehiclemor.codegen.vector_lanes import LANES, RESULTS, padded
+import numpy as np
 
-# Before the name of an argument: the argument's direction, see `tangent`.
+from vehiclemor.codegen.vector_lanes import padded
+
+# Before the name of an argument: the argument's direction, see `derivatives`.
 SEED = "_seed"
-ARITHMETIC = {
-    ast.Add: "add",
-    ast.Sub: "subtract",
-    ast.Mult: "multiply",
-    ast.Div: "divide",
-    ast.Pow: "power",
+FUNCTIONS = (
+    *("sqrt", "log", "exp", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
+    *("floor", "abs", "power_of_two"),
+)
+COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+# Operations of values with one result -> how many values they take.  Saved models hold places of
+# this table: new kinds come last.
+KINDS = {
+    **dict.fromkeys(("number", "entry"), 0),
+    **dict.fromkeys(("add", "subtract", "multiply", "divide", "power", "atan2"), 2),
+    **dict.fromkeys(COMPARISONS, 2),
+    **dict.fromkeys(("negate", *FUNCTIONS), 1),
+    "select": 3,
 }
-SIGNS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/", "power": "**"}
-COMPARISONS = {
-    ast.Lt: "<",
-    ast.LtE: "<=",
-    ast.Gt: ">",
-    ast.GtE: ">=",
-    ast.Eq: "==",
-    ast.NotEq: "!=",
-}
-# As texts write it -> kind of operation.
-FUNCTIONS = {
-    f"math.{name}": name
-    for name in (
-        *("sqrt", "log", "exp", "sin", "cos", "tan", "asin", "acos", "atan", "atan2"),
-        *("sinh", "cosh", "tanh"),
-    )
-} | {
-    "atan": "atan",
-    "power_of_two": "power_of_two",
-    "np.floor": "floor",
-    **dict.fromkeys(("abs", "np.abs", "math.fabs"), "abs"),
-}
-BATCHES = {f"{name}_batch": name for name in RESULTS}
 VECTOR_STATEMENTS = ("combine", "magnitudes", "product", "execute")
-# Expressions within one another; the largest of this package is 34 deep.
-DEEPEST = 140
+# Nothing else depends on these, and these have a name whatever they are.
+EFFECTS = ("store", *VECTOR_STATEMENTS)
+NAMED = ("sincos", "batch", "sums", "part", *EFFECTS)
+COUNTED = ("add", "multiply", "divide", "negate", "sqrt", "trigonometric", "power")
 
 
 class Operation(NamedTuple):
-    """One operation of a kernel.
-
-    Attributes
-    ----------
-    kind
-        `number`, `entry` (of an argument), one of `SIGNS` or `FUNCTIONS`, `negate`, `select`, a
-        comparison; `sincos`, `batch` and `sums`, of whose results each is a `part`; `store`, or one
-        of `VECTOR_STATEMENTS`.
-    arguments
-        Numbers of the operations whose values it takes.
-    detail
-        Value of a number; array and place of an entry; number of a part; name of a batch; array,
-        first place and number of sums; place of a store; of a vector statement its arguments, those
-        that are pointers as (array, place).
-    """
+    """One operation of a kernel."""
 
     kind: str
     arguments: tuple[int, ...] = ()
     detail: Any = None
 
 
+@dataclass(frozen=True, slots=True)
+class Value:
+    """What an operation gives; arithmetic with it writes further operations."""
+
+    listing: Listing
+    number: int
+    # Numbers of NumPy leave arithmetic to this class.
+    __array_ufunc__: ClassVar[None] = None
+
+    def __add__(self, other: Value | float) -> Value:
+        return self.listing.new("add", self, other)
+
+    def __radd__(self, other: float) -> Value:
+        return self.listing.new("add", other, self)
+
+    def __sub__(self, other: Value | float) -> Value:
+        return self.listing.new("subtract", self, other)
+
+    def __rsub__(self, other: float) -> Value:
+        return self.listing.new("subtract", other, self)
+
+    def __mul__(self, other: Value | float) -> Value:
+        return self.listing.new("multiply", self, other)
+
+    def __rmul__(self, other: float) -> Value:
+        return self.listing.new("multiply", other, self)
+
+    def __truediv__(self, other: Value | float) -> Value:
+        return self.listing.new("divide", self, other)
+
+    def __rtruediv__(self, other: float) -> Value:
+        return self.listing.new("divide", other, self)
+
+    def __neg__(self) -> Value:
+        return self.listing.new("negate", self)
+
+    def __abs__(self) -> Value:
+        return self.listing.new("abs", self)
+
+
 class Listing:
-    """Operations that are written one after the other."""
+    """Operations that are written one after the other; `named` are numbers of those with names."""
 
     def __init__(self) -> None:
         self.operations: list[Operation] = []
+        self.named: set[int] = set()
 
-    def new(self, kind: str, *arguments: int, detail: Any = None) -> int:
-        """Write an operation; its number."""
-        self.operations.append(Operation(kind, arguments, detail))
-        return len(self.operations) - 1
+    def new(self, kind: str, *arguments: Value | float, detail: Any = None) -> Value:
+        """Write an operation; what it gives."""
+        numbers = tuple(
+            a.number if isinstance(a, Value) else self.number(a).number for a in arguments
+        )
+        value = Value(self, len(self.operations))
+        self.operations.append(Operation(kind, numbers, detail))
+        return self.let(value) if kind in NAMED else value
+
+    def let(self, value: Value) -> Value:
+        """A value that has a name from here on."""
+        self.named.add(value.number)
+        return value
+
+    def number(self, value: float) -> Value:
+        """Write a number."""
+        return self.new("number", detail=float(value))
+
+    def entry(self, array: str, place: int) -> Value:
+        """Read an entry of an argument."""
+        return self.new("entry", detail=(array, place))
+
+    def parts(self, whole: Value, count: int) -> list[Value]:
+        """Results of an operation that has several."""
+        return [self.new("part", whole, detail=place) for place in range(count)]
+
+    def sums(self, array: str, first: int, targets: int, factors: Sequence[Value]) -> list[Value]:
+        """Sums of factors times the weights that stand in an array, see `weighted_sums`."""
+        whole = self.new("sums", *factors, detail=(array, first, targets))
+        return self.parts(whole, targets)
+
+    def store(self, place: int, value: Value | float) -> None:
+        """Write a value into the result."""
+        self.new("store", value, detail=place)
+
+    def kernel(self, name: str, arguments: Sequence[str], columns: int = 0) -> Kernel:
+        """What has been written as a kernel; with columns its result is a matrix.
+
+        Operations that nothing depends on are left out.
+        """
+        sizes = dict.fromkeys(arguments, 0)
+        roots = [n for n, operation in enumerate(self.operations) if operation.kind in EFFECTS]
+        operations, places = pruned(self.operations, roots)
+        for kind, numbers, detail in operations:
+            for array, reach in _reaches(kind, len(numbers), detail):
+                sizes[array] = max(sizes[array], reach)
+        named = [places[n] for n in sorted(self.named) if n in places]
+        listed = json.dumps([operations, named], separators=(",", ":"))
+        return Kernel(name, tuple(arguments), tuple(sizes.values()), columns, listed)
 
 
+def _reaches(kind: str, factors: int, detail: Any) -> list[tuple[str, int]]:
+    """Arrays that an operation reads or writes, and how many floats they must have."""
+    if kind == "store":
+        return [("_result", detail + 1)]
+    if kind == "sums":
+        array, first, targets = detail
+        return [(array, first + factors * padded(targets))]
+    entries = [detail] if kind == "entry" else detail if kind in VECTOR_STATEMENTS else []
+    return [(entry[0], entry[1] + 1) for entry in entries if is_entry(entry)]
+
+
+def function(kind: str, *values: Value) -> Value:
+    """A function of values, as `function("floor", x)`."""
+    return values[0].listing.new(kind, *values)
+
+
+@dataclass(frozen=True)
 class Kernel:
-    """A kernel's text as operations.
+    """A kernel, and what it wants of its arrays.
 
     Attributes
     ----------
     name, arguments
-        Of the kernel; scratch space is an argument of the text, not of the machine code.
-    operations
-        In order.
-    anchors
-        Numbers of those that statements name, store or execute, in order; others are parts of their
-        expressions.
+        Of the kernel.
     sizes
-        Argument -> smallest number of floats.
-    dimensions, columns
-        Of the result, and the length of its rows.
+        Smallest number of floats of each argument.
+    columns
+        Length of the rows of its result; 0 if that is a vector.
+    listed
+        The operations and numbers of those with names, as JSON: few programs ask for them.
     """
 
-    def __init__(self, text: str) -> None:
-        tree = ast.parse(text).body
-        if len(tree) != 1 or not isinstance(tree[0], ast.FunctionDef):
-            raise ValueError("a kernel is one function")
-        self.text, self.name = text, tree[0].name
-        self.arguments = [argument.arg for argument in tree[0].args.args]
-        reader = Reader(self.arguments)
-        for statement in tree[0].body:
-            reader.read(statement)
-        self.operations, self.anchors, self.sizes = reader.operations, reader.anchors, reader.sizes
-        stores = {n: op.detail for n, op in enumerate(self.operations) if op.kind == "store"}
-        self.dimensions = max(map(len, stores.values()), default=1)
-        # Every place of a result is written, so the largest tells its shape.
-        self.columns = 1 + max((place[-1] for place in stores.values()), default=0)
-        for number, place in stores.items():
-            if len(place) != self.dimensions:
-                raise ValueError("results have more than one shape")
-            flat = place[0] if len(place) == 1 else place[0] * self.columns + place[1]
-            self.operations[number] = self.operations[number]._replace(detail=flat)
-            self.sizes["_result"] = max(self.sizes["_result"], flat + 1)
+    name: str
+    arguments: tuple[str, ...]
+    sizes: tuple[int, ...]
+    columns: int
+    listed: str
+
+    @classmethod
+    def read(cls, written: dict[str, Any]) -> Kernel:
+        """The kernel of what `dataclasses.asdict` has made of one, and JSON of that."""
+        return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in written.items()})
+
+    @property
+    def operations(self) -> list[Operation]:
+        """The operations in order."""
+        return _read(self.listed)[0]
+
+    @property
+    def named(self) -> list[int]:
+        """Numbers of the operations that have names."""
+        return _read(self.listed)[1]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the result."""
+        size = self.sizes[self.arguments.index("_result")]
+        return (size // self.columns, self.columns) if self.columns else (size,)
+
+    @property
+    def copies(self) -> tuple[int, ...]:
+        """By result the place in the first argument of which it is a copy; -1 of other results."""
+        operations, found = self.operations, [-1] * self.sizes[-1]
+        for kind, arguments, place in operations:
+            if kind == "store" and operations[arguments[0]].kind == "entry":
+                array, entry = operations[arguments[0]].detail
+                found[place] = entry if array == self.arguments[0] else -1
+        return tuple(found)
 
     def of(self, results: Sequence[int]) -> Kernel:
         """The kernel of some results alone, which become a vector in this order."""
         stored = {op.detail: n for n, op in enumerate(self.operations) if op.kind == "store"}
         wanted = {stored[result]: place for place, result in enumerate(results)}
-        numbers = {old: new for new, old in enumerate(needed(self.operations, wanted))}
-        found = copy(self)
-        found.operations = [
-            Operation(kind, tuple(numbers[n] for n in arguments), wanted.get(old, detail))
-            for old in numbers
-            for kind, arguments, detail in [self.operations[old]]
-        ]
-        found.anchors = [numbers[n] for n in self.anchors if n in numbers]
-        found.dimensions, found.columns = 1, len(results)
-        found.sizes = self.sizes | {"_result": len(results)}
-        return found
+        operations, numbers = pruned(self.operations, wanted)
+        for old, place in wanted.items():
+            operations[numbers[old]] = operations[numbers[old]]._replace(detail=place)
+        named = [numbers[n] for n in self.named if n in numbers]
+        listed = json.dumps([operations, named], separators=(",", ":"))
+        return Kernel(self.name, self.arguments, (*self.sizes[:-1], len(results)), 0, listed)
 
     @property
-    def laned(self) -> list[str]:
-        """Arguments that differ from lane to lane: seeds if there are some, else all but constants.
+    def by_row(self) -> list[str]:
+        """Arguments that have a row for each of several samples: all but constants.
 
-        In the lanes of a tangent are directions, in those of other kernels samples.
+        Of a directional derivative the rows are directions: seeds and results have some.
         """
         seeds = [name for name in self.arguments if name.startswith(SEED)]
-        return [*seeds, "_result"] if seeds else [n for n in self.pointers if n != "_constants"]
+        return [*seeds, "_result"] if seeds else [n for n in self.arguments if n != "_constants"]
+
+    def check(self, *lengths: int) -> None:
+        """Raise `ValueError` if the kernel reads or writes more floats than its arguments have.
+
+        Parameters
+        ----------
+        lengths
+            Of the arguments in order, as far as they are known.
+        """
+        for argument, size, length in zip(self.arguments, self.sizes, lengths, strict=False):
+            if size > length:
+                raise ValueError(f"kernel {self.name}: {argument} has {length} floats, not {size}")
 
     @property
-    def pointers(self) -> list[str]:
-        """Arguments that the machine code takes: scratch space is not needed."""
-        return [name for name in self.arguments if name != "_work"]
+    def counts(self) -> dict[str, int]:
+        """How many operations it executes.
+
+        `add` (and subtract), `multiply`, `divide`, `negate`, `sqrt`, `trigonometric` (one for each
+        sine, cosine or inverse), `power`, and their sum `total`.  Loads and stores are not counted.
+        """
+        operations, used = self.operations, uses(self.operations)
+        known = {kind: kind for kind in COUNTED} | {"subtract": "add", "atan2": "trigonometric"}
+        known |= dict.fromkeys(set(FUNCTIONS) - {"sqrt", "abs"}, "trigonometric")
+        counts = dict.fromkeys(COUNTED, 0)
+        for number, (kind, arguments, _) in enumerate(operations):
+            if kind in known:
+                counts[known[kind]] += 1
+            elif kind == "part" and used[number] and operations[arguments[0]].kind != "sums":
+                counts["trigonometric"] += 1
+        return counts | {"total": sum(counts.values())}
 
 
-class Reader(Listing):
-    """Reads statements one after the other.
-
-    Parameters
-    ----------
-    arrays
-        Names of arguments.
-    known
-        Name -> number of an operation, or a value that has none yet.
-    """
-
-    def __init__(self, arrays: Collection[str], known: Mapping[str, float] | None = None) -> None:
-        super().__init__()
-        self.anchors: list[int] = []
-        self.sizes = dict.fromkeys(arrays, 0)
-        self._names = {name: self.new("number", detail=v) for name, v in (known or {}).items()}
-        self._work: dict[int, int] = {}
-
-    def _anchored(self, number: int) -> int:
-        self.anchors.append(number)
-        return number
-
-    def name(self, name: str, number: int) -> None:
-        """Give an operation a name."""
-        self._names[name] = self._anchored(number)
-
-    def read(self, statement: ast.stmt) -> None:
-        """Read a statement; `ValueError` if it is none of a kernel's."""
-        match statement:
-            case ast.Pass():
-                pass
-            case ast.Assign([ast.Name(target)], expression):
-                self.name(target, self.value(expression))
-            case ast.Assign([ast.Subscript(ast.Name("_work")) as target], expression):
-                self._work[places(target)[0]] = self._anchored(self.value(expression))
-            case ast.Assign([ast.Subscript(ast.Name("_result")) as target], expression):
-                value = self.value(expression)
-                self._anchored(self.new("store", value, detail=places(target)))
-            case ast.Assign(
-                [ast.Tuple(targets)], ast.Call(ast.Name("sincos_one"), [argument], [])
-            ) if len(targets) == 2:
-                found = self._anchored(self.new("sincos", self.value(argument)))
-                self._parts(found, targets)
-            case ast.Assign(
-                [ast.Tuple(targets)],
-                ast.Call(
-                    ast.Name("weighted_sums"),
-                    [ast.Name(array), ast.Constant(int() as first), ast.Tuple(terms)],
-                    [],
-                ),
-            ):
-                factors = [self.value(term) for term in terms]
-                reach = first + padded(len(targets)) * len(terms)
-                self.sizes[array] = max(self.sizes[array], reach)
-                detail = array, first, len(targets)
-                self._parts(self._anchored(self.new("sums", *factors, detail=detail)), targets)
-            case ast.Expr(
-                ast.Call(ast.Name(name), [ast.Name("_work"), ast.Constant(int() as first)], [])
-            ) if name in BATCHES:
-                self._batch(BATCHES[name], first)
-            case ast.Expr(ast.Call(ast.Name(name), arguments, [])) if name in VECTOR_STATEMENTS:
-                self._vectors(name, arguments)
-            case _:
-                raise ValueError(f"{ast.unparse(statement)[:80]}: not straight-line")
-
-    def _parts(self, number: int, targets: Sequence[ast.expr]) -> None:
-        for place, target in enumerate(targets):
-            self.name(ast.unparse(target), self.new("part", number, detail=place))
-
-    def _batch(self, name: str, first: int) -> None:
-        lanes = range(first, first + LANES)
-        if not all(place in self._work for place in lanes):
-            raise ValueError(f"{name}_batch(_work, {first}): not straight-line")
-        given = [self._work[place] for place in lanes]
-        found = self._anchored(self.new("batch", *given, detail=name))
-        for place in range(LANES * len(RESULTS[name])):
-            part = self._anchored(self.new("part", found, detail=place))
-            self._work[first + LANES + place] = part
-
-    def _vectors(self, name: str, arguments: Sequence[ast.expr]) -> None:
-        """A statement on whole vectors: factors are values, all else is known."""
-        values, detail = [], []
-        for place, argument in enumerate(arguments):
-            if name == "combine" and place > 1 and place % 2 == 0:
-                values.append(self.value(argument))
-            elif isinstance(argument, ast.Subscript):
-                detail.append(self._entry(argument))
-            else:
-                detail.append(ast.literal_eval(argument))
-        self._anchored(self.new(name, *values, detail=tuple(detail)))
-
-    def _entry(self, node: ast.Subscript) -> tuple[str, int]:
-        """Array and place of an entry."""
-        array, place = ast.unparse(node.value), places(node)
-        if array not in self.sizes or len(place) != 1:
-            raise ValueError(f"{ast.unparse(node)}: unknown, or of the wrong shape")
-        self.sizes[array] = max(self.sizes[array], place[0] + 1)
-        return array, place[0]
-
-    def value(self, node: ast.expr, depth: int = 0) -> int:
-        """Number of the operation that gives an expression's value."""
-        if depth > DEEPEST:
-            raise ValueError(f"expressions are more than {DEEPEST} within one another")
-
-        def inner(*parts: ast.expr) -> list[int]:
-            return [self.value(part, depth + 1) for part in parts]
-
-        match node:
-            case ast.Constant(value=float() as number):
-                return self.new("number", detail=number)
-            case ast.UnaryOp(ast.USub(), ast.Constant(value=float() as number)):
-                return self.new("number", detail=-number)
-            case ast.Name(name) if name in self._names:
-                return self._names[name]
-            case ast.Subscript(ast.Name("_work")) if (place := places(node)[0]) in self._work:
-                return self._work[place]
-            case ast.Subscript(ast.Name()):
-                if ast.unparse(node.value) != "_work":
-                    return self.new("entry", detail=self._entry(node))
-            case ast.BinOp(left, operator, right) if type(operator) in ARITHMETIC:
-                return self.new(ARITHMETIC[type(operator)], *inner(left, right))
-            case ast.UnaryOp(ast.USub(), operand):
-                return self.new("negate", *inner(operand))
-            case ast.IfExp(ast.Compare() | ast.Name() as test, then, other):
-                return self.new("select", *inner(test, then, other))
-            case ast.Compare(left, [operator], [right]) if type(operator) in COMPARISONS:
-                return self.new(COMPARISONS[type(operator)], *inner(left, right))
-            case ast.Call(ast.Name() | ast.Attribute(ast.Name()) as function, arguments, []):
-                kind = FUNCTIONS.get(ast.unparse(function), "")
-                if kind and len(arguments) == 1 + (kind == "atan2"):
-                    return self.new(kind, *inner(*arguments))
-        raise ValueError(f"{ast.unparse(node)[:80]}: unknown, or not straight-line")
+# Those of a kernel are asked for a few times one after the other.
+@lru_cache(maxsize=8)
+def _read(listed: str) -> tuple[list[Operation], list[int]]:
+    operations, named = json.loads(listed)
+    return [Operation(*map(_tuples, operation)) for operation in operations], named
 
 
-def places(node: ast.Subscript) -> tuple[int, ...]:
-    """Constant indices of an array's entry."""
-    elements = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-    found = [e.value for e in elements if isinstance(e, ast.Constant) and type(e.value) is int]
-    if len(found) != len(elements) or len(found) > 2:
-        raise ValueError(f"{ast.unparse(node)}: an index is not constant")
-    return tuple(found)
+def is_entry(detail: Any) -> bool:
+    """Whether a part of a detail is an entry of an array."""
+    return isinstance(detail, tuple) and bool(detail) and isinstance(detail[0], str)
+
+
+def _tuples(part: Any) -> Any:
+    return tuple(map(_tuples, part)) if isinstance(part, list) else part
 
 
 def uses(operations: Sequence[Operation]) -> list[int]:
@@ -325,94 +311,66 @@ def needed(operations: Sequence[Operation], roots: Collection[int]) -> list[int]
     return sorted(kept)
 
 
-# Expressions that are written are less deep; of a longer one the inside gets a name.
-SHALLOW = 12
-# Kind -> how kernels write it; see `Printer`.
-FORMS = {
-    **{kind: f"{text}({{}})" for text, kind in FUNCTIONS.items()},
-    "abs": "abs({})",
-    "atan": "atan({})",
-    "atan2": "math.atan2({}, {})",
-    **{kind: f"({{}} {sign} {{}})" for kind, sign in SIGNS.items()},
-    **{sign: f"({{}} {sign} {{}})" for sign in COMPARISONS.values()},
-    "negate": "(-{})",
-    "select": "({1} if {0} else {2})",
-}
+def pruned(
+    operations: Sequence[Operation], roots: Collection[int]
+) -> tuple[list[Operation], dict[int, int]]:
+    """The operations that others depend on, these included; number -> its new number."""
+    kept = needed(operations, roots)
+    places = {number: place for place, number in enumerate(kept)}
+    found = []
+    for number in kept:
+        kind, arguments, detail = operations[number]
+        found.append(Operation(kind, tuple(places[n] for n in arguments), detail))
+    return found, places
 
 
-class Printer:
-    """Writes operations as expressions; one that is used more than once gets a name.
+# Operations that a file may have: the largest kernel of this package has 22,000, and compiles in
+# 9 s.
+MOST_SIZE = 90_000
+# Arguments of which files may have entries.
+ARRAYS = ("_x", "_u", "_constants")
 
-    Parameters
-    ----------
-    forms
-        Kind of operation -> a form for the texts of its arguments.
-    declared
-        Form of the line that gives a name to a text.
 
-    Attributes
-    ----------
-    texts
-        Operation -> its text, a name or an expression.
-    lines
-        What has been written.
+def as_arrays(operations: Sequence[Operation]) -> dict[str, np.ndarray]:
+    """Operations with one result as numbers alone, for files.
+
+    Place of the kind in `KINDS`; arguments, of an entry the place in `ARRAYS` and in the array;
+    number.
     """
-
-    def __init__(
-        self, operations: Sequence[Operation], forms: Mapping[str, str], declared: str
-    ) -> None:
-        self.operations, self._uses = operations, uses(operations)
-        self._forms, self._declared = forms, declared
-        self._depths: dict[int, int] = {}
-        self.texts: dict[int, str] = {}
-        self.lines: list[str] = []
-
-    def write(self, number: int) -> None:
-        """Write an operation with one result; its arguments are written."""
-        kind, numbers, detail = self.operations[number]
+    kinds, arguments = list(KINDS), np.zeros((len(operations), 3), dtype=np.int64)
+    numbers = np.zeros(len(operations))
+    for n, (kind, given, detail) in enumerate(operations):
         if kind == "number":
-            text, depth = repr(detail) if detail >= 0.0 else f"({detail!r})", 0
+            numbers[n] = detail
         elif kind == "entry":
-            text, depth = f"{detail[0]}[{detail[1]}]", 0
-        else:
-            text = self._forms[kind].format(*(self.texts[n] for n in numbers), detail)
-            depth = 1 + max(self._depths.get(n, 0) for n in numbers)
-        if depth and (self._uses[number] > 1 or depth > SHALLOW):
-            self.lines.append(self._declared.format(f"v{number}", text))
-            text, depth = f"v{number}", 0
-        self.texts[number], self._depths[number] = text, depth
+            given = ARRAYS.index(detail[0]), detail[1]  # noqa: PLW2901
+        arguments[n, : len(given)] = given
+    found = np.array([kinds.index(operation.kind) for operation in operations], dtype=np.int64)
+    return {"kinds": found, "arguments": arguments, "numbers": numbers}
 
 
-def kernel_text(
-    name: str, arguments: Sequence[str], operations: Sequence[Operation], columns: int = 0
-) -> str:
-    """Text of a kernel of all stores; with columns its result is a matrix."""
-    printer, work, firsts = Printer(operations, FORMS, "{} = {}"), 0, {}
-    lines, texts = printer.lines, printer.texts
-    stores = [n for n, operation in enumerate(operations) if operation.kind == "store"]
-    for number in needed(operations, stores):
-        kind, numbers, detail = operations[number]
-        match kind:
-            case "store":
-                place = f"{detail // columns}, {detail % columns}" if columns else detail
-                lines.append(f"_result[{place}] = {texts[numbers[0]]}")
-            case "sincos":
-                lines.append(f"v{number}_0, v{number}_1 = sincos_one({texts[numbers[0]]})")
-            case "sums":
-                array, first, targets = detail
-                names = ", ".join(f"v{number}_{k}" for k in range(targets))
-                factors = ", ".join(texts[n] for n in numbers)
-                lines.append(f"({names},) = weighted_sums({array}, {first}, ({factors},))")
-            case "batch":
-                firsts[number] = work
-                lines += [f"_work[{work + k}] = {texts[n]}" for k, n in enumerate(numbers)]
-                lines.append(f"{detail}_batch(_work, {work})")
-                work += LANES * (1 + len(RESULTS[detail]))
-            case "part" if numbers[0] in firsts:
-                texts[number] = f"_work[{firsts[numbers[0]] + LANES + detail}]"
-            case "part":
-                texts[number] = f"v{numbers[0]}_{detail}"
-            case _:
-                printer.write(number)
-    body = "\n    ".join(lines or ["pass"])
-    return f"def {name}({', '.join(arguments)}):\n    {body}\n"
+def of_arrays(
+    kinds: np.ndarray, arguments: np.ndarray, numbers: np.ndarray
+) -> tuple[Operation, ...]:
+    """Operations from what `as_arrays` gives; `ValueError` or `IndexError` if they are none."""
+    n = len(kinds)
+    if not (
+        (kinds.dtype, arguments.dtype, numbers.dtype) == (np.int64, np.int64, np.float64)
+        and (kinds.shape, arguments.shape, numbers.shape) == ((n,), (n, 3), (n,))
+        and n <= MOST_SIZE
+        and ((kinds >= 0) & (kinds < len(KINDS))).all()
+        and (arguments >= 0).all()
+    ):
+        raise ValueError("operations have arrays that don't fit one another")
+    table, found = [*KINDS.items()], []
+    for place, (number, given) in enumerate(zip(kinds.tolist(), arguments.tolist(), strict=True)):
+        kind, count = table[number]
+        detail = None
+        if kind == "number":
+            detail = float(numbers[place])
+        elif kind == "entry":
+            detail = ARRAYS[given[0]], given[1]
+        if max(given[:count], default=-1) >= place:
+            raise ValueError(f"operation {place} takes what is not there yet")
+        found.append(Operation(kind, tuple(given[:count]), detail))
+    return tuple(found)

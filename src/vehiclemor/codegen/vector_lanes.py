@@ -4,13 +4,10 @@
 # of them; fewer than the smallest batch one by one.  Kernels along a path take as many samples.
 LANES = 8
 SMALLEST_BATCH = 3
-# Directions that a tangent takes at once: what they share is computed once.
+# Directions that a derivative takes at once: what they share is computed once.
 DIRECTIONS = 16
 # Floats in a vector: half a batch; vectors of 512 bits were a fifth slower.
 WIDTH = LANES // 2
-# Batched function -> prefixes of its results; its block in the scratch space has one part for the
-# arguments and one for each result.
-RESULTS = {"sincos": ("_sin", "_cos"), "atan": ("_atan",)}
 
 
 def padded(count: int) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vehiclemor.codegen import operations
+from vehiclemor.codegen.operations import COMPARISONS, uses
 from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
 from vehiclemor.exporting.system import SIGNATURES, TANGENTS, TOOL, ExportedSystem
 
@@ -23,9 +23,15 @@ static double entry(double row, int place)
 {
     return vehiclemor_table[(long)row + place];
 }"""
-# Kind of operation -> how C writes it, see `operations.Printer`.
-FORMS = operations.FORMS | {
+# Kind of operation -> how C writes it.
+FORMS = {
     **{kind: f"{kind}({{}})" for kind in FUNCTIONS},
+    **{sign: f"({{}} {sign} {{}})" for sign in COMPARISONS},
+    "add": "({} + {})",
+    "subtract": "({} - {})",
+    "multiply": "({} * {})",
+    "divide": "({} / {})",
+    "negate": "(-{})",
     "abs": "fabs({})",
     "atan2": "atan2({}, {})",
     "max": "fmax({}, {})",
@@ -34,6 +40,8 @@ FORMS = operations.FORMS | {
     "select": "select({}, {}, {})",
     "table": "entry({}, {})",
 }
+# Expressions that are written are less deep; of a longer one the inside gets a name.
+SHALLOW = 12
 # Parameters have their places whether anything here depends on them or not.
 START_ALONE = "of the start alone, no effect here"
 HEADER, MODEL, TANGENT = "vehiclemor_model.h", "vehiclemor_model.c", "vehiclemor_tangent.c"
@@ -160,11 +168,25 @@ def _array(name: str, values: np.ndarray) -> str:
 def _function(name: str, function: StraightLine) -> str:
     """Definition of a function."""
     *given, result = (SIGNATURES | TANGENTS)[name]
-    printer = operations.Printer(function.operations, FORMS, "    const double {} = {};")
+    operations, counts = function.operations, uses(function.operations)
+    texts: dict[int, str] = {}
+    depths: dict[int, int] = {}
+    lines = [_signature(name), "{"]
     for number in function.needed:
-        printer.write(number)
-    stored = [f"    {result}[{i}] = {printer.texts[n]};" for i, n in enumerate(function.results)]
-    lines = [_signature(name), "{", *printer.lines, *stored]
+        kind, numbers, detail = operations[number]
+        depth = 1 + max((depths[n] for n in numbers), default=-1)
+        if kind == "number":
+            text = repr(detail) if detail >= 0.0 else f"({detail!r})"
+        elif kind == "entry":
+            text = f"{detail[0]}[{detail[1]}]"
+        else:
+            text = FORMS[kind].format(*(texts[n] for n in numbers), detail)
+            # What is used more than once has a name.
+            if counts[number] > 1 or depth > SHALLOW:
+                lines.append(f"    const double v{number} = {text};")
+                text, depth = f"v{number}", 0
+        texts[number], depths[number] = text, depth
+    lines += [f"    {result}[{i}] = {texts[n]};" for i, n in enumerate(function.results)]
     text = "\n".join(lines)
     # What is not read is said so, for compilers that ask.
     unread = [a for a in (*given, result) if f" {a}[" not in text and f"({a}[" not in text]

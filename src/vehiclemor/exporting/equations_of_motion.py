@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from vehiclemor.codegen.kernels import KernelSource
+from vehiclemor.codegen.operations import Kernel, Value
 from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.exporting.system import SEED, SIGNATURES, TRUST, ExportedSystem
 from vehiclemor.multibody.quantities import Quantity
@@ -32,17 +32,17 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
         parameter_quantities(model),
         np.concatenate([flat, [solved[key] for key in definition.solved]]),
         model.initial,
-        {key: lines.function(lines.include(sources[key].text, given)) for key in SIGNATURES},
+        {key: lines.function(lines.include(sources[key], given)) for key in SIGNATURES},
         lambda: {
             f"{key}_tangent": lines.function(
-                lines.tangent(sources[key], given, seeds_of(lines, given))
+                lines.derivative(sources[key], given, seeds_of(lines, given))
             )
             for key in SIGNATURES
         },
     )
 
 
-def full_arrays(lines: Lines, model: Model) -> dict[str, list[int]]:
+def full_arrays(lines: Lines, model: Model) -> dict[str, list[Value]]:
     """Arguments of a model's kernels, but for the state, in the entries of the exported arrays."""
     return {
         "_u": lines.entries("u", len(model.inputs)),
@@ -51,7 +51,7 @@ def full_arrays(lines: Lines, model: Model) -> dict[str, list[int]]:
     }
 
 
-def seeds_of(lines: Lines, arrays: Mapping[str, Sequence[int]]) -> dict[str, list[int]]:
+def seeds_of(lines: Lines, arrays: Mapping[str, Sequence]) -> dict[str, list[Value]]:
     """What the entries of arrays change by."""
     return {key: lines.entries(f"{key[1]}{SEED}", len(listed)) for key, listed in arrays.items()}
 
@@ -67,7 +67,7 @@ def parameter_quantities(model: Model) -> tuple[Quantity, ...]:
 
 
 def reduced_system(
-    reduced: ReducedSystem, name: str, lift: tuple[KernelSource, np.ndarray] | None
+    reduced: ReducedSystem, name: str, lift: tuple[Kernel, np.ndarray] | None
 ) -> ExportedSystem:
     """A reduced system: its states are lifted, then the model's outputs follow from them.
 
@@ -89,19 +89,19 @@ def reduced_system(
     lifted, of_lift = own["_x"], own
     if lift is not None:
         of_lift = own | {"_constants": lines.numbers(lift[1])}
-        lifted = lines.include(lift[0].text, of_lift)
+        lifted = lines.include(lift[0], of_lift)
     given = {"_x": lifted, "_u": own["_u"], "_constants": lines.numbers(model.constants)}
-    outputs, used = lines.include(source.text, given), lifted[full:]
+    outputs, used = lines.include(source, given), lifted[full:]
     nothing = lines.function(())
 
     def tangents() -> dict[str, StraightLine]:
         seeds = seeds_of(lines, own)
-        moved = seeds["_x"] if lift is None else lines.tangent(lift[0], of_lift, seeds)
-        found = lines.tangent(source, given, seeds | {"_x": moved})
-        further = [lines.largest_tangent(used, moved[full:])] if used else []
+        moved = seeds["_x"] if lift is None else lines.derivative(lift[0], of_lift, seeds)
+        found = lines.derivative(source, given, seeds | {"_x": moved})
+        further = [lines.largest_derivative(used, moved[full:])] if used else []
         return {
             "constants_tangent": nothing,
-            "derivative_tangent": lines.function(lines.tangent(rates, of_rates, seeds)),
+            "derivative_tangent": lines.function(lines.derivative(rates, of_rates, seeds)),
             "outputs_tangent": lines.function([*found, *further]),
         }
 
@@ -118,7 +118,7 @@ def reduced_system(
         {key: reduced.begin(key, at_rest) for key in model.starts},
         {
             "constants": nothing,
-            "derivative": lines.function(lines.include(rates.text, of_rates)),
+            "derivative": lines.function(lines.include(rates, of_rates)),
             "outputs": lines.function([*outputs, *([lines.largest(used)] if used else [])]),
         },
         tangents,

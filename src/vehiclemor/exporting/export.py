@@ -141,17 +141,14 @@ def system_of(model: Model | ReducedOrderModel) -> ExportedSystem:
 
 
 def _object(system: ExportedSystem, to: str) -> Any:
-    if to == "casadi":
-        from vehiclemor.exporting.to_casadi import casadi_function
+    from vehiclemor.exporting import libraries
 
-        return casadi_function(system)
-    if to == "jax":
-        from vehiclemor.exporting.to_jax import jax_function
-
-        return jax_function(system)
-    from vehiclemor.exporting.to_sympy import sympy_expressions
-
-    return sympy_expressions(system)
+    made = {
+        "casadi": libraries.casadi_function,
+        "jax": libraries.jax_function,
+        "sympy": libraries.sympy_expressions,
+    }
+    return made[to](system)
 
 
 def _writer(system: ExportedSystem, to: str, step: float) -> Callable[[Path], object]:

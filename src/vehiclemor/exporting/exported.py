@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from vehiclemor.codegen.kernels import kernel_sources
 from vehiclemor.errors import InputError
 from vehiclemor.exporting.equations_of_motion import full_system, reduced_system
 from vehiclemor.exporting.mechanism import mechanism_system
@@ -42,9 +41,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
         case PathMapModel():
             return map_system(what, name)
         case ReducedVehicle():
-            text, constants = what.lift.text(0)
-            lift = kernel_sources(text)["full_state"], constants
-            return reduced_system(what, name, lift)
+            return reduced_system(what, name, what.lift.kernel(0))
         case ReducedSystem() if what.spaces.formulation == "full":
             if what.states == what.model.definition.states:
                 return reduced_system(what, name, None)

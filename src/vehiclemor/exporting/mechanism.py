@@ -28,18 +28,18 @@ def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
     given, nothing = full_arrays(lines, model), lines.function(())
     q, correction = lines.numbers(model.start()), []
     for _ in range(STEPS):
-        correction = lines.include(sources["newton_step"].text, given | {"_q": q})
-        q = [lines.new("subtract", *pair) for pair in zip(q, correction, strict=True)]
+        correction = lines.include(sources["newton_step"], given | {"_q": q})
+        q = [place - change for place, change in zip(q, correction, strict=True)]
     solved = given | {"_q": q}
-    outputs = lines.include(sources["outputs"].text, solved)
+    outputs = lines.include(sources["outputs"], solved)
 
     def tangents() -> dict[str, StraightLine]:
         seeds = seeds_of(lines, given)
         # The residual is zero: the position changes by minus what the next step does.
-        falling = lines.tangent(sources["newton_step"], solved, seeds)
-        moved = [lines.new("negate", change) for change in falling]
-        found = lines.tangent(sources["outputs"], solved, seeds | {"_q": moved})
-        constants = lines.tangent(sources["constants"], given, seeds)
+        falling = lines.derivative(sources["newton_step"], solved, seeds)
+        moved = [-change for change in falling]
+        found = lines.derivative(sources["outputs"], solved, seeds | {"_q": moved})
+        constants = lines.derivative(sources["constants"], given, seeds)
         return {
             "constants_tangent": lines.function(constants),
             "derivative_tangent": nothing,
@@ -56,7 +56,7 @@ def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
         model.parameters.flat(),
         {model.starts[0]: np.zeros(0)},
         {
-            "constants": lines.function(lines.include(sources["constants"].text, given)),
+            "constants": lines.function(lines.include(sources["constants"], given)),
             "derivative": nothing,
             "outputs": lines.function([*outputs, lines.largest(correction)]),
         },

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vehiclemor.codegen.kernels import kernel_sources
+from vehiclemor.codegen.operations import Value
 from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.exporting.system import SEED, TRUST, ExportedSystem
@@ -20,26 +20,24 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
     table[:, :, : len(kept)] = coefficients[:, :, kept]
     lines, size, n = Lines(), table[0].size, len(definition.inputs)
     places, row, used = _cell(lines, reduced, size)
-    (source,) = kernel_sources(
-        map_kernel(reduced.moving, reduced.degree, tuple(kept.index(c) for c in columns))
-    ).values()
+    own = tuple(kept.index(column) for column in columns)
+    kernel = map_kernel(reduced.moving, reduced.degree, own)
     given = {
         "_x": places,
         "_coefficients": [lines.new("table", row, detail=place) for place in range(size)],
     }
-    outputs, nothing = lines.include(source.text, given), lines.function(())
+    outputs, nothing = lines.include(kernel, given), lines.function(())
 
     def tangents() -> dict[str, StraightLine]:
         scales, halves = reduced.cells.scales, reduced.cells.halves
         seeds = lines.entries(f"u{SEED}", n)
-        moved = [lines.new("multiply", *p) for p in zip(lines.numbers(scales), seeds, strict=True)]
-        doubled = lines.numbers(2.0 * halves)
-        steps = [lines.new("multiply", *pair) for pair in zip(doubled, moved, strict=True)]
-        found = lines.tangent(source, given, {"_x": steps})
+        changes = [scale * seed for scale, seed in zip(scales.tolist(), seeds, strict=True)]
+        steps = [2.0 * half * c for half, c in zip(halves.tolist(), changes, strict=True)]
+        found = lines.derivative(kernel, given, {"_x": steps})
         return {
             "constants_tangent": nothing,
             "derivative_tangent": nothing,
-            "outputs_tangent": lines.function([*found, lines.largest_tangent(used, moved)]),
+            "outputs_tangent": lines.function([*found, lines.largest_derivative(used, changes)]),
         }
 
     return ExportedSystem(
@@ -61,21 +59,18 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
     )
 
 
-def _cell(lines: Lines, reduced: PathMapModel, size: int) -> tuple[list[int], int, list[int]]:
+def _cell(lines: Lines, reduced: PathMapModel, size: int) -> tuple[list[Value], Value, list[Value]]:
     """Places in a cell, where its coefficients begin, and places in the box.
 
     It does what `map_loops.map_path` does for a sample.
     """
-    new, (one, two, zero) = lines.new, lines.numbers([1.0, 2.0, 0.0])
-    places, within, row = [], [], zero
-    cells = reduced.cells
+    places, within, row, cells = [], [], lines.number(0.0), reduced.cells
     for i, u in enumerate(lines.entries("u", len(cells.centres))):
-        numbers = (a[i] for a in (cells.centres, cells.scales, cells.halves, cells.tops))
-        centre, scale, half, top = lines.numbers(numbers)
-        (count,) = lines.numbers([cells.numbers[i]])
-        within.append(new("multiply", new("subtract", u, centre), scale))
-        place = new("multiply", new("add", within[-1], one), half)
-        cell = new("min", new("max", new("floor", place), zero), top)
-        places.append(new("subtract", new("multiply", two, new("subtract", place, cell)), one))
-        row = new("add", new("multiply", row, count), cell)
-    return places, new("multiply", row, *lines.numbers([size])), within
+        numbers = (float(a[i]) for a in (cells.centres, cells.scales, cells.halves, cells.tops))
+        centre, scale, half, top = numbers
+        within.append((u - centre) * scale)
+        place = (within[-1] + 1.0) * half
+        cell = lines.new("min", lines.new("max", lines.new("floor", place), 0.0), top)
+        places.append(2.0 * (place - cell) - 1.0)
+        row = row * float(cells.numbers[i]) + cell
+    return places, row * float(size), within

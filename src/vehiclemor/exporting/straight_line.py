@@ -11,17 +11,15 @@ import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from vehiclemor.codegen.kernels import KernelSource
-from vehiclemor.codegen.operations import SEED, Kernel, Listing, Operation, needed, uses
-from vehiclemor.codegen.tangent import tangent_source
+from vehiclemor.codegen.derivatives import derivative
+from vehiclemor.codegen.operations import SEED, Kernel, Listing, Operation, Value, needed, uses
 from vehiclemor.codegen.vector_lanes import padded
 
-# Functions that other systems must have, by the names of C's library.
+# Functions that other systems must have.
 FUNCTIONS = (
     *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
-    *("atan2", "fabs", "fmax", "fmin", "floor"),
+    *("atan2", "abs", "max", "min", "floor"),
 )
-RENAMED = {"abs": "fabs", "max": "fmax", "min": "fmin"}
 # Function that has batches -> what gives its results.
 PARTS = {"sincos": ("sin", "cos"), "atan": ("atan",)}
 OPERATORS: dict[str, Callable[..., Any]] = {
@@ -38,7 +36,7 @@ OPERATORS: dict[str, Callable[..., Any]] = {
     "==": operator.eq,
     "!=": operator.ne,
 }
-Given = Mapping[str, Sequence[int]]
+Given = Mapping[str, Sequence[Value]]
 
 
 class StraightLine(NamedTuple):
@@ -61,29 +59,30 @@ class StraightLine(NamedTuple):
 class Lines(Listing):
     """Operations that several functions share, written one after the other."""
 
-    def entries(self, array: str, count: int) -> list[int]:
+    def entries(self, array: str, count: int) -> list[Value]:
         """Entries of an array."""
-        return [self.new("entry", detail=(array, place)) for place in range(count)]
+        return [self.entry(array, place) for place in range(count)]
 
-    def numbers(self, values: Iterable[float]) -> list[int]:
+    def numbers(self, values: Iterable[float]) -> list[Value]:
         """Numbers."""
-        return [self.new("number", detail=float(value)) for value in values]
+        return [self.number(value) for value in values]
 
-    def function(self, results: Sequence[int]) -> StraightLine:
+    def function(self, results: Sequence[Value]) -> StraightLine:
         """The function of these results."""
-        return StraightLine(self.operations, results)
+        return StraightLine(self.operations, [result.number for result in results])
 
-    def include(self, text: str, given: Given) -> list[int]:
+    def include(self, kernel: Kernel, given: Given) -> list[Value]:
         """Write a kernel out; its results, row by row.
 
         Parameters
         ----------
         given
-            Argument as the text names it -> number of each of its entries.
+            Argument -> its entries.
         """
-        kernel, numbers, stored = Kernel(text), [], {}
+        written: list[Any] = []
+        stored = {}
         for kind, arguments, detail in kernel.operations:
-            values = [numbers[n] for n in arguments]
+            values = [written[n] for n in arguments]
             match kind:
                 case "entry":
                     found: Any = given[detail[0]][detail[1]]
@@ -99,55 +98,50 @@ class Lines(Listing):
                     found = values[0][detail]
                 case _:
                     found = self.new(kind, *values, detail=detail)
-            numbers.append(found)
+            written.append(found)
         return [stored[place] for place in sorted(stored)]
 
-    def tangent(self, source: KernelSource, given: Given, seeds: Given) -> list[int]:
-        """The derivative of a kernel along seeds of some of its arguments, see `tangent_text`."""
-        moved = {name: seed for name, seed in seeds.items() if name in source.arguments}
-        text = tangent_source(source, tuple(moved)).text
-        return self.include(text, {**given} | {SEED + name: seed for name, seed in moved.items()})
+    def derivative(self, kernel: Kernel, given: Given, seeds: Given) -> list[Value]:
+        """The derivative of a kernel along seeds of some of its arguments, see `derivatives`."""
+        own = {name: seed for name, seed in seeds.items() if name in kernel.arguments}
+        seeded = {SEED + name: seed for name, seed in own.items()}
+        return self.include(derivative(kernel, tuple(own)), {**given, **seeded})
 
     def _sums(
-        self, given: Given, factors: Sequence[int], array: str, first: int, targets: int
-    ) -> list[int]:
+        self, given: Given, factors: Sequence[Value], array: str, first: int, targets: int
+    ) -> list[Value]:
         """Sums of factors times weights, of which zeros are left out."""
         zero, one = (Operation("number", (), number) for number in (0.0, 1.0))
         rows, found = given[array][first:], []
         for column in range(targets):
             terms = []
             for weight, factor in zip(rows[column :: padded(targets)], factors, strict=False):
-                if self.operations[weight] != zero:
-                    alone = self.operations[factor] == one
-                    terms.append(weight if alone else self.new("multiply", weight, factor))
+                if self.operations[weight.number] != zero:
+                    alone = self.operations[factor.number] == one
+                    terms.append(weight if alone else weight * factor)
             found.append(self._total(terms))
         return found
 
-    def _total(self, terms: Sequence[int]) -> int:
+    def _total(self, terms: Sequence[Value]) -> Value:
         """Sum of terms in pairs: shallow for whoever walks through it, and rounded less."""
         if len(terms) < 2:
-            return terms[0] if terms else self.new("number", detail=0.0)
+            return terms[0] if terms else self.number(0.0)
         half = len(terms) // 2
-        return self.new("add", self._total(terms[:half]), self._total(terms[half:]))
+        return self._total(terms[:half]) + self._total(terms[half:])
 
-    def largest(self, values: Sequence[int]) -> int:
+    def largest(self, values: Sequence[Value]) -> Value:
         """The largest magnitude: what tells how far a state goes in what a model knows."""
-        first, *others = [self.new("abs", value) for value in values]
+        first, *others = map(abs, values)
         for value in others:
             first = self.new("max", first, value)
         return first
 
-    def largest_tangent(self, values: Sequence[int], moved: Sequence[int]) -> int:
+    def largest_derivative(self, values: Sequence[Value], changes: Sequence[Value]) -> Value:
         """Derivative of the largest magnitude, of values that change so."""
-        zero, largest, found = self.new("number", detail=0.0), self.largest(values), None
-        for value, change in zip(values, moved, strict=True):
-            falls = self.new("<", value, zero)
-            own = self.new("select", falls, self.new("negate", change), change)
-            if found is not None:
-                here = self.new(">=", self.new("abs", value), largest)
-                own = self.new("select", here, own, found)
-            found = own
-        assert found is not None
+        largest, found = self.largest(values), self.number(0.0)
+        for value, change in zip(values, changes, strict=True):
+            own = self.new("select", self.new("<", value, 0.0), -change, change)
+            found = self.new("select", self.new(">=", abs(value), largest), own, found)
         return found
 
 
@@ -180,7 +174,7 @@ def evaluated(
         elif kind == "table":
             found = functions["entry"](*values, detail)
         else:
-            found = computed[RENAMED.get(kind, kind)](*values)
+            found = computed[kind](*values)
             found = let(found) if let and counts[number] > 1 else found
         known[number] = found
     return [known[number] for number in function.results]

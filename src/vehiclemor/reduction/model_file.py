@@ -1,7 +1,7 @@
 """Reduced models as files: one netCDF-4 file with all that they are made of, and nothing to run.
 
-Numbers are variables by the names of the fields that they stand in; their order and the texts
-of features are JSON.  Machine code is made of these texts, or comes from the cache.
+Numbers are variables by the names of the fields that they stand in, operations of features too;
+their order is JSON.  Machine code is made of these operations, or comes from the cache.
 """
 
 from __future__ import annotations

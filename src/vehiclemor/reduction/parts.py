@@ -3,7 +3,7 @@
 What a method's `fit` gives is a tree of dataclasses and named tuples.  It is written field by
 field; the full-order model and its system are only referred to.  What is read can name the classes
 of this package that check their sizes, see `sizes`, and those of a plug-in that is in use, and
-nothing else: no text becomes Python.
+nothing else.  Operations of kernels are arrays of numbers: no text becomes Python.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any, ClassVar, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from vehiclemor.arguments import quoted
+from vehiclemor.codegen.operations import Operation, as_arrays, of_arrays
 from vehiclemor.errors import InputError
 from vehiclemor.registry import GROUPS
 from vehiclemor.simulation.model import Model
@@ -64,6 +65,9 @@ class Writer:
             name = _name(value, place)
             fields = {name: self.part(getattr(value, name), f"{place}.{name}") for name in names}
             return {"class": name, "fields": fields}
+        if kind is tuple and value and isinstance(value[0], Operation):
+            arrays = as_arrays(value)
+            return {"operations": {n: self._array(a, f"{place}.{n}") for n, a in arrays.items()}}
         if kind in (tuple, list):
             items = [self.part(item, f"{place}.{i}") for i, item in enumerate(value)]
             return {kind.__name__: items}
@@ -119,6 +123,10 @@ class Reader:
                 made = kind(**{key: self.value(v, f"{place}.{key}") for key, v in fields.items()})
                 _check(made)
                 return made
+            case {"operations": arrays}:
+                return of_arrays(
+                    *(self.value(arrays[n], place) for n in ("kinds", "arguments", "numbers"))
+                )
             case {"tuple": items}:
                 return tuple(self.value(item, f"{place}.{i}") for i, item in enumerate(items))
             case {"list": items}:

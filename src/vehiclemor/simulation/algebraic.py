@@ -345,8 +345,7 @@ class AlgebraicModel(Model):
         """
         n, parts = len(self.coordinates), self.equations.sources["tangent_parts"].sizes[-1]
         sizes = {"N": n, "INPUTS": len(self.inputs), "ENTRIES": parts - n}
-        texts = {key: kernel.text for key, kernel in self.equations.sources.items()}
-        inlined = {key: texts[key] for key in INLINED_KERNELS}
+        inlined = {key: self.equations.sources[key] for key in INLINED_KERNELS}
         modules = (*KINEMATIC_LOOPS, *further)
         return loops(modules, (name,), inlined, sizes)[name]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.codegen.tangent import tangent
+from vehiclemor.codegen.derivatives import sensitivity
 from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
@@ -86,8 +86,8 @@ def constants_along(
         directions[:, len(flat) :] = differences(solved, flat, numbers)
     given = np.concatenate([flat, solved(flat)]) if definition.solved else flat
     source = equations.sources["constants"]
-    along = tangent(source, source.arguments[0], equations.constants, len(given))
-    return along.columns((given,), directions)
+    found = sensitivity(source, source.arguments[0], equations.constants, len(given))
+    return found.columns((given,), directions)
 
 
 def differences(

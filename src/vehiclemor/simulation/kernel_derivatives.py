@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import quoted
+from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.tangent import Tangent, tangent
 from vehiclemor.errors import InputError
 from vehiclemor.registry import choice
 
@@ -24,19 +24,19 @@ By = str | Sequence[str]
 
 def partial(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int) -> np.ndarray:
     """Derivatives (size, n) of a kernel's result by the entries of the argument at a place."""
-    return _tangent(kernels, name, arrays, size, place).jacobian(arrays)
+    return _sensitivity(kernels, name, arrays, size, place).jacobian(arrays)
 
 
 def along(
     kernels: Kernels, name: str, arrays: Arrays, size: int, place: int, directions: np.ndarray
 ) -> np.ndarray:
     """Derivatives (k, size) of a kernel's result along directions (k, n) of one argument."""
-    return _tangent(kernels, name, arrays, size, place).columns(arrays, directions)
+    return _sensitivity(kernels, name, arrays, size, place).columns(arrays, directions)
 
 
-def _tangent(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int) -> Tangent:
+def _sensitivity(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int) -> Sensitivity:
     source = kernels.sources[name]
-    return tangent(source, source.arguments[place], size, len(arrays[place]))
+    return sensitivity(source, source.arguments[place], size, len(arrays[place]))
 
 
 def parameter_names(by: Any) -> tuple[str, ...]:

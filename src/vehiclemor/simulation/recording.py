@@ -70,6 +70,11 @@ class Recorder:
         call()
         return result.T
 
+    @cached_property
+    def _copied(self) -> tuple[int, ...]:
+        """By output the number of the state that it is, -1 where it is another quantity."""
+        return self.model.kernels.sources["outputs"].copies
+
     def packed(
         self, names: tuple[str, ...], rows: int, ranges: np.ndarray = NO_RANGES
     ) -> tuple[Ready, int]:
@@ -83,7 +88,7 @@ class Recorder:
         lanes = LANES if rows >= LANES else 1
         if (names, lanes) not in self._packed:
             model = self.model
-            states, copied = model.definition.states, model.equations.copied
+            states, copied = model.definition.states, self._copied
             kernel, columns = [], []
             for name in names:
                 number = model.outputs.index(name) if name in model.outputs else -1

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.errors import InputError
@@ -17,7 +17,7 @@ from vehiclemor.simulation.checks import check_positive, loop_array, output_time
 from vehiclemor.simulation.formulations import FORMULATIONS
 from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
 from vehiclemor.simulation.integrators import catalogue
-from vehiclemor.simulation.integrators.step_text import Frame
+from vehiclemor.simulation.integrators.step_kernels import Frame
 from vehiclemor.simulation.integrators.structures import (
     NOT_FINITE,
     SINGULAR,
@@ -177,8 +177,8 @@ class System(ShortRepr):
         """Address of the kernel that takes whole steps of an integrator."""
         stepped = catalogue.integrator(solver).stepped
         assert stepped
-        sources = kernel_sources(stepped.text(self.frame, self.inputs))
-        return address_of(Kernels(sources), next(iter(sources)))
+        kernel = stepped.kernel(self.frame, self.inputs)
+        return address_of(Kernels([kernel]), kernel.name)
 
     def method(self, solver: str, active: np.ndarray) -> Ready:
         """What an integrator needs beside its code; kept for further runs."""

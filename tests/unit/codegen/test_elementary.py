@@ -1,6 +1,4 @@
-"""Sine, cosine, arctangent and exponential of the kernels, in plain Python and compiled."""
-
-import math
+"""Sine, cosine, arctangent and exponential of the kernels, compiled."""
 
 import mpmath as mp
 import numpy as np
@@ -8,39 +6,47 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vehiclemor.codegen import exponential
-from vehiclemor.codegen.arctangent import TAN_3_PI_8, atan
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
-from vehiclemor.codegen.sincos import sincos
+from tests.unit.kernels import batch, kernel, sincos
+from vehiclemor.codegen.elementary import TAN_3_PI_8
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.operations import function
+from vehiclemor.codegen.vector_lanes import LANES
 
 # Largest rounding error of sine's polynomials and of the last addition.
 ACCURACY = 1.7e-16
-PLACES = range(8)
-BATCHES = [
-    *(f"_work[{k}] = _x[{k}]\n    _work[{k + 24}] = _x[{k}]" for k in PLACES),
-    "sincos_batch(_work, 0)\n    atan_batch(_work, 24)",
-    *(f"_result[{k}, {c}] = _work[{p + k}]" for k in PLACES for c, p in enumerate((8, 16, 32))),
-]
-ALONE = ["s, c = sincos_one(_x[0])"] + [
-    f"_result[{k}] = {value}"
-    for k, value in enumerate(("s", "c", "atan(_x[0])", "math.exp(_x[0])"))
-]
 
 
-def compiled(head: str, lines: list[str]):
-    kernels = Kernels(kernel_sources(f"def {head}:\n    " + "\n    ".join(lines) + "\n"))
-    (name,) = kernels.sources
-    return lambda *arrays: kernels.call(name, *arrays)
+def batches(x, result):
+    given = [x[k] for k in range(LANES)]
+    columns = np.array([*batch("sincos", given), *batch("atan", given)]).reshape(3, LANES)
+    for place in np.ndindex(LANES, 3):
+        result[place] = columns[place[::-1]]
+
+
+def alone(x, result):
+    result[0], result[1] = sincos(x[0])
+    result[2], result[3] = function("atan", x[0]), function("exp", x[0])
+
+
+BATCHES, ALONE = Kernels([kernel(batches, columns=3)]), Kernels([kernel(alone)])
 
 
 def in_batches(x: np.ndarray) -> np.ndarray:
     """Sines, cosines and arctangents (n, 3) by the compiled batches of eight."""
-    blocks = np.zeros((-(-len(x) // 8), 8))
+    blocks = np.zeros((-(-len(x) // LANES), LANES))
     blocks.ravel()[: len(x)] = x
-    found, kernel = np.full((len(blocks), 8, 3), np.nan), compiled("b(_x, _work, _result)", BATCHES)
+    found = np.full((len(blocks), LANES, 3), np.nan)
     for block, into in zip(blocks, found, strict=True):
-        kernel(block, into)
+        BATCHES.call("batches", block, into)
     return found.reshape(-1, 3)[: len(x)]
+
+
+def one_by_one(x: np.ndarray) -> np.ndarray:
+    """Sines, cosines, arctangents and exponentials (n, 4)."""
+    found = np.full((len(x), 4), np.nan)
+    for value, into in zip(x, found, strict=True):
+        ALONE.call("alone", np.array([value]), into)
+    return found
 
 
 def precise(x: np.ndarray, *functions) -> np.ndarray:
@@ -53,7 +59,7 @@ def test_sine_and_cosine_are_as_accurate_as_they_say(scale, rng):
     borders = np.arange(-9, 10) * (np.pi / 4.0)
     near = np.concatenate([borders, np.nextafter(borders, 99.0), np.nextafter(borders, -99.0)])
     angles = np.concatenate([rng.uniform(-scale, scale, 400), near])
-    for found in (in_batches(angles)[:, :2], np.array([sincos(float(a)) for a in angles])):
+    for found in (in_batches(angles)[:, :2], one_by_one(angles)[:, :2]):
         with mp.workdps(40):
             errors = precise(angles, mp.sin, mp.cos) - found
             assert max(abs(e) for e in errors.ravel()) < ACCURACY
@@ -67,12 +73,13 @@ def test_small_angles_keep_their_relative_accuracy():
 
 @given(angle=st.floats(-1e4, 1e4))
 def test_identities_of_sine_and_cosine_hold(angle):
-    sine, cosine = sincos(angle)
+    (sine, cosine), opposite, turned = one_by_one(np.array([angle, -angle, angle + np.pi / 2.0]))[
+        :, :2
+    ]
     assert sine * sine + cosine * cosine == pytest.approx(1.0, abs=5e-16)
-    assert sincos(-angle) == pytest.approx((-sine, cosine), abs=2 * ACCURACY)
+    assert opposite.tolist() == pytest.approx((-sine, cosine), abs=2 * ACCURACY)
     rounding = np.spacing(abs(angle) + 2.0)
-    turned = sincos(angle + np.pi / 2.0)
-    assert turned == pytest.approx((cosine, -sine), abs=rounding + 2 * ACCURACY)
+    assert turned.tolist() == pytest.approx((cosine, -sine), abs=rounding + 2 * ACCURACY)
 
 
 def test_lanes_do_not_disturb_each_other_and_infinite_angles_give_no_number():
@@ -85,31 +92,28 @@ def test_lanes_do_not_disturb_each_other_and_infinite_angles_give_no_number():
 
 def test_arctangent_is_as_accurate_as_it_says(rng):
     points = np.concatenate([rng.uniform(-4.0, 4.0, 1500), rng.standard_cauchy(500)])
-    expected = precise(points, mp.atan)[:, 0]
+    expected, found = precise(points, mp.atan)[:, 0], in_batches(points)[:, 2]
     with mp.workdps(40):
-        errors = [abs(atan(float(x)) / e - 1) for x, e in zip(points, expected, strict=True)]
+        errors = [abs(mp.mpf(float(f)) / e - 1) for f, e in zip(found, expected, strict=True)]
     assert max(errors) < 2.3e-16
     # Where the argument is reduced, and magnitudes from denormal to the largest.
     near = [np.nextafter(b, side) for b in (0.66, 1.0, TAN_3_PI_8) for side in (0.0, b, 9.0)]
     dense = np.concatenate([np.linspace(0, 4, 20001), np.logspace(-300, 300, 2001), near])
-    found = np.array([atan(float(x)) for x in dense])
+    found = in_batches(dense)[:, 2]
     np.testing.assert_allclose(found, np.arctan(dense), rtol=3.4e-16, atol=0.0)
-    np.testing.assert_array_equal([atan(float(-x)) for x in dense], -found)
-    with np.errstate(all="ignore"):
-        for x in (0.0, math.inf, -math.inf, 1e308, -1e308, 5e-324):
-            assert float(atan(np.float64(x))) == math.atan(x)
-    assert math.isnan(atan(math.nan))
+    np.testing.assert_array_equal(in_batches(-dense)[:, 2], -found)
+    ends = np.array([0.0, np.inf, -np.inf, 1e308, -1e308, 5e-324])
+    np.testing.assert_array_equal(in_batches(ends)[:, 2], np.arctan(ends))
+    assert np.isnan(in_batches(np.array([np.nan]))[0, 2])
 
 
 def test_functions_alone_at_all_sizes_and_beyond_the_range_of_floats(rng):
-    kernel, result = compiled("alone(_x, _result)", ALONE), np.empty(4)
     numbers = [*rng.uniform(-700, 700, 500), *rng.uniform(-1, 1, 200), 0.0, -0.0, 5e-324, np.nan]
     beyond = [-np.inf, -1e300, -746.0, -740.0, -708.5, 709.7, 711.0, 1e300, np.inf]
-    for x in (*numbers, *beyond):
-        kernel(np.array([x]), result)
-        with np.errstate(all="ignore"):
-            np.testing.assert_allclose(result[3], np.exp(x), rtol=1e-15, atol=5e-324)
-            if abs(x) <= 700.0:
-                expected = [np.sin(x), np.cos(x), np.arctan(x)]
-                np.testing.assert_allclose(result[:3], expected, rtol=5e-16, atol=1e-15)
-                assert exponential.exp(x) == pytest.approx(result[3], rel=5e-16)
+    x = np.array([*numbers, *beyond])
+    found, within = one_by_one(x), abs(x) <= 700.0
+    with np.errstate(all="ignore"):
+        np.testing.assert_allclose(found[:, 3], np.exp(x), rtol=1e-15, atol=5e-324)
+    x = x[within]
+    expected = np.column_stack([np.sin(x), np.cos(x), np.arctan(x)])
+    np.testing.assert_allclose(found[within, :3], expected, rtol=5e-16, atol=1e-15)

@@ -6,19 +6,26 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.unit.kernels import kernel
 from vehiclemor.codegen import cache
 from vehiclemor.codegen import kernels as module
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
-
-TEXT = """
-def double(_x, _work, _result):
-    _result[0] = 2.0 * _x[0]
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.operations import Kernel
 
 
-def product(_x, _u, _constants, _work, _result):
-    _result[0, 0] = _x[0] * _u[1]
-    _result[0, 1] = _constants[3]
-"""
+def times(factor: float) -> Kernel:
+    def double(x, result):
+        result[0] = factor * x[0]
+
+    return kernel(double)
+
+
+def product(x, u, constants, result):
+    result[0, 0] = x[0] * u[1]
+    result[0, 1] = constants[3]
+
+
+DOUBLE, PRODUCT = times(2.0), kernel(product, columns=2)
 
 
 @pytest.fixture
@@ -37,14 +44,19 @@ def loaded(source) -> int:
 
 
 def test_a_kernel_knows_what_it_wants_of_its_arrays():
-    source = kernel_sources(TEXT)["product"]
-    assert source.arguments == ("_x", "_u", "_constants", "_result")
-    assert source.sizes == (1, 2, 4, 2)
-    assert source.dimensions == 2
+    assert PRODUCT.arguments == ("_x", "_u", "_constants", "_result")
+    assert PRODUCT.sizes == (1, 2, 4, 2)
+    PRODUCT.check(1, 2, 4)
+    with pytest.raises(ValueError, match="_u"):
+        PRODUCT.check(1, 1)
+    result = np.empty((1, 2))
+    arrays = np.array([3.0]), np.array([0.0, 5.0]), np.array([0.0, 0.0, 0.0, 7.0])
+    Kernels([PRODUCT]).call("product", *arrays, result)
+    assert result.tolist() == [[15.0, 7.0]]
 
 
 def test_a_kernel_that_is_not_used_is_not_compiled(folder):
-    kernels = Kernels(kernel_sources(TEXT.replace("2.0", "7.0")))
+    kernels = Kernels([times(7.0), PRODUCT])
     assert "product" in kernels
     assert names(folder) == []
     result = np.empty(1)
@@ -53,19 +65,18 @@ def test_a_kernel_that_is_not_used_is_not_compiled(folder):
     assert names(folder) == ["double"]
 
 
-def test_another_text_compiler_or_processor_is_another_file(folder, monkeypatch):
-    source = kernel_sources(TEXT)["double"]
-    loaded(source)
-    loaded(source)
+def test_another_operation_compiler_or_processor_is_another_file(folder, monkeypatch):
+    loaded(DOUBLE)
+    loaded(DOUBLE)
     assert names(folder) == ["double"]
-    loaded(kernel_sources(TEXT.replace("2.0", "3.0"))["double"])
+    loaded(times(3.0))
     assert names(folder) == ["double"] * 2
     for number, function in enumerate(("source_digest", "compiler_identity"), 3):
         with monkeypatch.context() as patch:
             patch.setattr(module, function, lambda *_: "another")
-            loaded(source)
+            loaded(DOUBLE)
         assert names(folder) == ["double"] * number
-    loaded(source)
+    loaded(DOUBLE)
     assert len(names(folder)) == 4
 
 
@@ -89,7 +100,7 @@ def test_the_identity_of_the_compiler_names_versions_and_processor(monkeypatch):
 
 
 def test_what_is_missing_has_no_address():
-    kernels = Kernels(kernel_sources(TEXT))
+    kernels = Kernels([DOUBLE])
     assert "triple" not in kernels
     assert kernels.address("triple") == 0
     _, _, code = module._machine.__wrapped__(kernels.sources["double"])

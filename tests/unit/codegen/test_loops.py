@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
+from tests.unit.kernels import kernel
 from vehiclemor.codegen import loop_types
 from vehiclemor.codegen import loops as module
 from vehiclemor.codegen.compiler import compiled_loops, inlined_kernel
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.kernels import Kernels, MachineCode
 from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, declared_arguments
 from vehiclemor.codegen.loops import Loop, address_of_array, cache_lines, ready
-from vehiclemor.codegen.machine_code import MachineCode
 
 
 class Pair(NamedTuple):
@@ -168,7 +168,15 @@ def test_parts_of_a_buffer_are_the_buffer_itself():
     np.testing.assert_array_equal(other, result)
 
 
-KERNEL = "def double(_x, _u, _constants, _work, _result):\n    _result[0] = 2.0 * _x[0] + _u[0]\n"
+def double(x, u, constants, result):
+    result[0] = 2.0 * x[0] + u[0]
+
+
+def triple(x, u, constants, result):
+    result[0] = 3.0 * x[0] + u[0]
+
+
+KERNEL = kernel(double)
 
 
 def test_kernels_are_called_by_their_addresses():
@@ -177,7 +185,7 @@ def entry(kernels: IntVector, x: Vector, result: Vector) -> Int:
     call_kernel(kernels, 1, x, x, x, result)
     return 0
 """)
-    kernels, result = Kernels(kernel_sources(KERNEL)), np.empty(1)
+    kernels, result = Kernels([KERNEL]), np.empty(1)
     loop(np.array([0, kernels.address("double")]), np.array([1.5]), result)
     assert result == [4.5]
 
@@ -205,7 +213,7 @@ def test_another_source_kernel_size_or_compiler_is_another_file(monkeypatch):
             module._loops.__wrapped__(modules, ("kernel_path",), kernels, sizes)
 
     monkeypatch.setattr(module, "fetched", fetched)
-    other = (("double", KERNEL.replace("2.0", "3.0")),)
+    other = (("double", kernel(triple)),)
     for given in (
         {},
         {},

@@ -7,7 +7,7 @@ import pytest
 import vehiclemor as vm
 from tests.reducing import fitted
 from vehiclemor.cli import main
-from vehiclemor.exporting import packages
+from vehiclemor.exporting import libraries
 from vehiclemor.reduction.reduced_model import ReducedOrderModel
 
 CAR = "independent_suspension_vehicle"
@@ -37,7 +37,7 @@ def test_what_has_no_equations_to_export(model, nominal, monkeypatch):
     with pytest.raises(vm.VehiclemorError, match="table"):
         vm.export(vm.rom("double_wishbone"), "sympy")
     # Missing packages are named.
-    monkeypatch.setattr(packages, "find_spec", lambda _: None)
+    monkeypatch.setattr(libraries, "find_spec", lambda _: None)
     with pytest.raises(vm.VehiclemorError, match=r"vehiclemor\[casadi\]"):
         vm.export(vm.rom(CAR), "casadi")
 

@@ -18,7 +18,8 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor import netcdf_file
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.operations import KINDS, MOST_SIZE
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.reduction import parts
@@ -30,7 +31,7 @@ from vehiclemor.study.plans.protocol import protocol_names
 from vehiclemor.study.scenario import start_of
 
 CAR = "independent_suspension_vehicle"
-KERNELS = Kernels(kernel_sources("def derivative(_x, _result):\n    _result[0] = _x[0]\n"))
+KERNELS = Kernels([])
 # What refers to no model.
 NOTHING: Any = SimpleNamespace()
 
@@ -44,7 +45,7 @@ class Pair(NamedTuple):
 
 @pytest.fixture(scope="module")
 def car():
-    """A car whose equations are features in a text."""
+    """A car whose equations are features."""
     return vm.reduce(CAR, "linear_single_track", training="nominal")
 
 
@@ -278,7 +279,7 @@ SHAPES = ([-1], [5, -1], [True, 6], [2, 3], [1, 6], [10**9], [6.0], 6, None, "6"
 # Types are checked whatever else a part says of itself.
 HIDDEN = {"model": "none", "class": f"{ROOM}.interface:OfflineCost", "fields": {"seconds": "long"}}
 NAN = {"tuple": [{"tuple": [{"tuple": [math.nan]}, {"tuple": [1]}]}]}
-KERNEL = {"kernels": "def derivative(_x, _result):\n    _result[9] = _x[9]\n"}
+KERNEL = {"kernels": "def derivative(x, result): result[9] = x[9]"}
 # Of the bicycle: place -> what is no part that may stand there.
 PARTS = [
     *(("input_range", wrong) for wrong in (None, {"tuple": [1.0]}, {"same": "reduced.offline"})),
@@ -288,7 +289,12 @@ PARTS = [
     *(("offline", {"same": same}) for same in ("reduced.nothing", [], "reduced.shape")),
     *(("offline", {"model": name}) for name in ("parameters", "kernels")),
     *(("offline.fields", {"minutes": 0.0}), ("features", {"same": "reduced.shape"})),
-    *(("features.states", True), ("features.terms.tuple", ["z0", 3]), ("features.groups", NAN)),
+    *(
+        ("features.states", True),
+        ("features.terms.tuple", ["z0", 3]),
+        ("features.terms.tuple", [True]),
+        ("features.groups", NAN),
+    ),
     *(("coefficients", 3.0), ("coefficients", VECTOR | {"array": "reduced.nothing"})),
     *(("solver", VECTOR), ("tolerance", "1e-3"), ("tolerance", True)),
     ("model", {"class": "vehiclemor.simulation.dynamic:DynamicModel", "fields": {}}),
@@ -405,45 +411,44 @@ def test_sizes_that_dont_fit_are_refused(file, word, change, contents, tmp_path)
     assert word in refused_untouched(rewritten(path, replaced(changed(change))))
 
 
-# Texts of one feature.
-TEXTS = [
-    *(HARM, "_x[0]", "p[99999]", "p[-1]", "p[False]", "p[p[0]]", "p[0:1]", "z9", "u9", "term"),
-    *("z0\n    _result[99999] = z0", "z0; _result[0] = z0", "z0 # )", "z0, z1", "z0,)) or ((z0"),
-    *("z1 = z0", "(z0 := 1.0)", "*z0", "lambda: z0", "f'{z0}'", "z0.real", "z0 < z1", "z0 % 2.0"),
-    *("1.0 if 0.0 < z0 < 1.0 else 0.0", "1.0 if z0 in z0 else 0.0", "math.system(z0)"),
-    *("1", "1j", "\uff5a0", "math.sin(z0, x=z0)"),
-    *("math.sin(z0, z0)", "execute(p[0], p[0], p[0], p[0])", "", 3, "z0 \\\n + z0", "not z0"),
-    *("-" * 60_000 + "u0", "z0 + " * 145 + "z0"),
+def row(number, *values):
+    """Another row of the arguments of operations."""
+    return f"arguments=where(arange(len(a))[:,None]-{number},a,{[*values]})".replace(" ", "")
+
+
+def alone(kind):
+    """Only operations of one kind, on the first one, so many that they take long to compile."""
+    more = MOST_SIZE // 150
+    kinds = f"kinds=append(a,repeat({[*KINDS].index(kind)},{more}))"
+    return f"{kinds}|arguments=vstack([a,zeros(({more},3),int)])|numbers=append(a,zeros({more}))"
+
+
+# Operations 0, 1 and 2 of the bicycle are reduced coordinates, the last one multiplies.
+OPERATIONS = [
+    *("kinds=a+99", "kinds=a[None]", "arguments=a+99", "arguments=1.0*a", "numbers=a[:-1]"),
+    # What they were not given, and what is not there yet.
+    *(row(0, *entry) for entry in ((0, 9, 0), (1, 9, 0), (2, 99999, 0), (3, 0, 0))),
+    row("len(a)+1", 0, 9999, 0),
+    # A comparison for a number, and a number for a comparison.
+    *(f"kinds=where(a-2,a,{[*KINDS].index('<')})", f"kinds=append(a[:-1],{len(KINDS) - 1})"),
+    # More than compiles soon.
+    *map(alone, ("sqrt", "atan2", "power")),
 ]
 
 
-@pytest.mark.parametrize("text", TEXTS, ids=range(len(TEXTS)))
-def test_features_that_are_more_than_arithmetic_of_their_numbers_are_refused(text, saved):
-    terms = replaced({"reduced.features.terms.tuple": lambda known: [text, *known[1:]]})
-    refused_untouched(rewritten(saved, terms))
+@pytest.mark.parametrize("change", OPERATIONS, ids=range(len(OPERATIONS)))
+def test_operations_that_are_more_than_arithmetic_of_what_is_given_are_refused(change, saved):
+    inner = "features.operations.operations"
+    changes = changed("|".join(f"{inner}.{one}" for one in change.split("|")))
+    refused_untouched(rewritten(saved, replaced(changes)))
 
 
-SINES = " + ".join(["math.sin(z0)"] * 100)
-
-
-@pytest.mark.parametrize(
-    ("place", "entries"),
-    [
-        *(("lines", [[name, "z0"]]) for name in ("_result[9]", "_x", "_work", "p", "if", "\uff41")),
-        *(("lines", [[name, "z0"]]) for name in ("a = 1.0\n    b", "a.b", "", "a, b")),
-        ("lines", [["a", "a"]]),
-        ("lines", [["a", "z9"]]),
-        ("lines", [["a", "z0", "z0"]]),
-        ("lines", [["a", SINES]] * 6),
-        ("lines", [["a", "z0" + 100_000 * " "]] * 6),
-        ("watched", [["p[99999]", "speed"]]),
-        ("watched", [["y0", "speed"]]),
-    ],
-)
-def test_lines_of_features_are_as_terms_are(place, entries, saved):
-    added = [{"tuple": entry} for entry in entries]
-    where = f"reduced.features.{place}.tuple"
-    refused_untouched(rewritten(saved, replaced({where: lambda known: added + known})))
+@pytest.mark.parametrize("number", [-1, 10**6, 0.0, "0", HARM, None])
+@pytest.mark.parametrize("place", ["named", "terms", "watched"])
+def test_numbers_of_operations_must_be_there(place, number, saved):
+    entry = {"tuple": [number, "speed"]} if place == "watched" else number
+    more = {f"reduced.features.{place}.tuple": lambda known: [entry, *known[1:]]}
+    refused_untouched(rewritten(saved, replaced(more)))
 
 
 def test_what_is_huge_where_it_is_written_small_is_refused_soon(saved):

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.oracles import complex_step
-from tests.oracles.tangent_texts import run_as_text
-from vehiclemor.codegen.tangent import Tangent
+from vehiclemor.codegen.derivatives import Sensitivity
 from vehiclemor.errors import InputError
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -41,10 +40,7 @@ def test_jacobians_are_those_of_the_complex_step(runs, name, of, by, part, seed)
     size = np.maximum(np.abs((x, u)[place]), 1e-3)
     directions = [np.zeros_like(array) for array in (x, u, model.constants)]
     directions[place] = size * np.random.default_rng(seed).normal(size=len(size))
-    shape = model.equations.shapes[source.name]
-    expected = complex_step.derivative_along(
-        source.text, (x, u, model.constants), directions, shape
-    )
+    expected = complex_step.derivative_along(source, (x, u, model.constants), directions)
     jacobian = model.jacobian(x, u, by, of)
     found = jacobian @ directions[place]
     # Rounding is a part of the largest number that is added up; forces are differences of others.
@@ -68,8 +64,8 @@ def test_jacobians_are_those_of_the_complex_step(runs, name, of, by, part, seed)
 def test_parameters_are_those_of_models_made_anew(runs, name, parameters, monkeypatch):
     model, run = runs[name]
     if name == "high_fidelity_vehicle":
-        # The 14-DOF vehicle's tangents are compiled.
-        monkeypatch.setattr(Tangent, "_products", run_as_text)
+        # The 14-DOF vehicle's derivatives are compiled.
+        monkeypatch.setattr(Sensitivity, "_products", complex_step.products)
     sample = np.abs(run.inputs[:, 0]).argmax()
     x, u = run.states[sample], run.inputs[sample]
     # Both models on either side of each number, which both functions are taken of.

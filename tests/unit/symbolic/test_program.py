@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 from tests.unit.programs import inlined, precise, random_program, run
-from vehiclemor.codegen.kernel_text import operation_counts, reference_source
+from vehiclemor.codegen.lowering import kernels_of
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
@@ -77,13 +77,13 @@ def test_program_keeps_the_value_of_every_function(seed: int):
         ((p * r + 2) * x * y, {"multiply": 2}),
         (x + p + r, {"add": 1}),
         (x / (p * p + r), {"multiply": 1}),
-        (sp.sin(p + r) ** 2, {}),
+        (sp.log(p + r) ** 2, {}),
         (2 * x + p, {"multiply": 1, "add": 1}),
     ],
 )
 def test_parameter_terms_are_hoisted(expression: sp.Expr, left: dict[str, int]):
     program = assembled(expression)
-    counts = operation_counts(reference_source(program))["f"]
+    counts = kernels_of(program)["f"].counts
     assert {kind: n for kind, n in counts.items() if n and kind != "total"} == left
     at = {x: 0.7, y: -1.3, p: 0.4, r: 1.9}
     assert run(program, "f", at)[0] == pytest.approx(precise([expression], at)[0], rel=1e-14)
@@ -114,7 +114,7 @@ def test_common_subexpressions_are_evaluated_once():
     tape = Tape()
     first, second = tape.let((x * y + 1) * x), tape.let((x * y + 1) * y)
     program = assemble(tape, {"q": [x, y]}, [p], {"f": ([first, second, p], (3,))})
-    counts = operation_counts(reference_source(program))["f"]
+    counts = kernels_of(program)["f"].counts
     assert (counts["multiply"], counts["add"]) == (3, 1)
 
 

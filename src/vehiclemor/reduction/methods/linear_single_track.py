@@ -25,7 +25,7 @@ import numpy as np
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.features import PLANAR, Features
+from vehiclemor.reduction.vehicle.features import PLANAR, FeatureListing
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import (
     CORNERING,
@@ -62,10 +62,12 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
     # What comes from the tires goes as one over the speed.
     tire = condensed[:, :2] - np.array([[0.0, -shape.speed], [0.0, 0.0]])
     # States V, r and the deviation of the speed.
-    lines = (("part", "p[0] / (p[0] + z2)"),)
-    terms = ("z0", "z1", "u0", "part * z0", "part * z1", "(p[0] + z2) * z1", "p[0] + z2", "z2")
+    listing = FeatureListing(3, inputs)
+    (v, r, slower), u, p = listing.z, listing.u[0], listing.p(0)
+    part, speed = listing.let(p / (p + slower)), p + slower
+    terms = ((v,), (r,), (u,), (part, v), (part, r), (speed, r), (speed,), (slower,))
     groups = (((0, 1, 2, 3, 4, 5), (0, 1, 3, 5)), ((6, 7), (4,)))
-    features = Features(3, inputs, lines, terms, groups)
+    features = listing.features(terms, groups)
     c = np.zeros((len(terms), 3 + PLANAR))
     c[[3, 4], :2], c[2, :2], c[5, 0] = tire.T, condensed[:, 2], -1.0
     c[1, 3], c[6, 4], c[0, 5] = 1.0, 1.0, 1.0

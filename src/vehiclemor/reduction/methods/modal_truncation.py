@@ -25,7 +25,7 @@ from vehiclemor.errors import InputError
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.features import Features
+from vehiclemor.reduction.vehicle.features import FeatureListing
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import (
     CORNERING,
@@ -128,11 +128,12 @@ def fit(
     lateral = truncated(lateral_modes(shape), settings.fastest, static)
     linear, modes = shape.linearised, slow_modes(shape, np.inf)
     k, inputs = len(lateral.a), linear.b.shape[1]
-    terms = ("1.0", *(f"z{i}" for i in range(k + 1)), *(f"u{i}" for i in range(inputs)))
+    listing = FeatureListing(k + 1, inputs)
+    terms = [(value,) for value in (listing.number(1.0), *listing.z, *listing.u)]
     odd, even = [*range(1, k + 1), *range(k + 2, k + 2 + inputs)], [0, k + 1]
     # The vehicle is its own mirror image: the speed moves nothing sideways, steering changes no U.
     groups = ((tuple(odd), (*range(k), k + 1, k + 3)), (tuple(even), (k, k + 2)))
-    features = Features(k + 1, inputs, (), terms, groups)
+    features = listing.features(terms, groups)
     lifting = np.zeros((len(features.terms), len(linear.a)))
     lifting[odd] = np.vstack([lateral.right.T, lateral.follow.T])
     lifting[k + 1] = modes.speed_right

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from pydantic import Field
 
-from vehiclemor.codegen.foreign_texts import MOST_SIZE
-from vehiclemor.codegen.kernels import kernel_sources
+from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
-from vehiclemor.codegen.tangent import Tangent, tangent
+from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.inputs.maneuver import Maneuver
@@ -61,21 +60,20 @@ def monomials(rank: int, degree: int) -> tuple[tuple[int, ...], ...]:
     return tuple(c for n in orders for c in combinations_with_replacement(range(rank), n))
 
 
-def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> str:
-    """Text of the kernel `polynomials`: each monomial is one of a degree less times a variable.
+def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> Kernel:
+    """The kernel `polynomials`: each monomial is one of a degree less times a variable.
 
     The variables are the moving inputs; several results may share a column of the coefficients.
     """
-    every = monomials(len(moving), degree)
-    indices = {term: index for index, term in enumerate(every)}
-    lines = [f"x{j} = _x[{i}]" for j, i in enumerate(moving)]
-    lines.append("m0 = 1.0")
-    lines += [f"m{indices[term]} = m{indices[term[:-1]]} * x{term[-1]}" for term in every[1:]]
-    values = ", ".join(f"v{i}" for i in range(max(columns) + 1))
-    powers = ", ".join(f"m{index}" for index in range(len(every)))
-    lines.append(f"({values},) = weighted_sums(_coefficients, 0, ({powers},))")
-    lines += [f"_result[{i}] = v{column}" for i, column in enumerate(columns)]
-    return "\n    ".join(["def polynomials(_x, _coefficients, _result):", *lines]) + "\n"
+    listing = Listing()
+    x = [listing.let(listing.entry("_x", i)) for i in moving]
+    powers = {(): listing.number(1.0)}
+    for term in monomials(len(moving), degree)[1:]:
+        powers[term] = listing.let(powers[term[:-1]] * x[term[-1]])
+    values = listing.sums("_coefficients", 0, max(columns) + 1, [*powers.values()])
+    for place, column in enumerate(columns):
+        listing.store(place, values[column])
+    return listing.kernel("polynomials", ("_x", "_coefficients", "_result"))
 
 
 @cache
@@ -137,7 +135,7 @@ class PathMapModel(ReducedMechanism):
         terms = math.comb(len(self.moving) + self.degree, self.degree)
         width = padded(max(self.columns) + 1)
         require(cells.coefficients.shape[1:] == (terms, width), "coefficients")
-        # The text of the loop grows with them.
+        # The kernel grows with them.
         require(bool(self.moving) and terms * width <= MOST_SIZE, "degree")
 
     @property
@@ -170,9 +168,9 @@ class PathMapModel(ReducedMechanism):
         return self._evaluated(np.array([time]), inputs, ready(Samples(inputs)))
 
     @cached_property
-    def _tangent(self) -> Tangent:
-        (source,) = kernel_sources(map_kernel(self.moving, self.degree, self.columns)).values()
-        return tangent(source, source.arguments[0], len(self.columns), len(self.ranges))
+    def _sensitivity(self) -> Sensitivity:
+        kernel = map_kernel(self.moving, self.degree, self.columns)
+        return sensitivity(kernel, kernel.arguments[0], len(self.columns), len(self.ranges))
 
     def slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
         """Derivatives of coordinates, or of the model's outputs there, by the inputs."""
@@ -183,7 +181,7 @@ class PathMapModel(ReducedMechanism):
         indices = np.clip(within, 0.0, cells.tops).astype(int)
         cell = np.ravel_multi_index(tuple(indices), tuple(cells.numbers))
         arrays = 2.0 * (within - indices) - 1.0, cells.coefficients[cell].ravel()
-        table = self._tangent.jacobian(arrays) * (2.0 * cells.halves * cells.scales)
+        table = self._sensitivity.jacobian(arrays) * (2.0 * cells.halves * cells.scales)
         moved = table[: len(self.model.coordinates)]
         if of == "coordinates":
             return moved

@@ -23,7 +23,7 @@ from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle import tire_features as tf
-from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
+from vehiclemor.reduction.vehicle.features import PLANAR, Term, feature_columns
 from vehiclemor.reduction.vehicle.reach_of_runs import training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
@@ -108,18 +108,19 @@ def straight(model: DynamicModel, training: Training) -> list[TrainingRun]:
     return found
 
 
-def tire_text(shape: VehicleShape, samples: Samples, settings: TwoTrackSettings) -> tf.Text:
-    """Lines of the arguments, of slips and loads fitted to the training runs, and of the tires."""
+def tire_features(
+    shape: VehicleShape, samples: Samples, settings: TwoTrackSettings
+) -> tf.TireFeatures:
+    """The arguments, slips and loads fitted to the training runs, and what the tires do."""
     z, u = samples.z, samples.inputs
-    model, inputs = shape.model, u.shape[1]
+    model = shape.model
     reach = settings.hull * largest(tf.argument_values(shape.speed, z, u))
     reversal = settings.reversal * float(largest(u[:, :1] * u[:, 1:2])[0])
-    text = tf.arguments(shape.speed, reach, reversal)
-    linear = tf.linear_terms(inputs)
-    odd = [*linear, *tf.CUBIC, *tf.FASTER]
-    even = ["1.0", "m", *tf.SQUARE, *tf.FASTER_SQUARE]
-    given = text.features(inputs, [*odd, *even])
-    columns = feature_columns(given, z, u, np.array(text.values))
+    made = tf.arguments(u.shape[1], shape.speed, reach, reversal)
+    linear = linear_terms(made)
+    odd = [*linear, *made.cubic, *made.faster(made.alone(made.a))]
+    even = [(made.number(1.0),), (made.m,), *made.square, *made.faster(made.square)]
+    columns = feature_columns(made.of([*odd, *even]), z, u, np.array(made.parameters))
     parities = (
         (odd, columns[:, : len(odd)], len(linear)),
         (even, columns[:, len(odd) :], 1),
@@ -136,42 +137,49 @@ def tire_text(shape: VehicleShape, samples: Samples, settings: TwoTrackSettings)
                 terms, table, first = parities[parity]
                 chosen = forward_selection(table, target[:, None], first, settings.wheel_terms)
                 weights = ridge_fit(table[:, chosen], target, RIDGE)
-                text.sum(f"{name}{end}{axle}", [terms[i] for i in chosen], weights.tolist())
+                total = made.sum([terms[i] for i in chosen], weights.tolist())
+                made.by_name[f"{name}{end}{axle}"] = total
         parameters = {name: float(model.parameters[name]) for name in FIALA}
-        tf.axle_lines(text, axle, tf.Tire(parameters, float(loads.mean()), settings.saturation))
-    return text
+        tf.add_axle(made, axle, tf.Tire(parameters, float(loads.mean()), settings.saturation))
+    return made
+
+
+def linear_terms(made: tf.TireFeatures) -> list[Term]:
+    """The arguments and derivatives of the steering; they are not held."""
+    return made.alone([*made.raw[:5], *made.raw[6:]])
 
 
 def fitted_on_rates(
     shape: VehicleShape,
     modes: SlowModes,
     encoding: np.ndarray,
-    text: tf.Text,
+    made: tf.TireFeatures,
     samples: Samples,
     settings: TwoTrackSettings,
 ) -> ReducedVehicle:
     """Equations fitted to the accelerations of the training runs."""
     z, u, rates, of_shape, _ = samples
-    inputs, parameters = u.shape[1], np.array(text.values)
+    inputs, parameters = u.shape[1], np.array(made.parameters)
 
-    def columns_of(terms: Sequence[str]) -> np.ndarray:
-        return feature_columns(text.features(inputs, terms), z, u, parameters)
+    def columns_of(terms: Sequence[Term]) -> np.ndarray:
+        return feature_columns(made.of(terms), z, u, parameters)
 
     def chosen(
-        given: Sequence[str], others: Sequence[str], values: np.ndarray, more: int
-    ) -> list[str]:
+        given: Sequence[Term], others: Sequence[Term], values: np.ndarray, more: int
+    ) -> list[Term]:
         terms = [*given, *(term for term in others if term not in given)]
         scaled = values / np.sqrt(np.mean(values**2, axis=0))
         numbers = forward_selection(columns_of(terms), scaled, len(given), more)
         return [terms[i] for i in numbers]
 
-    plain = [*(f"z{i}" for i in range(4)), *tf.linear_terms(inputs)[4:], "F0", "F1", "M0", "M1"]
-    odd = chosen(plain, tf.odd_candidates(), rates[:, ACCELERATIONS], settings.terms)
+    forces = made.alone(made.by_name[name] for name in ("F0", "F1", "M0", "M1"))
+    plain = [*made.alone(made.z[:4]), *linear_terms(made)[4:], *forces]
+    odd = chosen(plain, tf.odd_candidates(made), rates[:, ACCELERATIONS], settings.terms)
     forward = of_shape.motion[:, 1] - shape.speed - z[:, tf.SPEED]
     symmetric = np.column_stack([rates[:, tf.SPEED], forward])
-    candidates = tf.even_candidates(inputs)
-    even = chosen([f"z{tf.SPEED}"], candidates, symmetric, settings.even_terms)
-    terms = [*odd, "1.0", *even]
+    candidates = tf.even_candidates(made)
+    even = chosen([(made.z[tf.SPEED],)], candidates, symmetric, settings.even_terms)
+    terms = [*odd, (made.number(1.0),), *even]
     seen = of_shape.deviations[:, [shape.names.index(name) for name in SEEN]]
     lifted = chosen(terms, candidates, seen, settings.lifted_terms)
     columns = columns_of(terms)
@@ -184,7 +192,7 @@ def fitted_on_rates(
     return ReducedVehicle(
         shape.model,
         shape,
-        text.features(inputs, terms, len(odd)),
+        made.of(terms, len(odd)),
         parameters,
         c,
         both_sides(shape, columns_of(lifted), len(odd), of_shape.deviations),
@@ -192,7 +200,7 @@ def fitted_on_rates(
         np.zeros((tf.STATES, inputs)),
         np.concatenate([3.0 * largest(z[:, :4]), [10.0, 1.0, 10.0, 10.0]]),
         transient=modes.symmetric,
-        lifted_features=text.features(inputs, lifted),
+        lifted_features=made.of(lifted),
     )
 
 
@@ -274,8 +282,8 @@ def fit(model: DynamicModel, training: Training, settings: TwoTrackSettings) -> 
         of_shape,
         np.concatenate([run.outputs for run in runs]),
     )
-    text = tire_text(shape, samples, settings)
-    reduced = fitted_on_rates(shape, modes, encoding, text, samples, settings)
+    made = tire_features(shape, samples, settings)
+    reduced = fitted_on_rates(shape, modes, encoding, made, samples, settings)
     if settings.sweeps:
         goals = targets(reduced, own, runs, stride=1)
         (odd, _), (even, symmetric) = reduced.features.groups

@@ -1,7 +1,7 @@
 """Features: functions of reduced coordinates and inputs, in which reduced equations are linear.
 
-One text serves both sides: evaluated on arrays it makes the columns of a fit, and as a compiled
-kernel it makes the right-hand side of the reduced vehicle
+The same operations serve both sides: evaluated on arrays they make the columns of a fit, and as a
+compiled kernel the right-hand side of the reduced vehicle
 
     z' = C_z phi(z, u),  psi' = C_r phi
     X' = U cos(psi) - V sin(psi),  Y' = U sin(psi) + V cos(psi),  (U, V) = C_UV phi
@@ -12,15 +12,25 @@ Coefficients are constants of the kernel: fits with the same features compile no
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache, lru_cache
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache, reduce
 from itertools import combinations_with_replacement
-from typing import NamedTuple
+from operator import mul
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.foreign_texts import MOST_CHARACTERS, MOST_SIZE, check_line
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.operations import (
+    COMPARISONS,
+    FUNCTIONS,
+    MOST_SIZE,
+    Kernel,
+    Listing,
+    Operation,
+    Value,
+    pruned,
+)
 from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.simulation.paths import along
 from vehiclemor.simulation.system import System
@@ -30,23 +40,28 @@ from vehiclemor.sizes import apart, require
 PLANAR = 3
 # Reduced coordinates that a file may have; the models of this package have at most 9.
 MOST_STATES = 100
+# What an elementary function counts, in operations: chains of them take longest to compile.
+CALL = 160
+# Factors of a product, in order.
+Term = tuple[Value, ...]
 
 
 @dataclass(frozen=True)
 class Features:
-    """Text of features of so many reduced coordinates `z0, z1, ...` and inputs `u0, u1, ...`.
+    """Features of so many reduced coordinates z and inputs u, and of parameters p.
 
     Attributes
     ----------
-    lines
-        Assignments `name = expression` of what the features share, in order; they may use
-        parameters `p[i]`.
+    operations
+        All that they are computed by, from entries of `_x` (z), `_u` and `_constants` (p).
+    named
+        Numbers of the operations with names, see `operations`.
     terms
-        Expression of each feature.
+        Number of the operation that gives each feature.
     groups
         (numbers of features, columns of C) of each block of C that is not zero; all if empty.
     watched
-        (expression, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
+        (operation, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
         what the features were made for.
     lateral
         How many of these, the first ones, move when the vehicle is steered: how long they do
@@ -55,14 +70,15 @@ class Features:
 
     states: int
     inputs: int
-    lines: tuple[tuple[str, str], ...]
-    terms: tuple[str, ...]
+    operations: tuple[Operation, ...]
+    named: tuple[int, ...]
+    terms: tuple[int, ...]
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
-    watched: tuple[tuple[str, str], ...] = ()
+    watched: tuple[tuple[int, str], ...] = ()
     lateral: int = 0
 
     def check_sizes(self) -> None:
-        """Raise `ValueError` if the texts are more than arithmetic of what they are given."""
+        """Raise `ValueError` if the operations are more than arithmetic of what they are given."""
         needed_parameters(self)
 
     @property
@@ -71,42 +87,91 @@ class Features:
         everything = tuple(range(len(self.terms))), tuple(range(self.states + PLANAR))
         return self.groups or (everything,)
 
+    def with_terms(self, kept: Sequence[int], groups: Any = ()) -> Features:
+        """Some of the features, by their numbers in order, and no operation that none needs."""
+        terms = [self.terms[i] for i in kept]
+        operations, places = pruned(self.operations, [*terms, *(n for n, _ in self.watched)])
+        return replace(
+            self,
+            operations=tuple(operations),
+            named=tuple(places[n] for n in self.named if n in places),
+            terms=tuple(places[n] for n in terms),
+            groups=groups,
+            watched=tuple((places[n], what) for n, what in self.watched),
+        )
+
 
 @lru_cache(maxsize=64)
 def needed_parameters(features: Features) -> int:
-    """Number of parameters that the texts need; `ValueError` if they reach into anything else."""
+    """Number of parameters that they need; `ValueError` if they reach into anything else."""
     states, inputs, columns = features.states, features.inputs, features.states + PLANAR
     require(0 < states <= MOST_STATES and 0 <= inputs <= MOST_STATES, "states")
-    lines = [*features.lines, *(("term", text) for text in features.terms)]
-    lines += [("watched", text) for text, _ in features.watched]
-    require(sum(len(text) for _, text in lines) <= MOST_CHARACTERS, "features")
-    known = {f"z{i}" for i in range(states)} | {f"u{i}" for i in range(inputs)}
-    sizes, most = [], 0
-    for number, (name, text) in enumerate(lines):
-        size, needed = check_line(name, text, known)
-        sizes.append(size)
-        most = max(most, needed)
-        if number < len(features.lines):
-            known.add(name)
-    own, total = sizes[len(features.lines) :], sum(sizes)
+    operations, reach = features.operations, {"_x": 0, "_u": 0, "_constants": 0}
+    for array, place in (op.detail for op in operations if op.kind == "entry"):
+        reach[array] = max(reach[array], place + 1)
+    require(reach["_x"] <= states and reach["_u"] <= inputs, "features")
+    # A comparison is no number, and no number is a comparison.
+    tests = [op.arguments[0] for op in operations if op.kind == "select"]
+    others = [n for op in operations for n in op.arguments[op.kind == "select" :]]
+    others += [*features.named, *features.terms, *(number for number, _ in features.watched)]
+    compared = {n for n, op in enumerate(operations) if op.kind in COMPARISONS}
+    require(all(0 <= n < len(operations) for n in others), "features")
+    require(compared.issuperset(tests) and compared.isdisjoint(others), "features")
+    calls = sum(op.kind in (*FUNCTIONS, "atan2", "power") for op in operations)
+    total = len(operations) + CALL * calls
     require(len(features.groups) <= columns, "groups")
     for terms, targets in features.blocks:
         apart("groups", terms, len(features.terms))
         apart("groups", targets, columns)
         require(bool(terms and targets), "groups")
-        total += sum(own[j] for j in terms) + len(terms) * padded(len(targets))
+        total += len(terms) * padded(len(targets))
     require(total <= MOST_SIZE, "features")
-    return most
+    return reach["_constants"]
 
 
-def monomials(names: Sequence[str], degree: int) -> tuple[str, ...]:
-    """All products of that many of the names."""
-    return tuple(" * ".join(part) for part in combinations_with_replacement(names, degree))
+class FeatureListing(Listing):
+    """Features of reduced coordinates `z` and inputs `u` under construction."""
+
+    def __init__(self, states: int, inputs: int) -> None:
+        super().__init__()
+        self.z = [self.let(self.entry("_x", i)) for i in range(states)]
+        self.u = [self.let(self.entry("_u", i)) for i in range(inputs)]
+
+    def p(self, number: int) -> Value:
+        """A parameter."""
+        return self.entry("_constants", number)
+
+    def features(
+        self,
+        terms: Sequence[Term],
+        groups: Any = (),
+        watched: Sequence[tuple[Term, str]] = (),
+        lateral: int = 0,
+    ) -> Features:
+        """Features, each the product of its factors."""
+        numbers = tuple(product(term).number for term in terms)
+        told = tuple((product(term).number, what) for term, what in watched)
+        sizes, made = (
+            (len(self.z), len(self.u)),
+            (tuple(self.operations), tuple(sorted(self.named))),
+        )
+        found = Features(*sizes, *made, numbers, groups, told, lateral)
+        return found.with_terms(range(len(terms)), groups)
 
 
-def held(text: str) -> str:
-    """Text of a value held in [-1, 1]: nothing is known of what lies beyond the training runs."""
-    return f"0.5 * (abs({text} + 1.0) - abs({text} - 1.0))"
+def product(factors: Term) -> Value:
+    """The product of factors, from the first one on."""
+    return reduce(mul, factors)
+
+
+def monomials(values: Sequence[Value], degree: int) -> tuple[Term, ...]:
+    """All products of that many of the values."""
+    return tuple(combinations_with_replacement(values, degree))
+
+
+def held(value: Value) -> Value:
+    """A value held in [-1, 1]: nothing is known of what lies beyond the training runs."""
+    return 0.5 * (abs(value + 1.0) - abs(value - 1.0))
 
 
 class Layout(NamedTuple):
@@ -118,72 +183,71 @@ class Layout(NamedTuple):
     pairs: Sequence[tuple[int, int]]
 
 
-def rates_text(features: Features, parameters: int) -> str:
-    """Source of the right-hand side; constants are that many parameters, then C."""
+def _listed(features: Features) -> tuple[Listing, list[Value]]:
+    """Operations of features for a kernel, and the features."""
+    listing = Listing()
+    listing.operations += features.operations
+    listing.named.update(features.named)
+    return listing, [Value(listing, number) for number in features.terms]
+
+
+def _kernel(listing: Listing, name: str) -> Kernel:
+    return listing.kernel(name, ("_x", "_u", "_constants", "_result"))
+
+
+def rates_kernel(features: Features, parameters: int) -> Kernel:
+    """The right-hand side; constants are that many parameters, then C."""
     k, first = features.states, parameters
-    lines = _coordinates(features)
-    lines += [f"{name} = {_constants(text)}" for name, text in features.lines]
-    sums: dict[int, list[str]] = {}
-    for b, (terms, columns) in enumerate(features.blocks):
-        names = ", ".join(f"t{b}_{i}" for i in columns)
-        factors = ", ".join(_constants(features.terms[j]) for j in terms)
-        lines.append(f"({names},) = weighted_sums(_constants, {first}, ({factors},))")
+    listing, values = _listed(features)
+    sums: dict[int, list[Value]] = {}
+    for terms, columns in features.blocks:
+        found = listing.sums("_constants", first, len(columns), [values[j] for j in terms])
         first += len(terms) * padded(len(columns))
-        for i in columns:
-            sums.setdefault(i, []).append(f"t{b}_{i}")
-    totals = [" + ".join(sums.get(i, ["0.0"])) for i in range(k + PLANAR)]
-    lines += [f"forward = {totals[k + 1]}", f"sideward = {totals[k + 2]}"]
-    lines.append(f"sine, cosine = sincos_one(_x[{k}])")
-    lines += [f"_result[{i}] = {totals[i]}" for i in range(k + 1)]
-    lines.append(f"_result[{k + 1}] = forward * cosine - sideward * sine")
-    lines.append(f"_result[{k + 2}] = forward * sine + sideward * cosine")
-    return _function("derivative", lines)
+        for i, part in zip(columns, found, strict=True):
+            sums.setdefault(i, []).append(part)
+    nothing = [listing.number(0.0)]
+    totals = [sum(rest, one) for one, *rest in (sums.get(i, nothing) for i in range(k + PLANAR))]
+    forward, sideward = map(listing.let, totals[k + 1 :])
+    sine, cosine = listing.parts(listing.new("sincos", listing.entry("_x", k)), 2)
+    for i in range(k + 1):
+        listing.store(i, totals[i])
+    listing.store(k + 1, forward * cosine - sideward * sine)
+    listing.store(k + 2, forward * sine + sideward * cosine)
+    return _kernel(listing, "derivative")
 
 
-def columns_text(features: Features) -> str:
-    """Source of the kernel that evaluates the features; its constants are their parameters."""
-    lines = _coordinates(features)
-    lines += [f"{name} = {_constants(text)}" for name, text in features.lines]
-    lines += [f"_result[{i}] = {_constants(text)}" for i, text in enumerate(features.terms)]
-    return _function("columns", lines)
+def columns_kernel(features: Features) -> Kernel:
+    """What evaluates the features; its constants are their parameters."""
+    listing, values = _listed(features)
+    for i, value in enumerate(values):
+        listing.store(i, value)
+    return _kernel(listing, "columns")
 
 
-def lifting_text(features: Features, layout: Layout, parameters: int, modes: int) -> str:
-    """Source of the kernel that gives full states, and after them what is watched.
+def lifting_kernel(features: Features, layout: Layout, parameters: int, modes: int) -> Kernel:
+    """What gives full states, and after them what is watched.
 
     Constants are the features' parameters, then rows of coefficients: of the terms, of the shape at
     straight running, and two of each mode of the transient, whose parts follow the inputs.
     """
     k, first = features.states, features.inputs
-    lines = _coordinates(features)
-    lines += [f"{name} = {_constants(text)}" for name, text in features.lines]
-    factors = [_constants(text) for text in features.terms]
-    factors += ["1.0", *(f"_u[{first + i}]" for i in range(2 * modes))]
-    names = ", ".join(f"s{i}" for i in layout.kept)
-    lines.append(f"({names},) = weighted_sums(_constants, {parameters}, ({', '.join(factors)},))")
-    lines.append(f"sine, cosine = sincos_one(_x[{k}])")
-    results = dict.fromkeys(range(layout.size), "0.0") | {i: f"s{i}" for i in layout.kept}
-    results |= zip(layout.planar, (f"_x[{i}]" for i in (k + 1, k + 2, k)), strict=True)
+    listing, factors = _listed(features)
+    factors.append(listing.number(1.0))
+    factors += [listing.entry("_u", first + i) for i in range(2 * modes)]
+    found = listing.sums("_constants", parameters, len(layout.kept), factors)
+    shape = dict(zip(layout.kept, found, strict=True))
+    sine, cosine = listing.parts(listing.new("sincos", listing.entry("_x", k)), 2)
+    results: dict[int, Value | float] = dict.fromkeys(range(layout.size), 0.0) | shape
+    for place, i in zip(layout.planar, (k + 1, k + 2, k), strict=True):
+        results[place] = listing.entry("_x", i)
     for a, b in layout.pairs:
-        results[a] = f"cosine * s{a} - sine * s{b}"
-        results[b] = f"sine * s{a} + cosine * s{b}"
-    results |= enumerate((_constants(text) for text, _ in features.watched), layout.size)
-    lines += [f"_result[{i}] = {text}" for i, text in results.items()]
-    return _function("full_state", lines)
-
-
-def _coordinates(features: Features) -> list[str]:
-    coordinates = [f"z{i} = _x[{i}]" for i in range(features.states)]
-    return coordinates + [f"u{i} = _u[{i}]" for i in range(features.inputs)]
-
-
-def _function(name: str, lines: Sequence[str]) -> str:
-    body = "\n    ".join(lines)
-    return f"def {name}(_x, _u, _constants, _work, _result):\n    {body}\n"
-
-
-def _constants(text: str) -> str:
-    return text.replace("p[", "_constants[")
+        results[a] = cosine * shape[a] - sine * shape[b]
+        results[b] = sine * shape[a] + cosine * shape[b]
+    watched = (Value(listing, number) for number, _ in features.watched)
+    results |= enumerate(watched, layout.size)
+    for place, value in results.items():
+        listing.store(place, value)
+    return _kernel(listing, "full_state")
 
 
 def feature_columns(
@@ -196,13 +260,13 @@ def feature_columns(
 
 @cache
 def _column_kernels(features: Features) -> Kernels:
-    return Kernels(kernel_sources(columns_text(features)))
+    return Kernels([columns_kernel(features)])
 
 
 # A fit makes systems of the same features again and again.
 @cache
 def _kernels(features: Features, parameters: int) -> Kernels:
-    return Kernels(kernel_sources(rates_text(features, parameters)))
+    return Kernels([rates_kernel(features, parameters)])
 
 
 def feature_system(

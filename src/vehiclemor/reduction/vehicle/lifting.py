@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Prepared, loops
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, lifting_text
+from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, lifting_kernel
 from vehiclemor.reduction.vehicle.lifting_loops import BESIDES, Known
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
@@ -99,25 +100,24 @@ class Lifting(ShortRepr):
     def _made(self) -> dict[int, tuple[Kernels, np.ndarray]]:
         return {}
 
-    def text(self, modes: int) -> tuple[str, np.ndarray]:
-        """Source and constants of the kernel; without modes for a start that excites none."""
+    def kernel(self, modes: int) -> tuple[Kernel, np.ndarray]:
+        """The kernel and its constants; without modes for a start that excites none."""
         right = self.transient.right[:modes]
         pairs = np.stack([np.real(right), -np.imag(right)], axis=1)
         pairs = pairs.reshape(2 * modes, right.shape[1])
         shared = [self.coefficients, self.reference[None]]
         rows = np.vstack([*shared, pairs] if modes else shared)
         rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
-        text = lifting_text(self.features, self.layout, len(self.parameters), modes)
-        return text, np.concatenate([self.parameters, rows.ravel()])
+        kernel = lifting_kernel(self.features, self.layout, len(self.parameters), modes)
+        return kernel, np.concatenate([self.parameters, rows.ravel()])
 
     def _kernels(self, modes: int) -> tuple[Kernels, np.ndarray]:
         """The kernel and its constants."""
         if modes not in self._made:
-            text, constants = self.text(modes)
-            sources, features = kernel_sources(text), self.features
+            (kernel, constants), features = self.kernel(modes), self.features
             given = features.states + PLANAR, features.inputs + 2 * modes, len(constants)
-            sources["full_state"].check(*given)
-            self._made[modes] = Kernels(sources), constants
+            kernel.check(*given)
+            self._made[modes] = Kernels([kernel]), constants
         return self._made[modes]
 
     def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.features import Features, held, monomials
+from vehiclemor.reduction.vehicle.features import FeatureListing, Features, Term, held, monomials
 from vehiclemor.reduction.vehicle.lifting_loops import MOVING
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -90,11 +90,10 @@ class FeatureTable:
         """Some of the features, by their numbers in order."""
         odd = [i for i in kept if i in self.odd]
         even = [i for i in kept if i in self.even]
-        terms = tuple(self.features.terms[i] for i in (*odd, *even))
-        numbers = tuple(range(len(terms)))
+        numbers = tuple(range(len(odd) + len(even)))
         (_, lateral), (_, symmetric) = self.features.groups
         groups = ((numbers[: len(odd)], lateral), (numbers[len(odd) :], symmetric))
-        features = replace(self.features, terms=terms, groups=groups)
+        features = self.features.with_terms([*odd, *even], groups)
         first, rest = list(numbers[: len(odd)]), list(numbers[len(odd) :])
         return replace(self, features=features, odd=first, even=rest)
 
@@ -127,46 +126,45 @@ def feature_table(
     parameters = np.concatenate([rows.ravel(), 1.0 / ranges.states, 1.0 / ranges.inputs, ends])
     width = k + 2
 
-    last = len(VARIABLES) * width + n + inputs
-    lines = [("part", f"p[{last}] / (p[{last}] + z{n})"), ("raw", f"p[{last + 1}] * z{n}")]
-    lines.append(("m", held("raw")))
+    listing = FeatureListing(n + 1, inputs)
+    z, u, let = listing.z, listing.u, listing.let
+    p = [*map(listing.p, range(len(parameters)))]
+    first, last = len(VARIABLES) * width, len(VARIABLES) * width + n + inputs
+    part, speed = let(p[last] / (p[last] + z[n])), let(p[last + 1] * z[n])
+    m, raw, v = let(held(speed)), [], []
     for i in range(len(VARIABLES)):
-        moved = " + ".join(f"p[{i * width + j}] * z{j}" for j in range(k))
-        moved = f"({moved} + p[{i * width + k}] * u0)"
-        direct = f"p[{i * width + k + 1}] * u0"
-        text = f"part * {moved} + {direct}" if i < 2 else moved
-        lines += [(f"raw{i}", text), (f"v{i}", held(f"raw{i}"))]
-    first = len(VARIABLES) * width
-    v = [f"v{i}" for i in range(len(VARIABLES))]
-    own = [f"p[{first + i}] * z{i}" for i in range(n)]
-    straight = [*own[:k], *(f"p[{first + n + j}] * u{j}" for j in range(inputs))]
+        row = p[i * width : (i + 1) * width]
+        one, *others = [a * b for a, b in zip(row[: k + 1], [*z[:k], u[0]], strict=True)]
+        moved = sum(others, one)
+        raw.append(let(part * moved + row[k + 1] * u[0] if i < 2 else moved))
+        v.append(let(held(raw[-1])))
+    own: list[Term] = [*zip(p[first:], z[:n], strict=False)]
+    straight: list[Term] = [*own[:k], *zip(p[first + n :], u, strict=False)]
     scaled = straight[: k + 1]
-    odd = [*straight, *(f"m * {t}" for t in scaled), *(f"m * m * {t}" for t in scaled)]
+    odd = [*straight, *((m, *term) for term in scaled), *((m, m, *term) for term in scaled)]
     odd += monomials(v, 3)
-    odd += [f"{v[i]} * {v[i]} * {v[i]} * {v[j]} * {v[j]}" for i, j in product((0, 1), (0, 1))]
-    slides = [f"v{i} * abs(v{i})" for i in (0, 1)]
-    odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
-    odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
-    odd += [f"m * {term}" for term in monomials(v, 3)]
-    odd += [f"{e} * {variable}" for e in own[k:] for variable in v]
-    even = [
-        "1.0",
-        f"z{n}",
-        *own[k:],
-        *monomials(v, 2),
-        *(f"m * {pair}" for pair in monomials(v, 2)),
-    ]
+    odd += [(v[i], v[i], v[i], v[j], v[j]) for i, j in product((0, 1), (0, 1))]
+    slides = [(v[i], abs(v[i])) for i in (0, 1)]
+    odd += [term for slide in slides for term in (slide, (m, *slide), (m, m, *slide))]
+    odd += [(*slide, *pair) for slide in slides for pair in monomials(v, 2)]
+    odd += [(m, *term) for term in monomials(v, 3)]
+    odd += [(*term, variable) for term in own[k:] for variable in v]
+    squares = monomials(v, 2)
+    even = [(listing.number(1.0),), (z[n],), *own[k:], *squares, *((m, *pair) for pair in squares)]
     numbers = tuple(range(len(odd) + len(even)))
     lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
     groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
-    steered = held(f"{1.0 / MOVING!r} * ({' + '.join(f'abs({x})' for x in v)})")
-    watched = [(f"p[{last + 2}] * raw{i}", meaning) for i, meaning in enumerate(MEANINGS)]
-    watched += [(f"{hull / trusted!r} * raw", "change of speed")]
+    one, *others = map(abs, v)
+    steered = held(1.0 / MOVING * sum(others, one))
+    watched: list[tuple[Term, str]] = [
+        ((p[last + 2], value), meaning) for value, meaning in zip(raw, MEANINGS, strict=True)
+    ]
+    watched.append(((listing.number(hull / trusted), speed), "change of speed"))
     # More of it than corners make is known only where the car runs straight.
-    alive = f"({AFTER_LANDING!r} + {(1.0 / STEERED - AFTER_LANDING)!r} * ({steered}))"
-    watched += [(f"{alive} * {e}", "heave and pitch") for e in own[k:]]
+    alive = AFTER_LANDING + (1.0 / STEERED - AFTER_LANDING) * steered
+    watched += [((alive, *term), "heave and pitch") for term in own[k:]]
     terms = (*odd, *even)
-    features = Features(n + 1, inputs, tuple(lines), terms, groups, tuple(watched), len(MEANINGS))
+    features = listing.features(terms, groups, watched, len(MEANINGS))
     counts = k + inputs, 2 + n - k
     return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts, ranges)
 
@@ -192,9 +190,7 @@ def fitted_lifting(
     values = np.hstack([part / largest(part) for part in (deviations, outputs)])
     chosen = forward_selection(columns[:, order], values, len(given), LIFTED)
     kept = sorted(order[i] for i in chosen)
-    terms = tuple(features.terms[i] for i in kept)
-    lifted = replace(features, terms=terms, groups=())
-    return ridge_fit(columns[:, kept], deviations, ridge), lifted
+    return ridge_fit(columns[:, kept], deviations, ridge), features.with_terms(kept)
 
 
 def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:

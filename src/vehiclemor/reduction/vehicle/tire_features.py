@@ -9,13 +9,21 @@ see `multibody/components/tires`, at free rolling.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from vehiclemor.codegen.operations import Value
 from vehiclemor.multibody.quantities import WHEELS
-from vehiclemor.reduction.vehicle.features import Features, held, monomials
+from vehiclemor.reduction.vehicle.features import (
+    FeatureListing,
+    Features,
+    Term,
+    held,
+    monomials,
+    product,
+)
 
 # Reduced coordinates: lateral speed, yaw rate, roll angle, roll rate, deviation of the speed.
 STATES = 5
@@ -26,51 +34,74 @@ AXLES = (WHEELS[:2], WHEELS[2:])
 NAMES = ("lateral speed", "yaw rate", "roll", "roll rate", "steering")
 OF_SPEED = "change of speed"
 DERIVATIVES = ("rate of steering", "acceleration of steering")
-ARGUMENTS = tuple(f"a{i}" for i in range(5))
 # Part of its static load that a wheel keeps, so that no force is divided by zero.
 LEAST_LOAD = 0.02
-CUBIC = monomials(ARGUMENTS, 3)
-SQUARE = monomials(ARGUMENTS, 2)
-# What changes with the speed.
-FASTER = tuple(f"m * {a}" for a in ARGUMENTS)
-FASTER_SQUARE = tuple(f"m * {pair}" for pair in SQUARE)
 
 
-@dataclass
-class Text:
-    """Lines of features under construction, with the parameters that they name.
+class TireFeatures(FeatureListing):
+    """Features under construction, with their parameters and what they are products of.
 
     The first parameter multiplies all that is watched.
+
+    Attributes
+    ----------
+    parameters
+        Values of the parameters.
+    raw
+        Arguments and derivatives of the steering, scaled, not held.
+    a, m
+        Arguments and the change of speed, held.
+    by_name
+        Slips, loads, forces and moments of axles and wheels.
     """
 
-    lines: list[tuple[str, str]] = field(default_factory=list)
-    values: list[float] = field(default_factory=lambda: [1.0])
-    watched: list[tuple[str, str]] = field(default_factory=list)
+    def __init__(self, inputs: int) -> None:
+        super().__init__(STATES, inputs)
+        self.parameters = [1.0]
+        self.watched: list[tuple[Term, str]] = []
+        self.raw: list[Value] = []
+        self.a: list[Value] = []
+        self.m: Value
+        self.by_name: dict[str, Value] = {}
 
-    def parameter(self, value: float) -> str:
-        """Text of a new parameter."""
-        self.values.append(float(value))
-        return f"p[{len(self.values) - 1}]"
+    def parameter(self, value: float) -> Value:
+        """A new parameter."""
+        self.parameters.append(float(value))
+        return self.p(len(self.parameters) - 1)
 
-    def let(self, name: str, text: str) -> str:
-        """A new line; its name."""
-        self.lines.append((name, text))
-        return name
+    def sum(self, terms: Sequence[Term], weights: Sequence[float]) -> Value:
+        """A weighted sum."""
+        pairs = zip(weights, terms, strict=True)
+        first, *others = [product((self.parameter(weight), *term)) for weight, term in pairs]
+        return self.let(sum(others, first))
 
-    def sum(self, name: str, terms: Sequence[str], weights: Sequence[float]) -> str:
-        """A new line with a weighted sum."""
-        parts = [f"{self.parameter(w)} * {t}" for t, w in zip(terms, weights, strict=True)]
-        return self.let(name, " + ".join(parts))
-
-    def features(self, inputs: int, terms: Sequence[str], odd: int = 0) -> Features:
+    def of(self, terms: Sequence[Term], odd: int = 0) -> Features:
         """Features of these terms; the first ones are the odd ones."""
         numbers = tuple(range(len(terms)))
         groups = ((numbers[:odd], LATERAL), (numbers[odd:], SYMMETRIC)) if odd else ()
         # The change of speed comes last: alone it moves without steering.
-        watched = [(f"p[0] * {text}", name) for text, name in self.watched]
+        watched = [((self.p(0), *term), name) for term, name in self.watched]
         watched.sort(key=lambda of: of[1] == OF_SPEED)
-        lines, lateral = tuple(self.lines), max(len(watched) - 1, 0)
-        return Features(STATES, inputs, lines, tuple(terms), groups, tuple(watched), lateral)
+        lateral = max(len(watched) - 1, 0)
+        return self.features(terms, groups, watched, lateral)
+
+    @property
+    def square(self) -> tuple[Term, ...]:
+        """Products of two arguments."""
+        return monomials(self.a, 2)
+
+    @property
+    def cubic(self) -> tuple[Term, ...]:
+        """Products of three arguments."""
+        return monomials(self.a, 3)
+
+    def faster(self, terms: Iterable[Term]) -> list[Term]:
+        """What changes with the speed."""
+        return [(self.m, *term) for term in terms]
+
+    def alone(self, values: Iterable[Value]) -> list[Term]:
+        """Values as terms."""
+        return [(value,) for value in values]
 
 
 def argument_values(speed: float, z: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -80,24 +111,26 @@ def argument_values(speed: float, z: np.ndarray, u: np.ndarray) -> np.ndarray:
     return np.column_stack([moved, u[:, 0], z[:, SPEED], u[:, 1:]])
 
 
-def arguments(speed: float, reach: np.ndarray, reversal: float) -> Text:
-    """Lines of the arguments in [-1, 1], `raw` where they are not held.
+def arguments(inputs: int, speed: float, reach: np.ndarray, reversal: float) -> TireFeatures:
+    """The arguments in [-1, 1], `raw` where they are not held.
 
     Each of `argument_values` may go as far as `reach`, the product of the steering and its rate as
     far as `reversal`: where much steering is taken back fast, loads lag behind.
     """
-    text = Text()
-    text.let("part", f"1.0 / ({text.parameter(speed)} + z{SPEED})")
-    kinds = ("part * z0", "part * z1", "z2", "part * z3", "u0", f"z{SPEED}", "u1", "u2")
-    names = (*NAMES, OF_SPEED, *DERIVATIVES)
-    held_names = (*ARGUMENTS, "m")
-    for i, most in enumerate(reach):
-        text.let(f"raw{i}", f"{text.parameter(1.0 / most)} * {kinds[i]}")
-        text.watched.append((f"raw{i}", names[i]))
-        if i < len(held_names):
-            text.let(held_names[i], held(f"raw{i}"))
-    text.watched.append((f"{text.parameter(1.0 / reversal)} * u0 * u1", "reversal of the steering"))
-    return text
+    made = TireFeatures(inputs)
+    z, u = made.z, made.u
+    part = made.let(1.0 / (made.parameter(speed) + z[SPEED]))
+    moving: list[Term] = [(part, z[0]), (part, z[1]), (z[2],), (part, z[3]), (u[0],)]
+    kinds = [*moving, (z[SPEED],), *made.alone(u[1:])]
+    for most, name, kind in zip(reach, (*NAMES, OF_SPEED, *DERIVATIVES), kinds, strict=False):
+        made.raw.append(made.let(product((made.parameter(1.0 / most), *kind))))
+        made.watched.append(((made.raw[-1],), name))
+        if len(made.raw) <= len(NAMES) + 1:
+            made.a.append(made.let(held(made.raw[-1])))
+    made.m = made.a.pop()
+    reversed_ = made.parameter(1.0 / reversal), u[0], u[1]
+    made.watched.append((reversed_, "reversal of the steering"))
+    return made
 
 
 @dataclass(frozen=True)
@@ -109,71 +142,64 @@ class Tire:
     saturation: float
 
 
-def fiala(text: Text, wheel: str, slip: str, load: str, tire: Tire) -> None:
-    """Lines of a wheel: `F` lateral force, `M` aligning moment, `G` its part that still sticks.
+def fiala(made: TireFeatures, wheel: str, slip: Value, load: Value, tire: Tire) -> list[Value]:
+    """Lateral force and aligning moment of a wheel, and its part that still sticks.
 
-    Forces as parts of the static load, moments as parts of it times the width, from the lines of
-    the tangent of the slip angle and of the load in N.
+    Forces as parts of the static load, moments as parts of it times the width, from the tangent of
+    the slip angle and the load in N.
     """
-    p, parameter, let = tire.parameters, text.parameter, text.let
+    p, parameter, let = tire.parameters, made.parameter, made.let
     fall = parameter(p["largest_friction"] - p["smallest_friction"])
-    limit = let(
-        f"limit_{wheel}", f"{load} * ({parameter(p['largest_friction'])} - {fall} * abs({slip}))"
-    )
-    third = parameter(p["cornering_stiffness"] / 3.0)
-    raw = let(f"y_{wheel}", f"{third} * {slip} / {limit}")
-    text.watched.append(
-        (f"{parameter(1.0 / tire.saturation)} * {raw}", f"saturation of the {wheel} tire")
-    )
-    y = let(f"c_{wheel}", held(raw))
-    left = let(f"left_{wheel}", f"1.0 - abs({y})")
-    let(f"G_{wheel}", f"{left} * {left}")
-    share = let(f"share_{wheel}", f"{parameter(1.0 / tire.load)} * {limit} * {y}")
-    let(f"F_{wheel}", f"-{share} * (3.0 - 3.0 * abs({y}) + {y} * {y})")
-    let(f"M_{wheel}", f"{share} * G_{wheel} * {left}")
+    limit = let(load * (parameter(p["largest_friction"]) - fall * abs(slip)))
+    raw = let(parameter(p["cornering_stiffness"] / 3.0) * slip / limit)
+    used = parameter(1.0 / tire.saturation), raw
+    made.watched.append((used, f"saturation of the {wheel} tire"))
+    y = let(held(raw))
+    left = let(1.0 - abs(y))
+    sticking = let(left * left)
+    share = let(parameter(1.0 / tire.load) * limit * y)
+    force = let(-share * (3.0 - 3.0 * abs(y) + y * y))
+    return [force, let(share * sticking * left), sticking]
 
 
-def axle_lines(text: Text, axle: int, tire: Tire) -> None:
-    """Lines of an axle from those of the means and half differences of its slips and loads.
+def add_axle(made: TireFeatures, axle: int, tire: Tire) -> None:
+    """What the tires of an axle do, from the means and half differences of its slips and loads.
 
     Sums `F`, `M`, `G` of both wheels with the number of the axle, and `FD`, `MD`, `GD`, left less
     right.
     """
-    left, right = AXLES[axle]
-    for wheel, sign in ((left, "+"), (right, "-")):
-        slip = text.let(f"slip_{wheel}", f"slip{axle} {sign} slip_half{axle}")
-        given = text.let(f"given_{wheel}", f"load{axle} {sign} load_half{axle}")
-        least = text.parameter(LEAST_LOAD * tire.load)
-        load = text.let(f"load_{wheel}", f"0.5 * ({given} + {least} + abs({given} - {least}))")
-        fiala(text, wheel, slip, load, tire)
-    for kind in "FMG":
-        text.let(f"{kind}{axle}", f"{kind}_{left} + {kind}_{right}")
-        text.let(f"{kind}D{axle}", f"{kind}_{left} - {kind}_{right}")
+    named, wheels = made.by_name, []
+    for wheel, sign in zip(AXLES[axle], (1, -1), strict=True):
+        slip, load = (
+            made.let(named[mean] + named[half] if sign > 0 else named[mean] - named[half])
+            for mean, half in ((f"{kind}{axle}", f"{kind}_half{axle}") for kind in ("slip", "load"))
+        )
+        least = made.parameter(LEAST_LOAD * tire.load)
+        load = made.let(0.5 * (load + least + abs(load - least)))
+        wheels.append(fiala(made, wheel, slip, load, tire))
+    for kind, left, right in zip("FMG", *wheels, strict=True):
+        named[f"{kind}{axle}"] = made.let(left + right)
+        named[f"{kind}D{axle}"] = made.let(left - right)
 
 
-def linear_terms(inputs: int) -> list[str]:
-    """The arguments and derivatives of the steering; they are not held."""
-    return [*(f"raw{i}" for i in range(5)), *_derivatives(inputs)]
-
-
-def odd_candidates() -> list[str]:
+def odd_candidates(made: TireFeatures) -> list[Term]:
     """Odd terms that the equations may need beside the linear ones and the tire forces."""
-    found = [*CUBIC, *FASTER]
+    named, m = made.by_name, made.m
+    found = [*made.cubic, *made.faster(made.alone(made.a))]
     for axle in (0, 1):
-        found += [f"m * F{axle}", f"m * M{axle}", f"GD{axle}"]
-        found += [f"{kind}{axle} * {a}" for kind in ("G", "FD") for a in ARGUMENTS]
-        found += [f"F{axle} * {pair}" for pair in SQUARE]
+        force, moment = named[f"F{axle}"], named[f"M{axle}"]
+        found += [(m, force), (m, moment), (named[f"GD{axle}"],)]
+        found += [(named[f"{kind}{axle}"], a) for kind in ("G", "FD") for a in made.a]
+        found += [(force, *pair) for pair in made.square]
     return found
 
 
-def even_candidates(inputs: int) -> list[str]:
+def even_candidates(made: TireFeatures) -> list[Term]:
     """Even terms that vanish in straight running at any speed."""
-    found = [*SQUARE, *FASTER_SQUARE]
+    named = made.by_name
+    found = [*made.square, *made.faster(made.square)]
     for axle in (0, 1):
-        found += [f"FD{axle}", f"MD{axle}", f"F{axle} * F{axle}"]
-        found += [f"{kind}{axle} * {a}" for kind in ("F", "M", "m * F") for a in ARGUMENTS]
-    return [*found, *(f"{d} * {a}" for d in _derivatives(inputs) for a in ARGUMENTS)]
-
-
-def _derivatives(inputs: int) -> list[str]:
-    return [f"raw{5 + j}" for j in range(1, inputs)]
+        force, moment = named[f"F{axle}"], named[f"M{axle}"]
+        found += [(named[f"FD{axle}"],), (named[f"MD{axle}"],), (force, force)]
+        found += [(*kind, a) for kind in ((force,), (moment,), (made.m, force)) for a in made.a]
+    return [*found, *((rate, a) for rate in made.raw[len(NAMES) + 1 :] for a in made.a)]

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.errors import InputError
 from vehiclemor.progress import first_use
 from vehiclemor.registry import choice
@@ -17,7 +18,7 @@ from vehiclemor.simulation.formulations import FORMULATIONS
 from vehiclemor.simulation.integrators import exponential_functions, exponential_modes, tableaus
 from vehiclemor.simulation.integrators.loop import scratch_end
 from vehiclemor.simulation.integrators.ros34pw2 import GAMMA
-from vehiclemor.simulation.integrators.step_text import Frame, exponential_step, w_step
+from vehiclemor.simulation.integrators.step_kernels import Frame, exponential_step, w_step
 from vehiclemor.simulation.integrators.structures import Control
 
 # Step sizes (s) for which operators are stored.  Where a step and the nearest of them differ more,
@@ -50,15 +51,15 @@ class Stepped(NamedTuple):
 
     Attributes
     ----------
-    text
-        Makes the kernel's source from the frame and the number of inputs.
+    kernel
+        Makes the kernel from the frame and the number of inputs.
     tables
         Makes transposed operators (step sizes, tables, n, n) of a diagonal block.
     modules
         Modules of the loop's functions.
     """
 
-    text: Callable[[Frame, int], str]
+    kernel: Callable[[Frame, int], Kernel]
     tables: Callable[[np.ndarray], np.ndarray]
     modules: tuple[str, ...]
 

@@ -1,6 +1,6 @@
 """The exponential method: a whole step is one kernel.
 
-See `step_text.exponential_step`.
+See `step_kernels.exponential_step`.
 """
 
 from vehiclemor.codegen.loop_types import call_kernel, matrix, vector

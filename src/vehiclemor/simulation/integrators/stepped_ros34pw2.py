@@ -1,4 +1,4 @@
-"""The W-method: a whole step is one kernel, see `step_text.w_step`.
+"""The W-method: a whole step is one kernel, see `step_kernels.w_step`.
 
 What is not here is as in `ros34pw2`.
 """

@@ -5,35 +5,47 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.unit.kernels import kernel
 from tests.unit.python_system import python_system
-from vehiclemor.codegen.kernels import Kernels, kernel_sources
+from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Prepared, address_of_array
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.vehicle.features import Features, feature_system
+from vehiclemor.reduction.vehicle.features import FeatureListing, feature_system
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, frozen
 from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.workspaces import Solver
 
 GUARD, MARK = 64, 12345
-HEAD = "(_x, _u, _constants, _work, _result):"
 
 
 def oscillators(n: int, inputs: int) -> System:
     """n / 2 driven oscillators of unit mass; an odd last state decays."""
-    half, pushed = n // 2, "".join(f" + _u[{j}]" for j in range(inputs))
-    force = [f"{-1.0 - i}*_x[{i}] - 0.3*_x[{half + i}]{pushed}" for i in range(half)]
-    rates = [*(f"_x[{half + i}]" for i in range(half)), *force, *[f"-1.0*_x[{n - 1}]"] * (n % 2)]
-    parts = [f"def derivative{HEAD}", *(f"    _result[{k}] = {f}" for k, f in enumerate(rates))]
-    if half and not n % 2:
-        parts += [f"def speeds{HEAD}", *(f"    _result[{i}] = {rates[i]}" for i in range(half))]
-        parts += [f"def second_order{HEAD}"]
+    half = n // 2
+
+    def forces(x, u):
+        pushed = sum(u[j] for j in range(inputs))
+        return [(-1.0 - i) * x[i] - 0.3 * x[half + i] + pushed for i in range(half)]
+
+    def derivative(x, u, constants, result):
+        rates = [*(x[half + i] for i in range(half)), *forces(x, u), *[-1.0 * x[n - 1]] * (n % 2)]
+        for place, rate in enumerate(rates):
+            result[place] = rate
+
+    def speeds(x, u, constants, result):
         for i in range(half):
-            row = [*(str(float(i == j)) for j in range(half)), force[i]]
-            parts += [f"    _result[{i}, {j}] = {value}" for j, value in enumerate(row)]
-    kernels = Kernels(kernel_sources("\n".join(parts)))
+            result[i] = x[half + i]
+
+    def second_order(x, u, constants, result):
+        for i, force in enumerate(forces(x, u)):
+            for j, value in enumerate([*np.eye(half)[i], force]):
+                result[i, j] = value
+
+    made = [kernel(derivative)]
+    if half and not n % 2:
+        made += [kernel(speeds), kernel(second_order, columns=half + 1)]
     plain = python_system(lambda x, _: 0.0 * x, [0.0] * n, inputs)
-    return replace(plain, kernels=kernels)
+    return replace(plain, kernels=Kernels(made))
 
 
 def steered(inputs: int) -> Maneuver:
@@ -100,7 +112,9 @@ def test_a_reduced_run_stays_in_its_space(n, rank, inputs, formulation, solver):
 
 @pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4"])
 def test_a_step_of_a_reduced_vehicle_stays_in_its_space(solver):
-    features = Features(3, 1, (), ("z0", "z1", "z2", "u0", "z0 * z1 * z2", "1.0"))
+    listing = FeatureListing(3, 1)
+    z, alone = listing.z, (*listing.z, *listing.u, listing.number(1.0))
+    features = listing.features([*((value,) for value in alone), tuple(z)])
     system = feature_system(features, np.zeros(0), -0.1 * np.ones((6, 6)), np.ones(6), np.zeros(3))
     assert system.whole_steps(solver)
     check(system, 1, whole_space(6), solver)

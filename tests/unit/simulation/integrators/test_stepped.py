@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.inputs.steering import lane_change
-from vehiclemor.reduction.vehicle.features import Features, feature_system
+from vehiclemor.reduction.vehicle.features import FeatureListing, feature_system
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.integrators import catalogue
@@ -20,8 +20,10 @@ VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 
 def reduced_vehicle() -> System:
     """A damped oscillator and a decay, pushed by the inputs and by cubic terms; heading, place."""
-    terms = ("z0", "z1", "z2", "u0", "bend * z1", "z0 * z1 * z2", "1.0")
-    features = Features(3, 1, (("bend", "z0 * z0 - z2"),), terms)
+    listing = FeatureListing(3, 1)
+    z, alone = listing.z, [(value,) for value in (*listing.z, *listing.u)]
+    products = ((z[0] * z[0] - z[2], z[1]), tuple(z), (listing.number(1.0),))
+    features = listing.features([*alone, *products])
     c = np.zeros((7, 6))
     c[:2, :2] = [[-1.0, -4.0], [4.0, -1.0]]
     c[2, 2] = -9.0

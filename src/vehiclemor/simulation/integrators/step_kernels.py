@@ -1,4 +1,4 @@
-"""Text of kernels that take whole steps of a system with a frozen Jacobian.
+"""Kernels that take whole steps of a system with a frozen Jacobian.
 
 With two or four dozen states the loops of `ros34pw2` and `etdrk4` take as long as the right-hand
 side.  These kernels do what a step does there in vectors of known length, and execute the
@@ -9,12 +9,13 @@ Jacobian of a vehicle, its own mirror image, has two diagonal blocks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from vehiclemor.codegen.operations import Kernel, Listing, Value
 from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.simulation.integrators import ros34pw2, tableaus
 from vehiclemor.simulation.integrators.etdrk4 import ERROR_SHARE
@@ -95,74 +96,92 @@ class Frame(NamedTuple):
         return np.ascontiguousarray(np.concatenate(parts, axis=2).reshape(len(parts[0]), 1, -1))
 
 
-class _Step:
-    """Lines of a step; vectors beside those given stand one after the other in the result."""
+class _Step(Listing):
+    """Operations of a step; vectors beside those given stand one after the other in the result."""
 
-    def __init__(self, frame: Frame, given: Sequence[str], scalars: Sequence[str]) -> None:
+    def __init__(self, frame: Frame, given: Sequence[str], scalars: int) -> None:
+        super().__init__()
         self.frame = frame
         self.n = n = sum(len(block) for block in frame.blocks)
         # Of a vector of coordinates, and room for any.
         self.width = frame.places[-1]
         self.stride = max(padded(n), self.width)
         self.vectors = {name: ("_x", k * n) for k, name in enumerate(given)}
-        self.inputs = len(given) * n + len(scalars)
-        self.used = 0
-        self.lines = [f"{name} = _x[{len(given) * n + k}]" for k, name in enumerate(scalars)]
+        first = len(given) * n
+        self.inputs, self.used = first + scalars, 0
+        self.scalars = [self.let(self.entry("_x", first + k)) for k in range(scalars)]
+        # State that turns with the heading -> its partner, and whether that is the second.
+        self.partners: dict[int, tuple[int, bool]] = {}
         if frame.rotating:
-            self.lines.append(f"sine, cosine = sincos_one({self.at('y', frame.rotating[0])})")
+            heading = self.entry(*self.at("y", frame.rotating[0]))
+            self.sine, self.cosine = self.parts(self.new("sincos", heading), 2)
+            for a, b in zip(frame.rotating[1::2], frame.rotating[2::2], strict=True):
+                self.partners |= {a: (b, True), b: (a, False)}
 
-    def at(self, name: str, place: int = 0) -> str:
+    def at(self, name: str, place: int = 0) -> tuple[str, int]:
         """An entry of a vector."""
         if name not in self.vectors:
             self.vectors[name] = ("_result", self.used)
             self.used += padded(self.n) if name in RESULTS else self.stride
         array, first = self.vectors[name]
-        return f"{array}[{first + place}]"
+        return array, first + place
 
-    def sum(self, to: str, *terms: tuple[object, str], n: int = 0) -> None:
+    def sum(self, to: str, *terms: tuple[Value | float, str], n: int = 0) -> None:
         """A vector as the sum of factors times vectors, of coordinates by default."""
-        parts = [f"{factor}, {self.at(name)}" for factor, name in terms]
-        self.lines.append(f"combine({self.at(to)}, {n or self.width}, {', '.join(parts)})")
+        places = [self.at(name) for _, name in terms]
+        detail = self.at(to), n or self.width, *places
+        self.new("combine", *(factor for factor, _ in terms), detail=detail)
 
     def rates(self, state: str, inputs: int, to: str) -> None:
         """The right-hand side at a state and the inputs from a place on."""
-        self.lines.append(
-            f"execute(_kernels[0], {self.at(state)}, _x[{self.inputs + inputs}], _constants[0], "
-            f"{self.at(to)})"
-        )
+        given = self.at(state), ("_x", self.inputs + inputs), ("_constants", 0)
+        self.new("execute", detail=(("_kernels", 0), *given, self.at(to)))
+
+    def turned(self, read: Callable[[int], Value], state: int, back: bool) -> Value:
+        """A state with the heading turned to zero, or back, of what reads states."""
+        if state not in self.partners:
+            return read(state)
+        other, first = self.partners[state]
+        own, beside = self.cosine * read(state), self.sine * read(other)
+        return own - beside if first == back else own + beside
 
     def enter(self, to: str, vector: str) -> None:
         """Coordinates of a vector of states; the same vector if they are the states."""
         if self.frame.plain:
             self.vectors[to] = self.vectors[vector]
             return
-        value = {i: self.at(vector, i) for i in range(self.n)}
-        for a, b in _pairs(self.frame.rotating):
-            x, y = value[a], value[b]
-            value[a], value[b] = f"(cosine * {x} + sine * {y})", f"(cosine * {y} - sine * {x})"
+
+        def read(state: int) -> Value:
+            return self.entry(*self.at(vector, state))
+
         for first, block in zip(self.frame.places, self.frame.blocks, strict=False):
             for k in range(padded(len(block))):
-                terms = [f"{w!r} * {value[i]}" for i, w in block[k]] if k < len(block) else ["0.0"]
-                self.lines.append(f"{self.at(to, first + k)} = {' + '.join(terms)}")
+                row = block[k] if k < len(block) else ()
+                terms = [w * self.turned(read, i, back=False) for i, w in row]
+                self.store(self.at(to, first + k)[1], _total(terms) if terms else 0.0)
 
     def leave(self, to: str, coordinates: str, start: str = "") -> None:
         """States of a vector of coordinates, added to another vector of states."""
         if self.frame.plain:
             self.sum(to, *[(1.0, name) for name in (start, coordinates) if name], n=self.n)
             return
-        value: dict[int, list[str]] = {i: [] for i in range(self.n)}
+        shares: dict[int, list[tuple[float, int]]] = {i: [] for i in range(self.n)}
         for first, block in zip(self.frame.places, self.frame.blocks, strict=False):
             for k, row in enumerate(block):
                 for i, weight in row:
-                    share = weight / len(row)
-                    value[i].append(f"{share!r} * {self.at(coordinates, first + k)}")
-        whole = {i: f"({' + '.join(terms)})" for i, terms in value.items()}
-        for a, b in _pairs(self.frame.rotating):
-            x, y = whole[a], whole[b]
-            whole[a], whole[b] = f"(cosine * {x} - sine * {y})", f"(cosine * {y} + sine * {x})"
-        for i, text in whole.items():
-            other = f"{self.at(start, i)} + " if start else ""
-            self.lines.append(f"{self.at(to, i)} = {other}{text}")
+                    shares[i].append((weight / len(row), first + k))
+
+        def read(state: int) -> Value:
+            terms = [w * self.entry(*self.at(coordinates, k)) for w, k in shares[state]]
+            return _total(terms)
+
+        for i in range(self.n):
+            _, place = self.at(to, i)
+            if start:
+                begun = self.entry(*self.at(start, i))
+                self.store(place, begun + self.turned(read, i, back=True))
+            else:
+                self.store(place, self.turned(read, i, back=True))
 
     def product(self, to: str, table: int, vector: str, weight: float) -> None:
         """A stored operator times a vector of coordinates."""
@@ -171,33 +190,30 @@ class _Step:
             frame.places, frame.blocks, frame.columns, entries, strict=False
         ):
             kept = tuple(i for i in range(len(block)) if i not in columns)
-            self.lines.append(
-                f"product({self.at(to, first)}, {padded(len(block))}, _u[{rows}], "
-                f"{self.at(vector, first)}, {columns}, {kept}, {weight!r})"
-            )
+            own = self.at(to, first), padded(len(block)), ("_u", rows), self.at(vector, first)
+            self.new("product", detail=(*own, columns, kept, weight))
 
-    def text(self, name: str) -> str:
+    def made(self, name: str) -> Kernel:
         """The kernel."""
-        body = "\n    ".join(self.lines)
-        return f"def {name}(_x, _u, _constants, _result, _kernels):\n    {body}\n"
+        return self.kernel(name, ("_x", "_u", "_constants", "_result", "_kernels"))
 
 
-def _pairs(rotating: Sequence[int]) -> list[tuple[int, int]]:
-    return list(zip(rotating[1::2], rotating[2::2], strict=True))
+def _total(terms: Sequence[Value]) -> Value:
+    return sum(terms[1:], terms[0])
 
 
-def w_step(frame: Frame, inputs: int) -> str:
+def w_step(frame: Frame, inputs: int) -> Kernel:
     """A step of `ros34pw2`: first argument (y, f, h, inputs of three stages), result (new, error).
 
     The second argument is the stored inverse.
     """
-    tableau, step = tableaus.ros34pw2(), _Step(frame, ("y", "f"), ("h",))
+    tableau, step = tableaus.ros34pw2(), _Step(frame, ("y", "f"), 1)
     n, stages = step.n, ("s0", "s1", "s2", "s3")
     for name in ("new", "error"):
         step.at(name)
-    step.lines.append(f"scale = {ros34pw2.GAMMA!r} * h")
+    scale = step.let(ros34pw2.GAMMA * step.scalars[0])
 
-    def weighted(row: int, count: int) -> list[tuple[object, str]]:
+    def weighted(row: int, count: int) -> list[tuple[float, str]]:
         return [(float(tableau[row, j]), stages[j]) for j in range(count)]
 
     for k, stage in enumerate(stages):
@@ -205,7 +221,7 @@ def w_step(frame: Frame, inputs: int) -> str:
         if k:
             step.sum("middle", (1.0, "y"), *weighted(k, k), n=n)
             step.rates("middle", (k - 1) * inputs, rates := "rates")
-        step.sum("b", ("scale", rates), *weighted(4 + k, k), n=n)
+        step.sum("b", (scale, rates), *weighted(4 + k, k), n=n)
         step.enter("entered", "b")
         solved = stage if frame.plain else "solved"
         step.product(solved, 0, "entered", 1.0)
@@ -213,69 +229,63 @@ def w_step(frame: Frame, inputs: int) -> str:
             step.leave(stage, solved)
     step.sum("new", (1.0, "y"), *weighted(ros34pw2.M, 4), n=n)
     step.sum("error", *weighted(ros34pw2.E, 4), n=n)
-    return step.text("ros34pw2_step")
+    return step.made("ros34pw2_step")
 
 
-def exponential_step(frame: Frame, inputs: int) -> str:
+def exponential_step(frame: Frame, inputs: int) -> Kernel:
     """A step of `etdrk4`: first argument (y, f, both a step before, numbers, inputs of two stages).
 
     The numbers are h, stretch, three weights of the quadrature and the share of the defect; the
     second argument the tables of the step.  Result: (new, rates there, error).
     """
     given = ("y", "f", "y_past", "f_past")
-    step = _Step(frame, given, ("h", "stretch", "at_past", "at_half", "at_end", "share"))
-    n = step.n
+    step = _Step(frame, given, 6)
+    n, (h, stretch, at_past, at_half, at_end, share) = step.n, step.scalars
     for name in RESULTS:
         step.at(name)
 
     def product(to: str, table: int, vector: str) -> None:
         step.product(to, table, vector, AT_ZERO[table])
 
-    step.lines += ["against = -stretch", "half_h = 0.5 * h"]
+    against, half_h = step.let(-stretch), step.let(0.5 * h)
     step.enter("f1", "f")
     product("half", HALF_FIRST, "f1")
     product("whole", FIRST, "f1")
-    step.sum("v", ("h", "half"))
+    step.sum("v", (h, "half"))
     for k in range(4):
         if k == 1:
             product("p", HALF_SECOND, "d0")
-            step.sum("v", ("h", "half"), ("h", "p"))
+            step.sum("v", (h, "half"), (h, "p"))
         elif k == 2:
             product("p", SECOND, "d1")
-            step.sum("v", ("h", "whole"), ("h", "p"))
+            step.sum("v", (h, "whole"), (h, "p"))
         elif k == 3:
             step.sum("both", (1.0, "d0"), (1.0, "d1"))
             product("p", MIDDLE, "both")
             product("q", LAST, "d2")
-            step.sum("v", ("h", "whole"), ("h", "p"), ("h", "q"))
+            step.sum("v", (h, "whole"), (h, "p"), (h, "q"))
         product("p", JACOBIAN, "v")
         state = "new" if k == 3 else "middle"
         step.leave(state, "v", "y")
         step.rates(state, 0 if k < 2 else inputs, "rates")
         step.enter("entered", "rates")
-        step.sum(f"d{k}", (1.0, "entered"), (-1.0, "f1"), ("against", "p"))
+        step.sum(f"d{k}", (1.0, "entered"), (-1.0, "f1"), (against, "p"))
     step.sum("middle", (1.0, "y"), (-1.0, "y_past"), n=n)
     step.enter("moved", "middle")
     product("p", JACOBIAN, "moved")
     step.sum("middle", (1.0, "f"), (-1.0, "f_past"), n=n)
     step.enter("changed", "middle")
-    step.lines += [
-        f"pair = h * {ERROR_SHARE!r}",
-        "weight_half = half_h * at_half",
-        "weight_end = h * at_end",
-        "weight_past = h * at_past",
-        "weight_linear = weight_past * against",
-        "share_half = -0.5 * share",
-        "share_linear = 0.125 * share * stretch * h",
-    ]
-    change = (("pair", "d3"), ("-pair", "d2"), ("weight_half", "both"), ("weight_end", "d3"))
-    step.sum("v", *change, ("weight_past", "changed"), ("weight_linear", "p"))
+    pair, weight_half = step.let(h * ERROR_SHARE), step.let(half_h * at_half)
+    weight_end, weight_past = step.let(h * at_end), step.let(h * at_past)
+    weight_linear, share_half = step.let(weight_past * against), step.let(-0.5 * share)
+    share_linear = step.let(0.125 * share * stretch * h)
+    change = ((pair, "d3"), (-pair, "d2"), (weight_half, "both"), (weight_end, "d3"))
+    step.sum("v", *change, (weight_past, "changed"), (weight_linear, "p"))
     product("q", LAST, "v")
     product("p", JACOBIAN, "whole")
-    step.sum("v", ("share", "half"), ("share_half", "whole"), ("share_linear", "p"))
+    step.sum("v", (share, "half"), (share_half, "whole"), (share_linear, "p"))
     step.leave("middle", "q")
     step.leave("error", "v")
-    step.lines.append(
-        f"magnitudes({step.at('error')}, {n}, {step.at('error')}, {step.at('middle')})"
-    )
-    return step.text("etdrk4_step")
+    error = step.at("error")
+    step.new("magnitudes", detail=(error, n, error, step.at("middle")))
+    return step.made("etdrk4_step")

@@ -1,0 +1,191 @@
+"""Kernels of a program: its SymPy expressions as operations, in exactly known numbers.
+
+Every kernel has the arguments of its program, `_constants` and `_result`, which it fills.  The
+kernel `constants` makes the array that the others read from `_parameters`.  Sums and products keep
+the order in which SymPy prints them, small powers are products.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import sympy as sp
+
+from vehiclemor.codegen.operations import KINDS, Kernel, Listing, Value
+from vehiclemor.codegen.schedule import BATCHED, Batch, schedule
+from vehiclemor.codegen.vector_lanes import LANES, SMALLEST_BATCH
+from vehiclemor.symbolic.program import Function, Program
+
+# Where SymPy has another name.
+RENAMED = {"Abs": "abs"}
+# Powers that are products.
+LARGEST_PRODUCT = 4
+
+
+def kernels_of(program: Program) -> dict[str, Kernel]:
+    """Kernels of the functions of a program, and of its constants."""
+    given = {"parameters": program.parameters}
+    found = {"constants": _kernel("constants", given, program.constants)}
+    for name, function in program.functions.items():
+        found[name] = _kernel(name, _arguments(program), function)
+    if "residual_jacobian" in found:
+        found |= _product_kernels(program)
+    return found
+
+
+def _arguments(program: Program) -> dict[str, Sequence[sp.Symbol]]:
+    return program.arguments | {"constants": program.constant_symbols}
+
+
+def _kernel(name: str, arguments: dict[str, Sequence[sp.Symbol]], function: Function) -> Kernel:
+    lowering = _Lowering()
+    expressions = [e for _, e in function.assignments] + list(function.results)
+    used = set().union(*(e.free_symbols for e in expressions))
+    # With an underscore: a model's own names may be `result`.
+    for argument, symbols in arguments.items():
+        for place, symbol in enumerate(symbols):
+            if symbol in used:
+                lowering.known[symbol] = lowering.let(lowering.entry(f"_{argument}", place))
+    for step in schedule(function):
+        if isinstance(step, Batch):
+            lowering.evaluate(step)
+        else:
+            lowering.known[step[0]] = lowering.let(lowering.value(step[1]))
+    for place, expression in enumerate(function.results):
+        lowering.store(place, lowering.value(expression))
+    columns = function.shape[1] if len(function.shape) > 1 else 0
+    return lowering.kernel(name, [*(f"_{a}" for a in arguments), "_result"], columns)
+
+
+def _product_kernels(program: Program) -> dict[str, Kernel]:
+    """Two kernels by which a Jacobian is multiplied with vectors.
+
+    `tangent_parts(q, u, constants, result)` gives the entries of the Jacobian that are no
+    structural constants, then the residual; `tangent(parts, column, result)` the product.
+    """
+    function, product = program.functions["residual_jacobian"], Listing()
+    rows, columns = function.shape
+    entries: list[sp.Expr] = []
+    for i in range(rows):
+        terms = []
+        for j in range(columns - 1):
+            entry = function.results[i * columns + j]
+            if entry == 0:
+                continue
+            if entry not in (1, -1):
+                factor = product.entry("_parts", len(entries))
+                terms.append(factor * product.entry("_column", j))
+                entries.append(entry)
+            else:
+                column = product.entry("_column", j)
+                terms.append(column if entry == 1 else -column)
+        product.store(i, sum(terms[1:], terms[0]) if terms else 0.0)
+    residual = [function.results[(i + 1) * columns - 1] for i in range(rows)]
+    results = (*entries, *residual)
+    parts = Function(function.assignments, results, (len(results),))
+    return {
+        "tangent_parts": _kernel("tangent_parts", _arguments(program), parts),
+        "tangent": product.kernel("tangent", ("_parts", "_column", "_result")),
+    }
+
+
+class _Lowering(Listing):
+    """Writes expressions; `known` are the values of symbols and of functions in batches."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.known: dict[sp.Basic, Value] = {}
+
+    def evaluate(self, batch: Batch) -> None:
+        """Write the evaluation of a function for several arguments at once."""
+        given, calls = batch.arguments, BATCHED[batch.name]
+        if len(given) < SMALLEST_BATCH:
+            for argument in given:
+                whole = self.let(self.new(batch.name, self.known[argument]))
+                results = [whole] if len(calls) == 1 else self.parts(whole, len(calls))
+                self.known |= {c(argument): r for c, r in zip(calls, results, strict=True)}
+            return
+        for first in range(0, len(given), LANES):
+            own = given[first : first + LANES]
+            filled = [*(self.known[a] for a in own), *[self.number(0.0)] * (LANES - len(own))]
+            parts = self.parts(self.new("batch", *filled, detail=batch.name), LANES * len(calls))
+            for k, call in enumerate(calls):
+                found = parts[LANES * k : LANES * k + len(own)]
+                self.known |= {call(a): part for a, part in zip(own, found, strict=True)}
+
+    def value(self, expression: sp.Basic) -> Value:
+        """Write an expression; `ValueError` if kernels have no operation of that kind."""
+        if expression in self.known:
+            return self.known[expression]
+        match expression:
+            case sp.Add():
+                return self._sum(expression.as_ordered_terms())
+            case sp.Mul():
+                return self._product(expression)
+            case sp.Pow():
+                return self._power(expression.base, expression.exp)
+            case sp.Piecewise():
+                return self._choice(expression.args)
+            case sp.Expr() if expression.is_number and not expression.args:
+                return self.number(float(expression))
+        name = getattr(expression, "rel_op", type(expression).__name__)
+        kind = RENAMED.get(name, name)
+        if KINDS.get(kind) != len(expression.args) or not expression.args:
+            raise ValueError(f"{expression}: kernels have no {name}")
+        return self.new(kind, *map(self.value, expression.args))
+
+    def _sum(self, terms: Sequence[sp.Expr]) -> Value:
+        total = self.value(terms[0])
+        for term in terms[1:]:
+            if term.as_coeff_Mul()[0].is_negative:
+                total = total - self._product(term, opposite=True)
+            else:
+                total = total + self.value(term)
+        return total
+
+    def _product(self, expression: sp.Expr, opposite: bool = False) -> Value:
+        """A product, or the opposite of one that has a negative sign."""
+        number, rest = expression.as_coeff_Mul()
+        negative = bool(number.is_negative)
+        size = [] if abs(number) == 1 else [abs(number)]
+        above, below = [], []
+        for factor in [*size, *(rest.as_ordered_factors() if rest != 1 else [])]:
+            base, exponent = factor.args if factor.is_Pow else (factor, sp.S.One)
+            if exponent.is_Rational and exponent.is_negative:
+                below.append((base, -exponent))
+            else:
+                above.append(factor)
+        first, *others = above or [sp.S.One]
+        total = self._opposite(first) if negative and not opposite else self.value(first)
+        for factor in others:
+            total = total * self.value(factor)
+        if not below:
+            return total
+        divisor = self._power(*below[0])
+        for base, exponent in below[1:]:
+            divisor = divisor * self._power(base, exponent)
+        return total / divisor
+
+    def _opposite(self, factor: sp.Expr) -> Value:
+        return self.number(-float(factor)) if factor.is_Number else -self.value(factor)
+
+    def _power(self, base: sp.Basic, exponent: sp.Basic) -> Value:
+        if abs(exponent) == sp.Rational(1, 2):
+            root = self.new("sqrt", self.value(base))
+            return root if exponent.is_positive else 1.0 / root
+        if isinstance(exponent, sp.Integer) and 0 < abs(int(exponent)) <= LARGEST_PRODUCT:
+            one, *others = [self.value(base) for _ in range(abs(int(exponent)))]
+            for other in others:
+                one = one * other
+            return one if exponent.is_positive else 1.0 / one
+        return self.new("power", self.value(base), self.value(exponent))
+
+    def _choice(self, pairs: Iterable) -> Value:
+        """The first expression whose condition holds; the last one holds always."""
+        (expression, condition), *others = pairs
+        if condition == True:  # noqa: E712 - SymPy's truth
+            return self.value(expression)
+        if not others:
+            raise ValueError(f"{condition}: what holds otherwise?")
+        test = self.value(condition)
+        return self.new("select", test, self.value(expression), self._choice(others))
