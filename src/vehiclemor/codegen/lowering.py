@@ -7,7 +7,8 @@ the order in which SymPy prints them, small powers are products.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import sympy as sp
 
@@ -33,11 +34,11 @@ def kernels_of(program: Program) -> dict[str, Kernel]:
     return found
 
 
-def _arguments(program: Program) -> dict[str, Sequence[sp.Symbol]]:
+def _arguments(program: Program) -> Mapping[str, Sequence[sp.Symbol]]:
     return program.arguments | {"constants": program.constant_symbols}
 
 
-def _kernel(name: str, arguments: dict[str, Sequence[sp.Symbol]], function: Function) -> Kernel:
+def _kernel(name: str, arguments: Mapping[str, Sequence[sp.Symbol]], function: Function) -> Kernel:
     lowering = _Lowering()
     expressions = [e for _, e in function.assignments] + list(function.results)
     used = set().union(*(e.free_symbols for e in expressions))
@@ -113,7 +114,7 @@ class _Lowering(Listing):
                 found = parts[LANES * k : LANES * k + len(own)]
                 self.known |= {call(a): part for a, part in zip(own, found, strict=True)}
 
-    def value(self, expression: sp.Basic) -> Value:
+    def value(self, expression: Any) -> Value:
         """Write an expression; `ValueError` if kernels have no operation of that kind."""
         if expression in self.known:
             return self.known[expression]
@@ -134,7 +135,7 @@ class _Lowering(Listing):
             raise ValueError(f"{expression}: kernels have no {name}")
         return self.new(kind, *map(self.value, expression.args))
 
-    def _sum(self, terms: Sequence[sp.Expr]) -> Value:
+    def _sum(self, terms: Any) -> Value:
         total = self.value(terms[0])
         for term in terms[1:]:
             if term.as_coeff_Mul()[0].is_negative:
@@ -143,7 +144,7 @@ class _Lowering(Listing):
                 total = total + self.value(term)
         return total
 
-    def _product(self, expression: sp.Expr, opposite: bool = False) -> Value:
+    def _product(self, expression: Any, opposite: bool = False) -> Value:
         """A product, or the opposite of one that has a negative sign."""
         number, rest = expression.as_coeff_Mul()
         negative = bool(number.is_negative)
@@ -169,7 +170,7 @@ class _Lowering(Listing):
     def _opposite(self, factor: sp.Expr) -> Value:
         return self.number(-float(factor)) if factor.is_Number else -self.value(factor)
 
-    def _power(self, base: sp.Basic, exponent: sp.Basic) -> Value:
+    def _power(self, base: Any, exponent: Any) -> Value:
         if abs(exponent) == sp.Rational(1, 2):
             root = self.new("sqrt", self.value(base))
             return root if exponent.is_positive else 1.0 / root

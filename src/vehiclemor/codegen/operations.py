@@ -198,7 +198,8 @@ class Kernel:
     @classmethod
     def read(cls, written: dict[str, Any]) -> Kernel:
         """The kernel of what `dataclasses.asdict` has made of one, and JSON of that."""
-        return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in written.items()})
+        arrays = {key: tuple(written[key]) for key in ("arguments", "sizes")}
+        return cls(**{**written, **arrays})
 
     @property
     def operations(self) -> list[Operation]:
@@ -268,7 +269,7 @@ class Kernel:
         operations, used = self.operations, uses(self.operations)
         known = {kind: kind for kind in COUNTED} | {"subtract": "add", "atan2": "trigonometric"}
         known |= dict.fromkeys(set(FUNCTIONS) - {"sqrt", "abs"}, "trigonometric")
-        counts = dict.fromkeys(COUNTED, 0)
+        counts: dict[str, int] = dict.fromkeys(COUNTED, 0)
         for number, (kind, arguments, _) in enumerate(operations):
             if kind in known:
                 counts[known[kind]] += 1

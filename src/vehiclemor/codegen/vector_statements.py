@@ -17,6 +17,7 @@ from typing import Any
 
 from llvmlite import ir
 
+from vehiclemor.codegen.llvm_arithmetic import arithmetic
 from vehiclemor.codegen.vector_lanes import WIDTH
 from vehiclemor.codegen.weighted_sums import DOUBLE, FLAGS, VECTOR, spread
 
@@ -78,16 +79,10 @@ def _combine(builder: Any, to: Any, n: int, factors: Sequence[Any], places: Sequ
 
 def _magnitudes(builder: Any, to: Any, n: int, terms: Sequence[Any]) -> None:
     for place, kind in _parts(n):
-        suffix = "f64" if kind == DOUBLE else f"v{WIDTH}f64"
-        magnitude = builder.module.declare_intrinsic(f"llvm.fabs.{suffix}", (), _unary(kind))
         one, other = (
-            builder.call(magnitude, [_load(builder, term, place, kind)]) for term in terms
+            arithmetic(builder, "abs", [_load(builder, term, place, kind)]) for term in terms
         )
         _store(builder, builder.fadd(one, other, flags=FLAGS), to, place)
-
-
-def _unary(kind: ir.Type) -> ir.FunctionType:
-    return ir.FunctionType(kind, [kind])
 
 
 def _product(

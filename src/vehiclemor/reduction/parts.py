@@ -66,7 +66,7 @@ class Writer:
             fields = {name: self.part(getattr(value, name), f"{place}.{name}") for name in names}
             return {"class": name, "fields": fields}
         if kind is tuple and value and isinstance(value[0], Operation):
-            arrays = as_arrays(value)
+            arrays = as_arrays([*value])
             return {"operations": {n: self._array(a, f"{place}.{n}") for n, a in arrays.items()}}
         if kind in (tuple, list):
             items = [self.part(item, f"{place}.{i}") for i, item in enumerate(value)]

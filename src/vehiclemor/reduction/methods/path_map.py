@@ -20,7 +20,7 @@ from pydantic import Field
 
 from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
-from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing
+from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.errors import InputError, UnreachableError
 from vehiclemor.inputs.maneuver import Maneuver
@@ -67,7 +67,7 @@ def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -
     """
     listing = Listing()
     x = [listing.let(listing.entry("_x", i)) for i in moving]
-    powers = {(): listing.number(1.0)}
+    powers: dict[tuple[int, ...], Value] = {(): listing.number(1.0)}
     for term in monomials(len(moving), degree)[1:]:
         powers[term] = listing.let(powers[term[:-1]] * x[term[-1]])
     values = listing.sums("_coefficients", 0, max(columns) + 1, [*powers.values()])
