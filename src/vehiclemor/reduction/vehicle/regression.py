@@ -1,13 +1,9 @@
 """Linear regression on features."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 # Columns of which less than this share is left are sums of those chosen before.
 DEPENDENT = 1e-8
-# Of the normal matrix, scaled to a diagonal of ones: nearly dependent features are told apart.
-REGULARISATION = 1e-11
 
 
 def ridge_fit(columns: np.ndarray, values: np.ndarray, weight: float) -> np.ndarray:
@@ -64,41 +60,3 @@ def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more:
             products = products - np.outer(row, products[best])
             normal = normal - np.outer(row, normal[best])
     return chosen
-
-
-def surviving(
-    normal: np.ndarray, coefficients: np.ndarray, groups: Sequence[Sequence[int]], kept: int
-) -> tuple[list[int], np.ndarray]:
-    """Groups of coefficients that are left when all but a number have been eliminated, in order.
-
-    Near the minimum of a sum of squares with normal matrix H, setting the coefficients c_g of one
-    feature to zero and moving the others to their new optimum raises the sum by
-
-        c_g^T ((H^-1)_gg)^-1 c_g
-
-    The feature with the least rise goes first, H^-1 is updated, and so on (B. Hassibi, D. Stork,
-    Second order derivatives for network pruning: optimal brain surgeon, NIPS 5 (1992), 164-171;
-    here for groups, since a feature that one equation needs costs the others nothing).
-
-    The normal matrix (n, n) and the values (n,) at the minimum are of all coefficients, also of
-    those in no group, which stay.  They come back zero where they are eliminated.
-    """
-    scaled, scale = unit_diagonal(normal)
-    inverse = np.linalg.inv(scaled + REGULARISATION * np.eye(len(normal)))
-    c = coefficients * scale
-    left = list(range(len(groups)))
-    while len(left) > kept:
-        rises = []
-        for group in left:
-            g = list(groups[group])
-            rises.append(c[g] @ np.linalg.solve(inverse[np.ix_(g, g)], c[g]))
-        worst = left.pop(int(np.argmin(rises)))
-        g = list(groups[worst])
-        part = np.linalg.solve(inverse[np.ix_(g, g)], inverse[g])
-        c = c - part.T @ c[g]
-        inverse = inverse - inverse[:, g] @ part
-        c[g] = 0.0
-        # Rows of what is gone are zero but for rounding.
-        inverse[g], inverse[:, g] = 0.0, 0.0
-        inverse[g, g] = 1.0
-    return left, c / scale

@@ -1,216 +1,301 @@
-"""Features of the slow manifold: what is odd and what is even in the lateral quantities.
+"""Features of slow motion: few arguments, forces of the axles, and products of these.
 
-The nonlinear terms are products of the axles' slip angles (held within their training range), the
-roll angle, its rate and the steering; a vehicle that is its own mirror image has odd ones in the
-lateral equations and even ones in the others.
+Fast motion follows the slow one, so that slips and loads of the wheels are functions of few
+arguments: lateral speed and yaw rate over the speed, roll angle, roll rate over the speed and
+steering, each held within its training range.  A vehicle is its own mirror image: terms are odd in
+the arguments in the lateral equations, and even in those of speed, heave and pitch.
+
+Of tires with Fiala's law, see `multibody/components/tires`, the forces are those of the law at
+free rolling, at slips and loads of all wheels that are sums of products of the arguments (two-track
+model with load transfer: M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge, 5th ed.,
+Springer 2014).  Of any other tires they are powers of the mean slip of each axle.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import product
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.features import Features, held, monomials
+from vehiclemor.multibody.components.tire_coefficients import FIALA
+from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.reduction.vehicle.features import Features, feature_columns, held, monomials
 from vehiclemor.reduction.vehicle.lifting_loops import MOVING
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
+from vehiclemor.simulation.dynamic import DynamicModel
 
-VARIABLES = ("front", "rear", "roll", "rolling", "steer")
-MEANINGS = ("slip of the front axle", "slip of the rear axle", "roll", "rate of roll", "steering")
-# Part of heave and pitch at the start that samples after the landing still show.
-AFTER_LANDING = 0.3
-# And how much of it, in parts of what samples show, a car may have that is steered.
-STEERED = 1.2
-# Nonlinear terms that the lifting keeps: those that explain most of all states and outputs, each in
-# parts of its range.  With all it follows the training runs more closely, and others less.
-LIFTED = 8
+AXLES = (WHEELS[:2], WHEELS[2:])
+# Lines of an axle: sums of both wheels' lateral force, aligning moment and part of the contact that
+# sticks, and what the left one has more.
+FORCES = ("F", "M", "G", "FD", "MD", "GD")
+# Of the values of both wheels, and the parity of terms.
+MEAN, HALF = np.array([0.5, 0.5]), np.array([0.5, -0.5])
+EVEN, ODD = 0, 1
+ARGUMENTS = tuple(f"a{i}" for i in range(5))
+NAMES = ("lateral speed", "yaw rate", "roll", "roll rate", "steering", "change of speed")
+DERIVATIVES = ("rate of steering", "acceleration of steering")
+# Arguments that go as one over the speed.
+OVER_SPEED = (True, True, False, True)
+SQUARE, CUBIC = monomials(ARGUMENTS, 2), monomials(ARGUMENTS, 3)
+LINEAR = tuple(f"raw{i}" for i in range(len(ARGUMENTS)))
+# What changes with the speed.
+FASTER = tuple(f"m * {a}" for a in ARGUMENTS)
+FASTER_SQUARE = tuple(f"m * {pair}" for pair in SQUARE)
+# Arguments are held beyond this multiple of their training range.
+HULL = 1.1
+# Products in each sum that is a slip or a load of wheels, and the weight of their sizes.
+WHEEL_TERMS, RIDGE = 9, 1e-12
+# Part of its static load that a wheel keeps, so that no force is divided by zero.
+LEAST_LOAD = 0.02
+# Part of the slip at which all of a tire's contact slides that is trusted.
+SATURATION = 1.2
+# Part of heave and pitch at the start that samples after the landing still show, and how much of
+# it, in parts of what samples show, a car may have that is steered.
+AFTER_LANDING, STEERED = 0.3, 1.2
 
 
-class Ranges(NamedTuple):
-    """Largest magnitudes in training runs: of the nonlinear terms' arguments (5,) and the rest."""
+@dataclass
+class FeatureText:
+    """Lines of features under construction, with the parameters that they name.
 
-    arguments: np.ndarray
-    states: np.ndarray
-    inputs: np.ndarray
-    speed: float
-
-
-@dataclass(frozen=True)
-class FeatureTable:
-    """Features with the numbers of those that are odd and even in the lateral quantities.
-
-    The first odd ones, `linear_count` of them, are lateral coordinates and the inputs, the first
-    even ones, `straight_count` of them, are 1, the speed and the symmetric coordinates.
+    Attributes
+    ----------
+    lateral, symmetric, inputs
+        How many coordinates steering moves, how many others there are, and how many inputs.  After
+        the coordinates comes the speed.
+    watched, besides
+        (expression, what it is) of what is watched: lateral motion, then the rest.
+    coordinates
+        Coordinates as parts of their training range.
+    forces
+        Kinds of lines of an axle, whose index stands behind them.
     """
 
-    features: Features
-    parameters: np.ndarray
-    odd: list[int]
-    even: list[int]
-    linear_count: int
-    straight_count: int
-    ranges: Ranges
-
-    def set_linear(self, c: np.ndarray, shape: VehicleShape, modes: SlowModes) -> None:
-        """Write what is exact at straight running into coefficients (terms, states + 3)."""
-        k, n, states = modes.lateral, len(modes.rates), self.ranges.states[:, None]
-        odd, even = self.odd, self.even
-        # Linear terms are scaled by the ranges of the training runs.
-        c[odd[:k], :k] = modes.rates[:k, :k].T * states[:k]
-        c[odd[k], :k] = modes.drive[:k] * self.ranges.inputs[0]
-        # Straight running at any speed is an equilibrium: the speed changes by even terms alone.
-        own = even[2 : self.straight_count]
-        c[own, k:n] = modes.rates[k:, k:].T * states[k:]
-        c[even[0], n + 2], c[even[1], n + 2] = shape.speed, 1.0
-        c[own, n + 2] = shape.linearised.motion_a[1] @ modes.right[:, k:] * states[k:, 0]
+    lateral: int
+    symmetric: int
+    inputs: int
+    lines: list[tuple[str, str]] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+    watched: list[tuple[str, str]] = field(default_factory=list)
+    besides: list[tuple[str, str]] = field(default_factory=list)
+    coordinates: list[str] = field(default_factory=list)
+    forces: tuple[str, ...] = ()
 
     @property
-    def odd_nonlinear(self) -> list[int]:
-        """Odd features that are not linear."""
-        return self.odd[self.linear_count :]
+    def speed(self) -> int:
+        """Index of the speed."""
+        return self.lateral + self.symmetric
 
     @property
-    def even_nonlinear(self) -> list[int]:
-        """Even features that are not linear."""
-        return self.even[self.straight_count :]
+    def odd_columns(self) -> tuple[int, ...]:
+        """Columns of the coefficients of odd terms: lateral coordinates, yaw rate, sideways."""
+        return (*range(self.lateral), self.speed + 1, self.speed + 3)
 
     @property
-    def free(self) -> list[tuple[list[int], int]]:
-        """(features, column of C) of the coefficients that whole runs may change."""
-        (_, lateral), (_, symmetric) = self.features.groups
-        heading = self.features.states
-        free = [(self.odd_nonlinear, column) for column in lateral if column < heading]
-        free += [(self.odd, column) for column in lateral if column >= heading]
-        return [*free, *((self.even_nonlinear, column) for column in symmetric)]
+    def even_columns(self) -> tuple[int, ...]:
+        """Columns of the coefficients of even terms: the other coordinates, speed, forward."""
+        return (*range(self.lateral, self.speed + 1), self.speed + 2)
 
-    def with_only(self, kept: Sequence[int]) -> "FeatureTable":
-        """Some of the features, by their numbers in order."""
-        odd = [i for i in kept if i in self.odd]
-        even = [i for i in kept if i in self.even]
-        terms = tuple(self.features.terms[i] for i in (*odd, *even))
+    @property
+    def derivatives(self) -> list[str]:
+        """Lines of the derivatives of the steering."""
+        return [f"raw{len(NAMES) + j}" for j in range(self.inputs - 1)]
+
+    def parameter(self, value: float) -> str:
+        """Text of a new parameter."""
+        self.values.append(float(value))
+        return f"p[{len(self.values) - 1}]"
+
+    def let(self, name: str, text: str) -> str:
+        """A new line; its name."""
+        self.lines.append((name, text))
+        return name
+
+    def weighted(self, terms: Sequence[str], weights: Sequence[float]) -> str:
+        """Text of a weighted sum of the terms with a weight."""
+        pairs = zip(terms, weights, strict=True)
+        return " + ".join(f"{self.parameter(w)} * {term}" for term, w in pairs if w)
+
+    def features(self, terms: Sequence[str], odd: int = 0) -> Features:
+        """Features of these terms; the first ones are the odd ones."""
         numbers = tuple(range(len(terms)))
-        (_, lateral), (_, symmetric) = self.features.groups
-        groups = ((numbers[: len(odd)], lateral), (numbers[len(odd) :], symmetric))
-        features = replace(self.features, terms=terms, groups=groups)
-        first, rest = list(numbers[: len(odd)]), list(numbers[len(odd) :])
-        return replace(self, features=features, odd=first, even=rest)
+        groups = (numbers[:odd], self.odd_columns), (numbers[odd:], self.even_columns)
+        watched = (*self.watched, *self.besides)
+        return Features(
+            self.speed + 1,
+            self.inputs,
+            tuple(self.lines),
+            tuple(terms),
+            groups if odd else (),
+            watched,
+            len(self.watched),
+        )
+
+    def columns(self, terms: Sequence[str], z: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Terms (samples, terms) of coordinates (samples, states) and inputs."""
+        return feature_columns(self.features(terms), z, u, np.array(self.values))
 
 
-def ranges_of(
-    shape: VehicleShape, modes: SlowModes, deviations: np.ndarray, u: np.ndarray
-) -> Ranges:
-    """Ranges of deviations of the shape (samples, n) at inputs (samples, inputs)."""
-    z, speed = modes.coordinates(deviations, u)
-    k, rows = modes.lateral, _variables(shape, modes)
-    # The axles' slips go as one over the speed where they come from motion, not from steering.
-    at_speed = shape.speed / (shape.speed + speed)
-    values = np.column_stack([z[:, :k], u[:, 0]]) @ rows[:, : k + 1].T
-    values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
-    return Ranges(largest(values), largest(z), largest(u), float(largest(speed[:, None])[0]))
+def feature_text(
+    shape: VehicleShape, modes: SlowModes, samples: ShapeSamples, trusted: float, reversal: float
+) -> FeatureText:
+    """Lines of arguments and of the axles' forces, with what of training samples they need.
+
+    A run isn't trusted whose arguments leave the multiple `trusted` of their training range, or the
+    product of steering and its rate the multiple `reversal`: where much steering is taken back
+    fast, loads lag behind.
+    """
+    z = modes.coordinates(samples.deviations, samples.inputs)
+    text = FeatureText(modes.lateral, len(modes.rates) - modes.lateral, samples.inputs.shape[1])
+    _add_arguments(text, shape, modes, (z, samples.inputs), (HULL / trusted, reversal))
+    _add_axles(text, shape.model, samples, z)
+    return text
 
 
-def feature_table(
+def _add_arguments(
+    text: FeatureText,
     shape: VehicleShape,
     modes: SlowModes,
-    ranges: Ranges,
-    hull: float,
-    trusted: float,
-) -> FeatureTable:
-    """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
-    k, n, inputs = modes.lateral, len(ranges.states), len(ranges.inputs)
-    rows = _variables(shape, modes) * (1.0 / (hull * ranges.arguments))[:, None]
-    # The last one tells how far lateral arguments may go.
-    ends = [shape.speed, 1.0 / (hull * ranges.speed), hull / trusted]
-    parameters = np.concatenate([rows.ravel(), 1.0 / ranges.states, 1.0 / ranges.inputs, ends])
-    width = k + 2
-
-    last = len(VARIABLES) * width + n + inputs
-    lines = [("part", f"p[{last}] / (p[{last}] + z{n})"), ("raw", f"p[{last + 1}] * z{n}")]
-    lines.append(("m", held("raw")))
-    for i in range(len(VARIABLES)):
-        moved = " + ".join(f"p[{i * width + j}] * z{j}" for j in range(k))
-        moved = f"({moved} + p[{i * width + k}] * u0)"
-        direct = f"p[{i * width + k + 1}] * u0"
-        text = f"part * {moved} + {direct}" if i < 2 else moved
-        lines += [(f"raw{i}", text), (f"v{i}", held(f"raw{i}"))]
-    first = len(VARIABLES) * width
-    v = [f"v{i}" for i in range(len(VARIABLES))]
-    own = [f"p[{first + i}] * z{i}" for i in range(n)]
-    straight = [*own[:k], *(f"p[{first + n + j}] * u{j}" for j in range(inputs))]
-    scaled = straight[: k + 1]
-    odd = [*straight, *(f"m * {t}" for t in scaled), *(f"m * m * {t}" for t in scaled)]
-    odd += monomials(v, 3)
-    odd += [f"{v[i]} * {v[i]} * {v[i]} * {v[j]} * {v[j]}" for i, j in product((0, 1), (0, 1))]
-    slides = [f"v{i} * abs(v{i})" for i in (0, 1)]
-    odd += [t for slide in slides for t in (slide, f"m * {slide}", f"m * m * {slide}")]
-    odd += [f"{slide} * {pair}" for slide in slides for pair in monomials(v, 2)]
-    odd += [f"m * {term}" for term in monomials(v, 3)]
-    odd += [f"{e} * {variable}" for e in own[k:] for variable in v]
-    even = [
-        "1.0",
-        f"z{n}",
-        *own[k:],
-        *monomials(v, 2),
-        *(f"m * {pair}" for pair in monomials(v, 2)),
-    ]
-    numbers = tuple(range(len(odd) + len(even)))
-    lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
-    groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
-    steered = held(f"{1.0 / MOVING!r} * ({' + '.join(f'abs({x})' for x in v)})")
-    watched = [(f"p[{last + 2}] * raw{i}", meaning) for i, meaning in enumerate(MEANINGS)]
-    watched += [(f"{hull / trusted!r} * raw", "change of speed")]
-    # More of it than corners make is known only where the car runs straight.
+    samples: tuple[np.ndarray, np.ndarray],
+    edges: tuple[float, float],
+) -> None:
+    """Lines of the arguments in [-1, 1], `raw` where they are not held, and what is watched."""
+    (z, u), k, speed, linear = samples, text.lateral, text.speed, shape.linearised
+    sizes = largest(z[:, :speed])
+    roll = linear.output_a[shape.model.outputs.index("roll")]
+    seen = np.vstack([linear.motion_a[2], linear.motion_a[0], roll, roll @ linear.a])
+    rows = np.column_stack([seen @ modes.right[:, :k], seen @ modes.follow])
+    values = np.column_stack([z[:, :k], u[:, 0]]) @ rows.T
+    values = np.where(OVER_SPEED, values / (shape.speed + z[:, speed:]), values)
+    reach = HULL * largest(np.column_stack([values, u[:, 0], z[:, speed], u[:, 1:]]))
+    text.let("part", f"1.0 / ({text.parameter(shape.speed)} + z{speed})")
+    lateral = [*(f"z{j}" for j in range(k)), "u0"]
+    moved = [text.weighted(lateral, row / most) for row, most in zip(rows, reach[:4], strict=True)]
+    lines = [f"part * ({m})" if over else m for m, over in zip(moved, OVER_SPEED, strict=True)]
+    others = ["u0", f"z{speed}", *(f"u{j}" for j in range(1, text.inputs))]
+    lines += [text.weighted([x], [1.0 / most]) for x, most in zip(others, reach[4:], strict=True)]
+    factor, names = text.parameter(edges[0]), (*NAMES, *DERIVATIVES[: text.inputs - 1])
+    for i, (line, name) in enumerate(zip(lines, names, strict=True)):
+        text.let(f"raw{i}", line)
+        # Alone of them the speed changes without steering.
+        watched = text.besides if name == NAMES[-1] else text.watched
+        watched.append((f"{factor} * raw{i}", name))
+    for i, name in enumerate((*ARGUMENTS, "m")):
+        text.let(name, held(f"raw{i}"))
+    if text.inputs > 1:
+        most = edges[1] * largest(u[:, :1] * u[:, 1:2])
+        text.watched.append((text.weighted(["u0 * u1"], 1.0 / most), "reversal of the steering"))
+    text.coordinates = [text.weighted([f"z{i}"], [1.0 / most]) for i, most in enumerate(sizes)]
+    # More heave and pitch than corners make is known only where the car runs straight.
+    steered = held(f"{1.0 / MOVING!r} * ({' + '.join(f'abs({a})' for a in ARGUMENTS)})")
     alive = f"({AFTER_LANDING!r} + {(1.0 / STEERED - AFTER_LANDING)!r} * ({steered}))"
-    watched += [(f"{alive} * {e}", "heave and pitch") for e in own[k:]]
-    terms = (*odd, *even)
-    features = Features(n + 1, inputs, tuple(lines), terms, groups, tuple(watched), len(MEANINGS))
-    counts = k + inputs, 2 + n - k
-    return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts, ranges)
+    text.besides += [(f"{alive} * {own}", "heave and pitch") for own in text.coordinates[k:]]
 
 
-def fitted_lifting(
-    shape: VehicleShape,
-    table: FeatureTable,
-    columns: np.ndarray,
-    deviations: np.ndarray,
-    ridge: float,
-) -> tuple[np.ndarray, Features]:
-    """Coefficients (terms, n) of the shape's deviations from straight running, and their features.
+def _add_axles(
+    text: FeatureText, model: DynamicModel, samples: ShapeSamples, z: np.ndarray
+) -> None:
+    """Lines of the axles' forces."""
+    odd = [*LINEAR, *text.derivatives, *CUBIC, *FASTER]
+    even = ["1.0", "m", *SQUARE, *FASTER_SQUARE]
+    columns = text.columns([*odd, *even], z, samples.inputs)
+    # Of terms of a parity: their columns, and how many of the first ones every sum has.
+    tables = (
+        (even, columns[:, len(odd) :], 1),
+        (odd, columns[:, : len(odd)], len(LINEAR) + len(text.derivatives)),
+    )
 
-    Parameters
-    ----------
-    columns, deviations
-        Features of the table (samples, terms), and deviations (samples, n) that they fit.
+    def add_sum(name: str, values: np.ndarray, parity: int, more: int = WHEEL_TERMS) -> str:
+        terms, table, given = tables[parity]
+        chosen = forward_selection(table, values[:, None], given, more)
+        weights = ridge_fit(table[:, chosen], values, RIDGE)
+        return text.let(name, text.weighted([terms[i] for i in chosen], weights))
+
+    def of_wheels(kind: str, wheels: Sequence[str]) -> np.ndarray:
+        return samples.outputs[:, [model.outputs.index(f"{kind}_{wheel}") for wheel in wheels]]
+
+    exact = set(FIALA) <= set(model.parameters.entries)
+    text.forces = FORCES if exact else FORCES[:3]
+    for axle, wheels in enumerate(AXLES):
+        slips = np.tan(of_wheels("slip_angle", wheels))
+        if not exact:
+            mean = slips @ MEAN
+            add_sum(f"mean{axle}", mean / (HULL * np.abs(mean).max()), ODD, 0)
+            text.let(f"slip{axle}", held(f"mean{axle}"))
+            text.let(f"G{axle}", f"abs(slip{axle})")
+            text.let(f"F{axle}", f"slip{axle} * G{axle}")
+            text.let(f"M{axle}", f"F{axle} * G{axle}")
+            continue
+        loads = of_wheels("Fz", wheels)
+        for name, values, parity in (("slip", slips, ODD), ("load", loads, EVEN)):
+            add_sum(f"{name}{axle}", values @ MEAN, parity)
+            add_sum(f"{name}_half{axle}", values @ HALF, 1 - parity)
+        tire = {name: float(model.parameters[name]) for name in FIALA}
+        for wheel, sign in zip(wheels, "+-", strict=True):
+            slip = text.let(f"slip_{wheel}", f"slip{axle} {sign} slip_half{axle}")
+            load = text.let(f"given_{wheel}", f"load{axle} {sign} load_half{axle}")
+            add_fiala(text, wheel, (slip, load), tire, float(loads.mean()))
+        left, right = wheels
+        for kind in FORCES[:3]:
+            text.let(f"{kind}{axle}", f"{kind}_{left} + {kind}_{right}")
+            text.let(f"{kind}D{axle}", f"{kind}_{left} - {kind}_{right}")
+
+
+def add_fiala(
+    text: FeatureText,
+    wheel: str,
+    at: tuple[str, str],
+    tire: Mapping[str, float],
+    static_load: float,
+) -> None:
+    """Lines of a wheel: `F` lateral force, `M` aligning moment, `G` its part that still sticks.
+
+    Forces as parts of the static load, moments as parts of it times the width, from the lines of
+    the tangent of the slip angle and of the load in N.
     """
-    features, count = table.features, len(table.features.terms)
-    given = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
-    order = [*given, *np.setdiff1d(np.arange(count), given).tolist()]
-    outputs = deviations @ shape.linearised.output_a.T
-    values = np.hstack([part / largest(part) for part in (deviations, outputs)])
-    chosen = forward_selection(columns[:, order], values, len(given), LIFTED)
-    kept = sorted(order[i] for i in chosen)
-    terms = tuple(features.terms[i] for i in kept)
-    lifted = replace(features, terms=terms, groups=())
-    return ridge_fit(columns[:, kept], deviations, ridge), lifted
+    (slip, given), parameter, let = at, text.parameter, text.let
+    least = parameter(LEAST_LOAD * static_load)
+    load = let(f"load_{wheel}", f"0.5 * ({given} + {least} + abs({given} - {least}))")
+    fall = parameter(tire["largest_friction"] - tire["smallest_friction"])
+    friction = f"({parameter(tire['largest_friction'])} - {fall} * abs({slip}))"
+    limit = let(f"limit_{wheel}", f"{load} * {friction}")
+    raw = let(f"y_{wheel}", f"{parameter(tire['cornering_stiffness'] / 3.0)} * {slip} / {limit}")
+    edge = parameter(1.0 / SATURATION)
+    text.watched.append((f"{edge} * {raw}", f"saturation of the {wheel} tire"))
+    y = let(f"c_{wheel}", held(raw))
+    left = let(f"left_{wheel}", f"1.0 - abs({y})")
+    let(f"G_{wheel}", f"{left} * {left}")
+    share = let(f"share_{wheel}", f"{parameter(1.0 / static_load)} * {limit} * {y}")
+    let(f"F_{wheel}", f"-{share} * (3.0 - 3.0 * abs({y}) + {y} * {y})")
+    let(f"M_{wheel}", f"{share} * G_{wheel} * {left}")
 
 
-def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:
-    """Rows (5, k + 2) of the arguments of the nonlinear terms, per z, and per steering twice.
+def given_terms(text: FeatureText) -> tuple[list[str], list[str]]:
+    """Odd and even terms that the equations always have."""
+    k, forces = text.lateral, [f"{kind}{axle}" for kind in "FM" for axle in (0, 1)]
+    odd = [*text.coordinates[:k], LINEAR[-1], *text.derivatives, *forces]
+    return odd, ["1.0", f"z{text.speed}", *text.coordinates[k:]]
 
-    The steering moves the shape (last but one) and the wheels themselves (last).
-    """
-    linear, outputs, k = shape.linearised, shape.model.outputs, modes.lateral
 
-    def row(name: str) -> np.ndarray:
-        a, b = linear.output_a[outputs.index(name)], linear.output_b[outputs.index(name), 0]
-        return np.concatenate([a @ modes.right[:, :k], [a @ modes.follow, b]])
+def odd_candidates(text: FeatureText) -> list[str]:
+    """Odd terms that the equations may need besides."""
+    found = [*CUBIC, *FASTER]
+    for axle in (0, 1):
+        found += [f"m * F{axle}", f"m * M{axle}"]
+        found += [f"GD{axle}"] if "GD" in text.forces else []
+        factors = [kind for kind in ("G", "FD") if kind in text.forces]
+        found += [f"{kind}{axle} * {a}" for kind in factors for a in ARGUMENTS]
+        found += [f"F{axle} * {pair}" for pair in SQUARE]
+    moved = (*ARGUMENTS, "F0", "F1")
+    return [*found, *(f"{own} * {a}" for own in text.coordinates[text.lateral :] for a in moved)]
 
-    front = 0.5 * (row("slip_angle_FL") + row("slip_angle_FR"))
-    rear = 0.5 * (row("slip_angle_RL") + row("slip_angle_RR"))
-    roll = row("roll")
-    rolling = np.concatenate([roll[:k] @ modes.rates[:k, :k], [0.0, 0.0]])
-    steer = np.concatenate([np.zeros(k), [1.0, 0.0]])
-    return np.array([front, rear, roll, rolling, steer])
+
+def even_candidates(text: FeatureText) -> list[str]:
+    """Even terms that the equations may need besides; zero in straight running at any speed."""
+    found = [*SQUARE, *FASTER_SQUARE]
+    for axle in (0, 1):
+        found += [f"{kind}{axle}" for kind in ("FD", "MD") if kind in text.forces]
+        found += [f"F{axle} * F{axle}"]
+        found += [f"{kind}{axle} * {a}" for kind in ("F", "M", "m * F") for a in ARGUMENTS]
+    return [*found, *(f"{rate} * {a}" for rate in text.derivatives for a in ARGUMENTS)]

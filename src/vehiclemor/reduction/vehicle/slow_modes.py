@@ -53,14 +53,19 @@ class SlowModes:
     speed_right: np.ndarray
     symmetric: Transient
 
-    def coordinates(
-        self, deviations: np.ndarray, inputs: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Slow coordinates (samples, k) and speed (samples,) of deviations and inputs."""
-        return (
-            deviations @ self.left.T - inputs @ self.feedthrough.T,
-            deviations @ self.speed_left,
-        )
+    @property
+    def encoding(self) -> np.ndarray:
+        """Slow coordinates and, last, the speed per deviation of the shape (k + 1, n)."""
+        return np.vstack([self.left, self.speed_left])
+
+    @property
+    def shift(self) -> np.ndarray:
+        """What is subtracted of them (k + 1, inputs) per input."""
+        return np.vstack([self.feedthrough, np.zeros(self.feedthrough.shape[1])])
+
+    def coordinates(self, deviations: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Slow coordinates and speed (samples, k + 1) of deviations and inputs."""
+        return deviations @ self.encoding.T - inputs @ self.shift.T
 
 
 def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowModes:
