@@ -92,13 +92,15 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     runs, shape = [run.recorded() for run in training], VehicleShape(model)
     modes = slow_modes(shape, settings.fastest)
     starts = [shape.of(run.states[:1])[0] - shape.reference for run in runs]
-    if any(modes.symmetric.amplitudes(start).size for start in starts):
+    dropped = any(modes.symmetric.amplitudes(start).size for start in starts)
+    if dropped:
         modes = slow_modes(shape, settings.fastest, SYMMETRIC)
     settled = [after_transient(modes.symmetric, shape, run) for run in runs]
     samples = shape_samples(shape, settled)
     text = feature_text(shape, modes, samples, settings.trusted, settings.reversal)
     reduced = _fitted_on_rates(shape, modes, text, samples, settings)
-    reduced = with_transients(reduced, modes, runs)
+    if dropped:
+        reduced = with_transients(reduced, modes, runs)
     if settings.steps:
         targets = targets_of(reduced, training, runs)
         (odd, lateral), (even, symmetric) = reduced.features.groups
