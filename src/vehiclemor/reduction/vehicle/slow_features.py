@@ -29,9 +29,9 @@ AXLES = (WHEELS[:2], WHEELS[2:])
 # Lines of an axle: sums of both wheels' lateral force, aligning moment and part of the contact that
 # sticks, and what the left one has more.
 FORCES = ("F", "M", "G", "FD", "MD", "GD")
-# Of the values of both wheels, and the parity of terms.
 MEAN, HALF = np.array([0.5, 0.5]), np.array([0.5, -0.5])
-EVEN, ODD = 0, 1
+# Terms, their columns (samples, terms), and how many of them are given.
+Table = tuple[Sequence[str], np.ndarray, int]
 ARGUMENTS = tuple(f"a{i}" for i in range(5))
 NAMES = ("lateral speed", "yaw rate", "roll", "roll rate", "steering", "change of speed")
 DERIVATIVES = ("rate of steering", "acceleration of steering")
@@ -200,14 +200,14 @@ def _add_axles(
     odd = [*LINEAR, *text.derivatives, *CUBIC, *FASTER]
     even = ["1.0", "m", *SQUARE, *FASTER_SQUARE]
     columns = text.columns([*odd, *even], z, samples.inputs)
-    # Of terms of a parity: their columns, and how many of the first ones every sum has.
-    tables = (
-        (even, columns[:, len(odd) :], 1),
-        (odd, columns[:, : len(odd)], len(LINEAR) + len(text.derivatives)),
-    )
+    # Terms, their columns, and how many of the first ones every sum has.
+    of_odd = odd, columns[:, : len(odd)], len(LINEAR) + len(text.derivatives)
+    of_even = even, columns[:, len(odd) :], 1
+    # Zero in straight running at any speed.
+    of_turning = even[2:], columns[:, len(odd) + 2 :], 0
 
-    def add_sum(name: str, values: np.ndarray, parity: int, more: int = WHEEL_TERMS) -> str:
-        terms, table, given = tables[parity]
+    def add_sum(name: str, values: np.ndarray, among: Table, more: int = WHEEL_TERMS) -> str:
+        terms, table, given = among
         chosen = forward_selection(table, values[:, None], given, more)
         weights = ridge_fit(table[:, chosen], values, RIDGE)
         return text.let(name, text.weighted([terms[i] for i in chosen], weights))
@@ -221,16 +221,17 @@ def _add_axles(
         slips = np.tan(of_wheels("slip_angle", wheels))
         if not exact:
             mean = slips @ MEAN
-            add_sum(f"mean{axle}", mean / (HULL * np.abs(mean).max()), ODD, 0)
+            add_sum(f"mean{axle}", mean / (HULL * np.abs(mean).max()), of_odd, 0)
             text.let(f"slip{axle}", held(f"mean{axle}"))
             text.let(f"G{axle}", f"abs(slip{axle})")
             text.let(f"F{axle}", f"slip{axle} * G{axle}")
             text.let(f"M{axle}", f"F{axle} * G{axle}")
             continue
         loads = of_wheels("Fz", wheels)
-        for name, values, parity in (("slip", slips, ODD), ("load", loads, EVEN)):
-            add_sum(f"{name}{axle}", values @ MEAN, parity)
-            add_sum(f"{name}_half{axle}", values @ HALF, 1 - parity)
+        add_sum(f"slip{axle}", slips @ MEAN, of_odd)
+        add_sum(f"slip_half{axle}", slips @ HALF, of_turning)
+        add_sum(f"load{axle}", loads @ MEAN, of_even)
+        add_sum(f"load_half{axle}", loads @ HALF, of_odd)
         tire = {name: float(model.parameters[name]) for name in FIALA}
         for wheel, sign in zip(wheels, "+-", strict=True):
             slip = text.let(f"slip_{wheel}", f"slip{axle} {sign} slip_half{axle}")
