@@ -130,7 +130,7 @@ def _fitted_on_rates(
     u, motion, k, n = samples.inputs, samples.motion, text.lateral, text.speed
     z = modes.coordinates(samples.deviations, u)
     # Inputs are derivatives of the first one.
-    rates = samples.rates @ modes.encoding.T - u[:, 1:] @ modes.shift[:, :-1].T
+    rates = samples.rates @ modes.encoding.T - u[:, 1:] @ modes.input_shift[:, :-1].T
     lateral = np.column_stack([rates[:, :k], motion[:, 0], motion[:, 2]])
     own, forward = modes.rates[k:, k:], shape.linearised.motion_a[1] @ modes.right[:, k:]
     linear = np.column_stack([z[:, k:n] @ own.T, np.zeros(len(z)), z[:, k:n] @ forward + z[:, n]])
@@ -140,9 +140,8 @@ def _fitted_on_rates(
         given: Sequence[str], others: Sequence[str], values: np.ndarray, more: int
     ) -> list[str]:
         terms = [*given, *(term for term in others if term not in given)]
-        scaled = values / np.sqrt(np.mean(values**2, axis=0))
         columns = text.columns(terms, z, u)
-        return [terms[i] for i in forward_selection(columns, scaled, len(given), more)]
+        return [terms[i] for i in forward_selection(columns, values, len(given), more)]
 
     given, straight = given_terms(text)
     others = even_candidates(text)
@@ -158,8 +157,7 @@ def _fitted_on_rates(
     c[first + 2 : last, k:n] = own.T * scale[k:, None]
     c[first + 2 : last, n + 2] = forward * scale[k:]
     c[last:, text.even_columns] = ridge_fit(columns[:, last:], symmetric, settings.ridge)
-    deviations = samples.deviations / largest(samples.deviations)
-    decoded = chosen([*given, *straight], [*terms, *others], deviations, DECODED)
+    decoded = chosen([*given, *straight], [*terms, *others], samples.deviations, DECODED)
     return ReducedVehicle(
         shape.model,
         shape,
@@ -168,7 +166,7 @@ def _fitted_on_rates(
         c,
         np.zeros((len(decoded), len(shape.names))),
         modes.encoding,
-        modes.shift,
+        modes.input_shift,
         np.concatenate([3.0 * scale, ABSOLUTE]),
         transient=modes.symmetric,
         lifted_features=text.features(decoded),

@@ -22,6 +22,12 @@ def largest(values: np.ndarray) -> np.ndarray:
     return np.where(found > 0.0, found, 1.0)
 
 
+def sizes(values: np.ndarray) -> np.ndarray:
+    """Root mean square of each column (samples, n) -> (n,); 1 where a column is zero."""
+    found = np.sqrt(np.mean(values**2, axis=0))
+    return np.where(found > 0.0, found, 1.0)
+
+
 def unit_diagonal(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix (n, n) scaled to a diagonal of ones, and the scales (n,) of coefficients.
 
@@ -33,29 +39,27 @@ def unit_diagonal(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more: int) -> list[int]:
-    """Numbers of the columns that explain most, one after the other (orthogonal least squares).
+    """Indices of the columns that explain most, one after the other (orthogonal least squares).
 
     S. Chen, S. A. Billings, W. Luo, Int. J. Control 50 (1989), 1873-1896.
 
-    The first `given` columns (samples, terms) are chosen already, `more` beside them; values
-    (samples, targets) are scaled so that their squares may be added.
+    The first `given` columns (samples, terms) are chosen already, `more` beside them; all values
+    (samples, targets) count the same, whatever their sizes.
     """
-    scale = np.sqrt(np.mean(columns**2, axis=0))
-    scale[scale == 0.0] = 1.0
-    columns = columns / scale
-    normal, products = columns.T @ columns, columns.T @ values
-    least = DEPENDENT * np.diag(normal)
+    columns = columns / sizes(columns)
+    normal, products = columns.T @ columns, columns.T @ (values / sizes(values))
+    least = DEPENDENT * len(columns)
     chosen: list[int] = []
     while len(chosen) < min(given + more, len(normal)):
         if len(chosen) < given:
             best = len(chosen)
         else:
-            sizes = np.diag(normal)
-            gains = np.sum(products**2, axis=1) / np.maximum(sizes, least)
-            gains[(sizes <= least) | np.isin(np.arange(len(gains)), chosen)] = -1.0
+            left = np.diag(normal)
+            gains = np.sum(products**2, axis=1) / np.maximum(left, least)
+            gains[(left <= least) | np.isin(np.arange(len(gains)), chosen)] = -1.0
             best = int(np.argmax(gains))
         chosen.append(best)
-        if normal[best, best] > least[best]:
+        if normal[best, best] > least:
             row = normal[best] / normal[best, best]
             products = products - np.outer(row, products[best])
             normal = normal - np.outer(row, normal[best])

@@ -11,7 +11,7 @@ model with load transfer: M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeu
 Springer 2014).  Of any other tires they are powers of the mean slip of each axle.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -112,7 +112,7 @@ class FeatureText:
         self.lines.append((name, text))
         return name
 
-    def weighted(self, terms: Sequence[str], weights: Sequence[float]) -> str:
+    def weighted(self, terms: Iterable[str], weights: Iterable[float]) -> str:
         """Text of a weighted sum of the terms with a weight."""
         pairs = zip(terms, weights, strict=True)
         return " + ".join(f"{self.parameter(w)} * {term}" for term, w in pairs if w)
@@ -165,7 +165,7 @@ def _add_arguments(
     sizes = largest(z[:, :speed])
     roll = linear.output_a[shape.model.outputs.index("roll")]
     seen = np.vstack([linear.motion_a[2], linear.motion_a[0], roll, roll @ linear.a])
-    rows = np.column_stack([seen @ modes.right[:, :k], seen @ modes.follow])
+    rows = np.column_stack([seen @ modes.right[:, :k], seen @ modes.static_response])
     values = np.column_stack([z[:, :k], u[:, 0]]) @ rows.T
     values = np.where(OVER_SPEED, values / (shape.speed + z[:, speed:]), values)
     reach = HULL * largest(np.column_stack([values, u[:, 0], z[:, speed], u[:, 1:]]))
@@ -221,7 +221,7 @@ def _add_axles(
         slips = np.tan(of_wheels("slip_angle", wheels))
         if not exact:
             mean = slips @ MEAN
-            add_sum(f"mean{axle}", mean / (HULL * np.abs(mean).max()), of_odd, 0)
+            add_sum(f"mean{axle}", mean / (HULL * largest(mean[:, None])), of_odd, 0)
             text.let(f"slip{axle}", held(f"mean{axle}"))
             text.let(f"G{axle}", f"abs(slip{axle})")
             text.let(f"F{axle}", f"slip{axle} * G{axle}")

@@ -100,7 +100,7 @@ def test_slow_coordinates_obey_their_linear_equation_where_steering_is_small(car
     found = modes.coordinates(shape.of(run.states) - shape.reference, run.inputs)
     z, speed = found[:, :-1], found[:, -1]
     rate = np.gradient(z, run.time, axis=0)
-    linear = z @ modes.rates.T + np.outer(run.inputs[:, 0], modes.drive)
+    linear = z @ modes.rates.T + np.outer(run.inputs[:, 0], modes.input_matrix)
     # Differences over 0.02 s are good to a few per cent of the fastest mode.
     inner = slice(60, 170)
     for j in range(len(modes.rates)):
@@ -195,7 +195,7 @@ def test_symmetric_modes_are_modes_that_steering_does_not_move(car):
     left, right = modes.left[k:], modes.right[:, k:]
     np.testing.assert_allclose(left @ a, modes.rates[k:, k:] @ left, atol=1e-4)
     np.testing.assert_allclose(left @ right, np.eye(4), atol=1e-6)
-    assert np.abs(modes.drive[k:]).max() < 1e-6 * np.abs(modes.drive[:k]).max()
+    assert np.abs(modes.input_matrix[k:]).max() < 1e-6 * np.abs(modes.input_matrix[:k]).max()
 
 
 def test_sensitivities_are_the_differences_of_runs(vehicle):

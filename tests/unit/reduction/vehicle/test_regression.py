@@ -10,7 +10,8 @@ from vehiclemor.reduction.vehicle.regression import forward_selection
 
 def left_over(columns, values, chosen):
     part = columns[:, chosen]
-    return float(np.sum((values - part @ np.linalg.lstsq(part, values, rcond=None)[0]) ** 2))
+    rest = values - part @ np.linalg.lstsq(part, values, rcond=None)[0]
+    return float(np.sum(rest**2 / np.mean(values**2, axis=0)))
 
 
 @given(seed=st.integers(0, 10**6), first=st.integers(0, 3))
@@ -18,6 +19,8 @@ def test_each_term_is_the_one_that_explains_most(seed, first):
     random = np.random.default_rng(seed)
     columns = random.normal(size=(30, 8)) @ random.normal(size=(8, 8))
     values = random.normal(size=(30, 2))
+    # Their sizes don't count.
+    values *= random.uniform(0.1, 10.0, 2)
     chosen = forward_selection(columns, values, first, 3)
     assert chosen[:first] == list(range(first))
     assert len(set(chosen)) == first + 3
