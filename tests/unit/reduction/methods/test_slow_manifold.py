@@ -309,3 +309,5 @@ def test_it_tells_when_its_tires_slide():
     assert run.status != "ok"
     assert run.trust.indicator > 1.0
     assert 1.0 < run.trust.until < run.time[-1]
+    watched = [what for _, what in with_tires().features.watched]
+    assert all(any(wheel in what for what in watched) for wheel in WHEELS)
