@@ -25,8 +25,8 @@ from vehiclemor.study.scenario import Scenario, start_of
 
 # Largest nominal steering of the lane change, and the contestant with its chosen candidate.
 VEHICLES = {
-    "independent_suspension_vehicle": (0.0300768, "slow manifold", 2),
-    "high_fidelity_vehicle": (-0.0046903, "two-track", 1),
+    "independent_suspension_vehicle": (0.0300768, "slow manifold", 3),
+    "high_fidelity_vehicle": (-0.0046903, "slow manifold", 1),
 }
 DURATIONS = {"long": (5.0, 10.0, 20.0, 25.0, 40.0), "short": (5.0, 10.0), "start": (5.0, 10.0)}
 Signal = Callable[[np.ndarray], np.ndarray]

@@ -41,16 +41,15 @@ PAIRS = [(m, method) for m in names("model") for method in METHODS if _declares(
 ROUGH = ("fixed_basis", "linear_single_track", "modal_truncation")
 # One run doesn't determine what these fit: (frequency, amplitude) factors of their training.
 TRAINED_ON: dict[str, tuple[tuple[float, float], ...]] = dict.fromkeys(
-    ("slow_manifold", "two_track", "guarded"),
+    ("slow_manifold", "guarded"),
     ((1.0, 1.0), (1.0, -0.6), (0.8, 1.2), (1.3, -1.2), (1.2, 0.8), (0.7, -0.8)),
 )
 
 
 # Quick enough for a test; trusted as far as these runs go.
 SETTINGS: dict[str, dict[str, object]] = {
-    "slow_manifold": {"sweeps": 1},
-    "two_track": {"terms": 8, "even_terms": 12, "wheel_terms": 6, "sweeps": 4, "reversal": 1.0},
-    "guarded": {"fast_settings": "sweeps = 1"},
+    "slow_manifold": {"steps": 1, "reversal": 1.0},
+    "guarded": {"fast_settings": "steps = 1, reversal = 1.0"},
 }
 
 

@@ -151,7 +151,7 @@ def test_a_training_set_needs_and_uses_its_factors():
 
 
 def test_settings_of_a_method_that_refuses_the_model_are_not_judged():
-    cell = make_cell(build("double_wishbone"), sine_travel, "two_track", {"rnk": 3})
+    cell = make_cell(build("double_wishbone"), sine_travel, "slow_manifold", {"rnk": 3})
     assert cell.settings == {}
     dataset = evaluate(cell)
     assert dataset["status"].item() == "rejected"

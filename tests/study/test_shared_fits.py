@@ -48,12 +48,12 @@ def fits(monkeypatch):
 
 
 def guarded(terms):
-    words = f"terms = {terms}, sweeps = 0"
+    words = f"terms = {terms}, steps = 0"
     return {"fast": "slow_manifold", "fast_settings": words, "tolerance": 5e-3}
 
 
 def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(vehicle, fits):
-    alone = kept_fit(vehicle, experiment(vehicle, "slow_manifold", terms=2, sweeps=0))
+    alone = kept_fit(vehicle, experiment(vehicle, "slow_manifold", terms=2, steps=0))
     both = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
     assert len(fits) == 1
     assert both.fast.tolerance == 5e-3
@@ -76,7 +76,7 @@ def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
 
     broken = replace(method, fit=fit)
     monkeypatch.setattr("vehiclemor.study.evaluate.component", lambda *_: broken)
-    wanted = experiment(vehicle, "slow_manifold", terms=1, sweeps=0)
+    wanted = experiment(vehicle, "slow_manifold", terms=1, steps=0)
     found = [kept_fit(vehicle, wanted).status for _ in range(4)]
     assert found == ["error", "error", "diverged", "diverged"]
     assert len(raised) == 3

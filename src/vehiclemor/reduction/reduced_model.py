@@ -147,7 +147,7 @@ class ReducedOrderModel(ShortRepr):
 
         Of a projected model it lies in the subspace, and so does what a step gives; `outputs` and
         `full_state` take a state as it is.  Of a method that fits slow motion (`slow_manifold`,
-        `two_track`, `guarded`) it is the slow part; runs are recorded from the start itself.
+        `guarded`) it is the slow part; runs are recorded from the start itself.
 
         Parameters
         ----------

@@ -178,7 +178,7 @@ STEERED = component("maneuver", "lane_change")
 # Method, what is wrong.
 WRONG: list[tuple[str, dict[str, Any]]] = [
     *(("pod", {"training": training}) for training in ("matched", [], [STEERED], [3])),
-    *(("podd", {}), ("pod", {"ranc": 3}), ("two_track", {})),
+    *(("podd", {}), ("pod", {"ranc": 3}), ("slow_manifold", {})),
 ]
 
 

@@ -6,14 +6,12 @@ J. O'Reilly, Singular Perturbation Methods in Control, SIAM 1999).  Projection o
 can't follow its curvature; here the rates of the slow coordinates are fitted on training runs,
 which lie on it, and the lag of the fast modes is learnt with them:
 
-    z' = Lambda z + b u + N(z, speed, u)
+    z' = C phi(z, speed, u)
 
-Lambda and b are exact at straight running.  N is odd in the lateral quantities (the vehicle is its
-own mirror image): cubic, and in the axles' slip angles also quintic and |slip| slip, terms; the
-speed and what is symmetric have even terms.  Heave and pitch, as slow as the lateral modes, are
-coordinates too: corners and a drop move them, and they move the wheel loads.  The coefficients are
-improved on whole runs, since a heading that is off is a lateral position that is off; what whole
-runs hardly need is eliminated.
+Features phi are z, the inputs, the tire forces of the axles, and products that are chosen one after
+the other.  Heave and pitch, as slow as the lateral modes, are coordinates too if a training run is
+dropped.  The coefficients are improved on whole runs, since a heading that is off is a lateral
+position that is off.
 """
 
 import time
@@ -27,9 +25,8 @@ from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
-from vehiclemor.reduction.vehicle.reach_of_runs import after_landing, landed, training_reach
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.regression import ridge_fit
+from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import (
     ShapeSamples,
     VehicleShape,
@@ -37,76 +34,83 @@ from vehiclemor.reduction.vehicle.shape import (
     shape_samples,
 )
 from vehiclemor.reduction.vehicle.slow_features import (
-    FeatureTable,
-    feature_table,
-    fitted_lifting,
-    ranges_of,
+    Names,
+    SlowFeatures,
+    even_candidates,
+    given_terms,
+    odd_candidates,
+    slow_features,
 )
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
-from vehiclemor.reduction.vehicle.trajectory_fit import (
-    Target,
-    finishes,
-    improved,
-    pruned,
-    targets,
+from vehiclemor.reduction.vehicle.training_runs import (
+    after_transient,
+    training_reach,
+    with_transients,
 )
+from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets_of
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.trajectory import Trajectory
 
-# Heading (rad) below which its error counts absolutely.
-HEADING = 0.03
-# The part of the terms that is left by each round of elimination, and for how many of them all
-# training runs are looked at; with more terms it is fewer runs, but so many at least.
-SHRINKING, WANTED, FEW = 0.4, 60, 20
-GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+# Speed (m/s), heading (rad) and place (m) below which their errors count absolutely.
+ABSOLUTE = (10.0, 0.03, 10.0, 10.0)
+# Symmetric modes, heave and pitch, that are coordinates where training runs are dropped.
+SYMMETRIC = 2
+# Products chosen for the decoded shape.
+DECODED = 24
 
 
 class SlowManifoldSettings(OnlineSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
-    ridge: float = Field(1e-10, ge=0.0, description="weight of the coefficients' size in the fit")
-    symmetric: int = Field(
-        2, ge=0, description="symmetric modes (or pairs) that are integrated with them"
+    terms: int = Field(20, ge=0, description="chosen products in the lateral equations")
+    even_terms: int = Field(
+        12, ge=0, description="chosen products in those of speed, heave and pitch"
     )
-    sweeps: int = Field(
-        4, ge=0, description="Gauss-Newton steps of all coefficients on whole training runs"
-    )
-    terms: int = Field(
-        24,
-        ge=0,
-        description="nonlinear terms that the equations keep, those that whole runs need most; "
-        "0: all; only with sweeps",
-    )
-    hull: float = Field(
-        1.1,
-        gt=0.0,
-        description="arguments of nonlinear terms are held beyond this multiple of their training "
-        "range",
+    ridge: float = Field(1e-12, ge=0.0, description="weight of the coefficients' size in the fit")
+    steps: int = Field(
+        8, ge=0, description="Gauss-Newton steps on whole training runs, once and again"
     )
     trusted: float = Field(
-        0.93,
+        1.0,
         gt=0.0,
         description="a run whose arguments leave this multiple of their training range isn't "
         "trusted",
     )
+    reversal: float = Field(
+        0.5,
+        gt=0.0,
+        description="largest part of the training's product of steering and its rate that is "
+        "trusted, where the rate is an input",
+    )
     solver: Solver = "etdrk4"
-    tolerance: Tolerance = 2e-3
+    tolerance: Tolerance = 1e-3
 
 
 def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings) -> ReducedVehicle:
     """Fit the slow dynamics and the manifold on the training runs."""
     began = time.process_time()
-    runs = [run.recorded() for run in training]
-    shape = VehicleShape(model)
-    modes = slow_modes(shape, settings.fastest, settings.symmetric)
-    samples = shape_samples(shape, [after_landing(modes.symmetric, shape, run) for run in runs])
-    ranges = ranges_of(shape, modes, samples.deviations, samples.inputs)
-    table = feature_table(shape, modes, ranges, settings.hull, settings.trusted)
-    reduced = _fitted_on_rates(shape, modes, table, samples, settings)
-    if settings.sweeps:
-        goals = targets(reduced, training, runs)
-        reduced = landed(reduced, modes, runs)
-        reduced = _fitted_on_runs(reduced, table, goals, settings)
+    runs, shape = [run.recorded() for run in training], VehicleShape(model)
+    modes = slow_modes(shape, settings.fastest)
+    starts = [shape.of(run.states[:1])[0] - shape.reference for run in runs]
+    dropped = any(modes.symmetric.amplitudes(start).size for start in starts)
+    if dropped:
+        modes = slow_modes(shape, settings.fastest, SYMMETRIC)
+    settled = [after_transient(modes.symmetric, shape, run) for run in runs]
+    samples = shape_samples(shape, settled)
+    made = slow_features(shape, modes, samples, settings.trusted, settings.reversal)
+    reduced = _fitted_on_rates(shape, modes, made, samples, settings)
+    if dropped:
+        reduced = with_transients(reduced, modes, runs)
+    if settings.steps:
+        targets = targets_of(reduced, training, runs)
+        (odd, lateral), (even, symmetric) = reduced.features.groups
+        # What heave and pitch do in straight running is exact, and speed is constant there.
+        even = even[2 + made.symmetric :]
+        free = [*((odd, i) for i in lateral), *((even, i) for i in symmetric)]
+        reduced = improved(reduced, targets, free, settings.steps, power=1.0)
+        reduced = improved(reduced, targets, free, settings.steps)
+    reduced = _with_decoding(reduced, training, settled, samples, settings.ridge)
     return replace(
         reduced,
         reach=training_reach(reduced, training, runs),
@@ -119,67 +123,78 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
 def _fitted_on_rates(
     shape: VehicleShape,
     modes: SlowModes,
-    table: FeatureTable,
+    made: SlowFeatures,
     samples: ShapeSamples,
     settings: SlowManifoldSettings,
 ) -> ReducedVehicle:
-    """Equations fitted on the rates of the training runs, exact at straight running."""
-    u, motion, ridge = samples.inputs, samples.motion, settings.ridge
-    z, speed = modes.coordinates(samples.deviations, u)
-    k, n, inputs = modes.lateral, len(modes.rates), u.shape[1]
-    odd = table.odd
-    odd_nonlinear, even_nonlinear = table.odd_nonlinear, table.even_nonlinear
-    columns = feature_columns(table.features, np.column_stack([z, speed]), u, table.parameters)
-    slow_rates = samples.rates @ modes.left.T - u[:, 1:] @ modes.feedthrough[:, : inputs - 1].T
-    slow_rates -= z @ modes.rates.T + np.outer(u[:, 0], modes.drive)
-    c = np.zeros((len(table.features.terms), n + 1 + PLANAR))
-    c[odd_nonlinear, :k] = ridge_fit(columns[:, odd_nonlinear], slow_rates[:, :k], ridge)
-    table.set_linear(c, shape, modes)
-    forward = shape.linearised.motion_a[1] @ modes.right[:, k:]
-    even_columns, ahead = columns[:, even_nonlinear], motion[:, 1] - shape.speed - speed
-    c[even_nonlinear, k:n] = ridge_fit(even_columns, slow_rates[:, k:], ridge)
-    c[even_nonlinear, n] = ridge_fit(even_columns, samples.rates @ modes.speed_left, ridge)
-    c[even_nonlinear, n + 2] = ridge_fit(even_columns, ahead - z[:, k:] @ forward, ridge)
-    c[odd, n + 1] = ridge_fit(columns[:, odd], motion[:, 0], ridge)
-    c[odd, n + 3] = ridge_fit(columns[:, odd], motion[:, 2], ridge)
-    lifting, lifted = fitted_lifting(shape, table, columns, samples.deviations, ridge)
+    """Equations fitted on the rates of the training runs; nothing is decoded yet."""
+    u, motion, k, n = samples.inputs, samples.motion, made.lateral, made.speed
+    z = modes.coordinates(samples.deviations, u)
+    # Inputs are derivatives of the first one.
+    rates = samples.rates @ modes.encoding.T - u[:, 1:] @ modes.input_shift[:, :-1].T
+    lateral = np.column_stack([rates[:, :k], motion[:, 0], motion[:, 2]])
+    own, forward = modes.rates[k:, k:], shape.linearised.motion_a[1] @ modes.right[:, k:]
+    linear = np.column_stack([z[:, k:n] @ own.T, np.zeros(len(z)), z[:, k:n] @ forward + z[:, n]])
+    symmetric = np.column_stack([rates[:, k:], motion[:, 1] - shape.speed]) - linear
+
+    def chosen(
+        given: Sequence[Names], others: Sequence[Names], values: np.ndarray, more: int
+    ) -> list[Names]:
+        terms = [*given, *(term for term in others if term not in given)]
+        columns = made.columns(terms, z, u)
+        return [terms[i] for i in forward_selection(columns, values, len(given), more)]
+
+    given, straight = given_terms(made)
+    others = even_candidates(made)
+    odd = chosen(given, odd_candidates(made), rates[:, :k], settings.terms)
+    even = [*straight, *chosen([], others, symmetric, settings.even_terms)]
+    terms = [*odd, *even]
+    c = np.zeros((len(terms), n + 1 + PLANAR))
+    columns, first, scale = made.columns(terms, z, u), len(odd), largest(z[:, :n])
+    c[:first, made.odd_columns] = ridge_fit(columns[:, :first], lateral, settings.ridge)
+    # Straight running at any speed is an equilibrium.
+    c[first, n + 2], c[first + 1, n + 2] = shape.speed, 1.0
+    last = first + len(straight)
+    c[first + 2 : last, k:n] = own.T * scale[k:, None]
+    c[first + 2 : last, n + 2] = forward * scale[k:]
+    c[last:, made.even_columns] = ridge_fit(columns[:, last:], symmetric, settings.ridge)
+    decoded = chosen([*given, *straight], [*terms, *others], samples.deviations, DECODED)
     return ReducedVehicle(
         shape.model,
         shape,
-        table.features,
-        table.parameters,
+        made.of_terms(terms, first),
+        np.array(made.values),
         c,
-        lifting,
-        np.vstack([modes.left, modes.speed_left]),
-        np.vstack([modes.feedthrough, np.zeros(inputs)]),
-        np.concatenate([3.0 * table.ranges.states, [10.0, HEADING, 10.0, 10.0]]),
+        np.zeros((len(decoded), len(shape.names))),
+        modes.encoding,
+        modes.input_shift,
+        np.concatenate([3.0 * scale, ABSOLUTE]),
         transient=modes.symmetric,
-        lifted_features=lifted,
+        lifted_features=made.of_terms(decoded),
     )
 
 
-def _fitted_on_runs(
+def _with_decoding(
     reduced: ReducedVehicle,
-    table: FeatureTable,
-    goals: Sequence[Target],
-    settings: SlowManifoldSettings,
+    training: Training,
+    settled: Sequence[Trajectory],
+    samples: ShapeSamples,
+    ridge: float,
 ) -> ReducedVehicle:
-    """Coefficients improved on whole runs; then with as few terms as the settings allow."""
-    if not finishes(reduced, goals):
-        return reduced
-    count = len(table.odd_nonlinear) + len(table.even_nonlinear)
-    while settings.terms and count > settings.terms:
-        share = max(WANTED / count, FEW / len(goals))
-        # Spread without a period.
-        some = [goal for i, goal in enumerate(goals) if i * GOLDEN % 1.0 < share]
-        reduced = improved(reduced, some, table.free, 1)
-        count = max(settings.terms, round(SHRINKING * count))
-        fewer, table = pruned(reduced, table, some, count)
-        # With too few terms a training run may fail.
-        if not finishes(fewer, goals):
-            return reduced
-        reduced = fewer
-    return improved(reduced, goals, table.free, settings.sweeps)
+    """The reduced vehicle whose shapes are fitted to where its own runs are.
+
+    Where one of these fails it is to where the training runs are.
+    """
+    assert reduced.lifted_features is not None
+    states = reduced.features.states
+    paths = [reduced.path(run.maneuver, run.start) for run in training]
+    parts = [
+        reduced.encoded_path(true.states, true.inputs) if path is None else path[-len(true.time) :]
+        for path, true in zip(paths, settled, strict=True)
+    ]
+    z = np.ascontiguousarray(np.concatenate(parts)[:, :states])
+    columns = feature_columns(reduced.lifted_features, z, samples.inputs, reduced.parameters)
+    return replace(reduced, lifting=ridge_fit(columns, samples.deviations, ridge))
 
 
 METHOD = Method(

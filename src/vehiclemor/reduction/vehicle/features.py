@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from functools import cache, lru_cache, reduce
 from itertools import combinations_with_replacement
 from operator import mul
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -44,6 +44,7 @@ MOST_STATES = 100
 CALL = 160
 # Factors of a product, in order.
 Term = tuple[Value, ...]
+Factor = TypeVar("Factor")
 
 
 @dataclass(frozen=True)
@@ -164,8 +165,8 @@ def product(factors: Term) -> Value:
     return reduce(mul, factors)
 
 
-def monomials(values: Sequence[Value], degree: int) -> tuple[Term, ...]:
-    """All products of that many of the values."""
+def monomials(values: Sequence[Factor], degree: int) -> tuple[tuple[Factor, ...], ...]:
+    """All products of that many of the values, or of their names."""
     return tuple(combinations_with_replacement(values, degree))
 
 

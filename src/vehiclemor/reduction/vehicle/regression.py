@@ -1,13 +1,9 @@
 """Linear regression on features."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 # Columns of which less than this share is left are sums of those chosen before.
 DEPENDENT = 1e-8
-# Of the normal matrix, scaled to a diagonal of ones: nearly dependent features are told apart.
-REGULARISATION = 1e-11
 
 
 def ridge_fit(columns: np.ndarray, values: np.ndarray, weight: float) -> np.ndarray:
@@ -26,6 +22,12 @@ def largest(values: np.ndarray) -> np.ndarray:
     return np.where(found > 0.0, found, 1.0)
 
 
+def sizes(values: np.ndarray) -> np.ndarray:
+    """Root mean square of each column (samples, n) -> (n,); 1 where a column is zero."""
+    found = np.sqrt(np.mean(values**2, axis=0))
+    return np.where(found > 0.0, found, 1.0)
+
+
 def unit_diagonal(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix (n, n) scaled to a diagonal of ones, and the scales (n,) of coefficients.
 
@@ -37,68 +39,28 @@ def unit_diagonal(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more: int) -> list[int]:
-    """Numbers of the columns that explain most, one after the other (orthogonal least squares).
+    """Indices of the columns that explain most, one after the other (orthogonal least squares).
 
     S. Chen, S. A. Billings, W. Luo, Int. J. Control 50 (1989), 1873-1896.
 
-    The first `given` columns (samples, terms) are chosen already, `more` beside them; values
-    (samples, targets) are scaled so that their squares may be added.
+    The first `given` columns (samples, terms) are chosen already, `more` beside them; all values
+    (samples, targets) count the same, whatever their sizes.
     """
-    scale = np.sqrt(np.mean(columns**2, axis=0))
-    scale[scale == 0.0] = 1.0
-    columns = columns / scale
-    normal, products = columns.T @ columns, columns.T @ values
-    least = DEPENDENT * np.diag(normal)
+    columns = columns / sizes(columns)
+    normal, products = columns.T @ columns, columns.T @ (values / sizes(values))
+    least = DEPENDENT * len(columns)
     chosen: list[int] = []
     while len(chosen) < min(given + more, len(normal)):
         if len(chosen) < given:
             best = len(chosen)
         else:
-            sizes = np.diag(normal)
-            gains = np.sum(products**2, axis=1) / np.maximum(sizes, least)
-            gains[(sizes <= least) | np.isin(np.arange(len(gains)), chosen)] = -1.0
+            left = np.diag(normal)
+            gains = np.sum(products**2, axis=1) / np.maximum(left, least)
+            gains[(left <= least) | np.isin(np.arange(len(gains)), chosen)] = -1.0
             best = int(np.argmax(gains))
         chosen.append(best)
-        if normal[best, best] > least[best]:
+        if normal[best, best] > least:
             row = normal[best] / normal[best, best]
             products = products - np.outer(row, products[best])
             normal = normal - np.outer(row, normal[best])
     return chosen
-
-
-def surviving(
-    normal: np.ndarray, coefficients: np.ndarray, groups: Sequence[Sequence[int]], kept: int
-) -> tuple[list[int], np.ndarray]:
-    """Groups of coefficients that are left when all but a number have been eliminated, in order.
-
-    Near the minimum of a sum of squares with normal matrix H, setting the coefficients c_g of one
-    feature to zero and moving the others to their new optimum raises the sum by
-
-        c_g^T ((H^-1)_gg)^-1 c_g
-
-    The feature with the least rise goes first, H^-1 is updated, and so on (B. Hassibi, D. Stork,
-    Second order derivatives for network pruning: optimal brain surgeon, NIPS 5 (1992), 164-171;
-    here for groups, since a feature that one equation needs costs the others nothing).
-
-    The normal matrix (n, n) and the values (n,) at the minimum are of all coefficients, also of
-    those in no group, which stay.  They come back zero where they are eliminated.
-    """
-    scaled, scale = unit_diagonal(normal)
-    inverse = np.linalg.inv(scaled + REGULARISATION * np.eye(len(normal)))
-    c = coefficients * scale
-    left = list(range(len(groups)))
-    while len(left) > kept:
-        rises = []
-        for group in left:
-            g = list(groups[group])
-            rises.append(c[g] @ np.linalg.solve(inverse[np.ix_(g, g)], c[g]))
-        worst = left.pop(int(np.argmin(rises)))
-        g = list(groups[worst])
-        part = np.linalg.solve(inverse[np.ix_(g, g)], inverse[g])
-        c = c - part.T @ c[g]
-        inverse = inverse - inverse[:, g] @ part
-        c[g] = 0.0
-        # Rows of what is gone are zero but for rounding.
-        inverse[g], inverse[:, g] = 0.0, 0.0
-        inverse[g, g] = 1.0
-    return left, c / scale

@@ -171,6 +171,7 @@ class ShapeSamples(NamedTuple):
     """Samples of all runs: deviations of the shape from straight running, its rates; psi', U, V."""
 
     inputs: np.ndarray
+    outputs: np.ndarray
     deviations: np.ndarray
     rates: np.ndarray
     motion: np.ndarray
@@ -179,8 +180,9 @@ class ShapeSamples(NamedTuple):
 def shape_samples(shape: VehicleShape, runs: Sequence[Trajectory]) -> ShapeSamples:
     """Samples of training runs; one evaluation of the full equations for each."""
     inputs = np.concatenate([run.inputs for run in runs])
+    outputs = np.concatenate([run.outputs for run in runs])
     shapes = np.concatenate([shape.of(run.states) for run in runs])
-    return ShapeSamples(inputs, shapes - shape.reference, *shape.motion(shapes, inputs))
+    return ShapeSamples(inputs, outputs, shapes - shape.reference, *shape.motion(shapes, inputs))
 
 
 def linearisation_cost(shape: VehicleShape, began: float) -> OfflineCost:

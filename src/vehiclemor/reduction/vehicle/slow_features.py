@@ -1,212 +1,312 @@
-"""Features of the slow manifold: what is odd and what is even in the lateral quantities.
+"""Features of slow motion: few arguments, forces of the axles, and products of these.
 
-The nonlinear terms are products of the axles' slip angles (held within their training range), the
-roll angle, its rate and the steering; a vehicle that is its own mirror image has odd ones in the
-lateral equations and even ones in the others.
+Fast motion follows the slow one, so that slips and loads of the wheels are functions of few
+arguments: lateral speed and yaw rate over the speed, roll angle, roll rate over the speed and
+steering, each held within its training range.  A vehicle is its own mirror image: terms are odd in
+the arguments in the lateral equations, and even in those of speed, heave and pitch.
+
+Of tires with Fiala's law, see `multibody/components/tires`, the forces are those of the law at
+free rolling, at slips and loads of all wheels that are sums of products of the arguments (two-track
+model with load transfer: M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge, 5th ed.,
+Springer 2014).  Of any other tires they are powers of the mean slip of each axle.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import product
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.features import FeatureListing, Features, Term, held, monomials
+from vehiclemor.codegen.operations import Value
+from vehiclemor.multibody.components.tire_coefficients import FIALA
+from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.reduction.vehicle.features import (
+    FeatureListing,
+    Features,
+    feature_columns,
+    held,
+    monomials,
+    product,
+)
 from vehiclemor.reduction.vehicle.lifting_loops import MOVING
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
+from vehiclemor.simulation.dynamic import DynamicModel
 
-VARIABLES = ("front", "rear", "roll", "rolling", "steer")
-MEANINGS = ("slip of the front axle", "slip of the rear axle", "roll", "rate of roll", "steering")
-# Part of heave and pitch at the start that samples after the landing still show.
-AFTER_LANDING = 0.3
-# And how much of it, in parts of what samples show, a car may have that is steered.
-STEERED = 1.2
-# Nonlinear terms that the lifting keeps: those that explain most of all states and outputs, each in
-# parts of its range.  With all it follows the training runs more closely, and others less.
-LIFTED = 8
+AXLES = (WHEELS[:2], WHEELS[2:])
+# Lines of an axle: sums of both wheels' lateral force, aligning moment and part of the contact that
+# sticks, and what the left one has more.
+FORCES = ("F", "M", "G", "FD", "MD", "GD")
+MEAN, HALF = np.array([0.5, 0.5]), np.array([0.5, -0.5])
+# Factors of a term, by the names of their lines.
+Names = tuple[str, ...]
+# Terms, their columns (samples, terms), and how many of them are given.
+Table = tuple[Sequence[Names], np.ndarray, int]
+ARGUMENTS = tuple(f"a{i}" for i in range(5))
+NAMES = ("lateral speed", "yaw rate", "roll", "roll rate", "steering", "change of speed")
+DERIVATIVES = ("rate of steering", "acceleration of steering")
+# Arguments that go as one over the speed.
+OVER_SPEED = (True, True, False, True)
+SQUARE, CUBIC = monomials(ARGUMENTS, 2), monomials(ARGUMENTS, 3)
+LINEAR = tuple((f"raw{i}",) for i in range(len(ARGUMENTS)))
+ONE, FAST = ("1",), ("m",)
+# What changes with the speed.
+FASTER = tuple(("m", a) for a in ARGUMENTS)
+FASTER_SQUARE = tuple(("m", *pair) for pair in SQUARE)
+# Arguments are held beyond this multiple of their training range.
+HULL = 1.1
+# Products in each sum that is a slip or a load of wheels, and the weight of their sizes.
+WHEEL_TERMS, RIDGE = 9, 1e-12
+# Part of its static load that a wheel keeps, so that no force is divided by zero.
+LEAST_LOAD = 0.02
+# Part of the slip at which all of a tire's contact slides that is trusted.
+SATURATION = 1.2
+# Part of heave and pitch at the start that samples after the landing still show, and how much of
+# it, in parts of what samples show, a car may have that is steered.
+AFTER_LANDING, STEERED = 0.3, 1.2
 
 
-class Ranges(NamedTuple):
-    """Largest magnitudes in training runs: of the nonlinear terms' arguments (5,) and the rest."""
+class SlowFeatures(FeatureListing):
+    """Lines of features under construction, by name, with the parameters that they take.
 
-    arguments: np.ndarray
-    states: np.ndarray
-    inputs: np.ndarray
-    speed: float
-
-
-@dataclass(frozen=True)
-class FeatureTable:
-    """Features with the numbers of those that are odd and even in the lateral quantities.
-
-    The first odd ones, `linear_count` of them, are lateral coordinates and the inputs, the first
-    even ones, `straight_count` of them, are 1, the speed and the symmetric coordinates.
+    Attributes
+    ----------
+    lateral, symmetric
+        How many coordinates steering moves, and how many others there are.  After the coordinates
+        comes the speed.
+    values
+        Of the parameters.
+    by_name
+        Name of a line -> its value.
+    watched, besides
+        (value, what it is) of what is watched: lateral motion, then the rest.
+    forces
+        Kinds of lines of an axle, whose index stands behind them.
     """
 
-    features: Features
-    parameters: np.ndarray
-    odd: list[int]
-    even: list[int]
-    linear_count: int
-    straight_count: int
-    ranges: Ranges
-
-    def set_linear(self, c: np.ndarray, shape: VehicleShape, modes: SlowModes) -> None:
-        """Write what is exact at straight running into coefficients (terms, states + 3)."""
-        k, n, states = modes.lateral, len(modes.rates), self.ranges.states[:, None]
-        odd, even = self.odd, self.even
-        # Linear terms are scaled by the ranges of the training runs.
-        c[odd[:k], :k] = modes.rates[:k, :k].T * states[:k]
-        c[odd[k], :k] = modes.drive[:k] * self.ranges.inputs[0]
-        # Straight running at any speed is an equilibrium: the speed changes by even terms alone.
-        own = even[2 : self.straight_count]
-        c[own, k:n] = modes.rates[k:, k:].T * states[k:]
-        c[even[0], n + 2], c[even[1], n + 2] = shape.speed, 1.0
-        c[own, n + 2] = shape.linearised.motion_a[1] @ modes.right[:, k:] * states[k:, 0]
+    def __init__(self, lateral: int, symmetric: int, inputs: int) -> None:
+        super().__init__(lateral + symmetric + 1, inputs)
+        self.lateral, self.symmetric = lateral, symmetric
+        self.values: list[float] = []
+        self.by_name = {f"z{i}": z for i, z in enumerate(self.z)} | {"1": self.number(1.0)}
+        self.watched: list[tuple[Value, str]] = []
+        self.besides: list[tuple[Value, str]] = []
+        self.forces: tuple[str, ...] = ()
 
     @property
-    def odd_nonlinear(self) -> list[int]:
-        """Odd features that are not linear."""
-        return self.odd[self.linear_count :]
+    def speed(self) -> int:
+        """Index of the speed."""
+        return self.lateral + self.symmetric
 
     @property
-    def even_nonlinear(self) -> list[int]:
-        """Even features that are not linear."""
-        return self.even[self.straight_count :]
+    def odd_columns(self) -> tuple[int, ...]:
+        """Columns of the coefficients of odd terms: lateral coordinates, yaw rate, sideways."""
+        return (*range(self.lateral), self.speed + 1, self.speed + 3)
 
     @property
-    def free(self) -> list[tuple[list[int], int]]:
-        """(features, column of C) of the coefficients that whole runs may change."""
-        (_, lateral), (_, symmetric) = self.features.groups
-        heading = self.features.states
-        free = [(self.odd_nonlinear, column) for column in lateral if column < heading]
-        free += [(self.odd, column) for column in lateral if column >= heading]
-        return [*free, *((self.even_nonlinear, column) for column in symmetric)]
+    def even_columns(self) -> tuple[int, ...]:
+        """Columns of the coefficients of even terms: the other coordinates, speed, forward."""
+        return (*range(self.lateral, self.speed + 1), self.speed + 2)
 
-    def with_only(self, kept: Sequence[int]) -> "FeatureTable":
-        """Some of the features, by their numbers in order."""
-        odd = [i for i in kept if i in self.odd]
-        even = [i for i in kept if i in self.even]
-        numbers = tuple(range(len(odd) + len(even)))
-        (_, lateral), (_, symmetric) = self.features.groups
-        groups = ((numbers[: len(odd)], lateral), (numbers[len(odd) :], symmetric))
-        features = self.features.with_terms([*odd, *even], groups)
-        first, rest = list(numbers[: len(odd)]), list(numbers[len(odd) :])
-        return replace(self, features=features, odd=first, even=rest)
+    @property
+    def coordinates(self) -> list[Names]:
+        """Coordinates as parts of their training range."""
+        return [(f"scaled{i}",) for i in range(self.speed)]
+
+    @property
+    def derivatives(self) -> list[Names]:
+        """Derivatives of the steering."""
+        return [(f"raw{len(NAMES) + j}",) for j in range(len(self.u) - 1)]
+
+    def parameter(self, value: float) -> Value:
+        """A new parameter."""
+        self.values.append(float(value))
+        return self.p(len(self.values) - 1)
+
+    def line(self, name: str, value: Value) -> Value:
+        """A value with a name."""
+        self.by_name[name] = self.let(value)
+        return self.by_name[name]
+
+    def term(self, names: Names) -> tuple[Value, ...]:
+        """Factors of a term."""
+        return tuple(self.by_name[name] for name in names)
+
+    def weighted(self, values: Iterable[Value], weights: Iterable[float]) -> Value:
+        """The weighted sum of the values with a weight."""
+        pairs = zip(values, weights, strict=True)
+        first, *others = [self.parameter(w) * value for value, w in pairs if w]
+        return sum(others, first)
+
+    def of_terms(self, terms: Sequence[Names], odd: int = 0) -> Features:
+        """Features of these terms; the first ones are the odd ones."""
+        indices = tuple(range(len(terms)))
+        groups = (indices[:odd], self.odd_columns), (indices[odd:], self.even_columns)
+        watched = [((value,), meaning) for value, meaning in (*self.watched, *self.besides)]
+        factors = [self.term(names) for names in terms]
+        return self.features(factors, groups if odd else (), watched, len(self.watched))
+
+    def columns(self, terms: Sequence[Names], z: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Terms (samples, terms) of coordinates (samples, states) and inputs."""
+        return feature_columns(self.of_terms(terms), z, u, np.array(self.values))
 
 
-def ranges_of(
-    shape: VehicleShape, modes: SlowModes, deviations: np.ndarray, u: np.ndarray
-) -> Ranges:
-    """Ranges of deviations of the shape (samples, n) at inputs (samples, inputs)."""
-    z, speed = modes.coordinates(deviations, u)
-    k, rows = modes.lateral, _variables(shape, modes)
-    # The axles' slips go as one over the speed where they come from motion, not from steering.
-    at_speed = shape.speed / (shape.speed + speed)
-    values = np.column_stack([z[:, :k], u[:, 0]]) @ rows[:, : k + 1].T
-    values[:, :2] = values[:, :2] * at_speed[:, None] + np.outer(u[:, 0], rows[:2, k + 1])
-    return Ranges(largest(values), largest(z), largest(u), float(largest(speed[:, None])[0]))
+def slow_features(
+    shape: VehicleShape, modes: SlowModes, samples: ShapeSamples, trusted: float, reversal: float
+) -> SlowFeatures:
+    """Lines of arguments and of the axles' forces, with what of training samples they need.
+
+    A run isn't trusted whose arguments leave the multiple `trusted` of their training range, or the
+    product of steering and its rate the multiple `reversal`: where much steering is taken back
+    fast, loads lag behind.
+    """
+    z = modes.coordinates(samples.deviations, samples.inputs)
+    made = SlowFeatures(modes.lateral, len(modes.rates) - modes.lateral, samples.inputs.shape[1])
+    _add_arguments(made, shape, modes, (z, samples.inputs), (HULL / trusted, reversal))
+    _add_axles(made, shape.model, samples, z)
+    return made
 
 
-def feature_table(
+def _add_arguments(
+    made: SlowFeatures,
     shape: VehicleShape,
     modes: SlowModes,
-    ranges: Ranges,
-    hull: float,
-    trusted: float,
-) -> FeatureTable:
-    """Features, scaled by the ranges of training runs; see the settings of the slow manifold."""
-    k, n, inputs = modes.lateral, len(ranges.states), len(ranges.inputs)
-    rows = _variables(shape, modes) * (1.0 / (hull * ranges.arguments))[:, None]
-    # The last one tells how far lateral arguments may go.
-    ends = [shape.speed, 1.0 / (hull * ranges.speed), hull / trusted]
-    parameters = np.concatenate([rows.ravel(), 1.0 / ranges.states, 1.0 / ranges.inputs, ends])
-    width = k + 2
-
-    listing = FeatureListing(n + 1, inputs)
-    z, u, let = listing.z, listing.u, listing.let
-    p = [*map(listing.p, range(len(parameters)))]
-    first, last = len(VARIABLES) * width, len(VARIABLES) * width + n + inputs
-    part, speed = let(p[last] / (p[last] + z[n])), let(p[last + 1] * z[n])
-    m, raw, v = let(held(speed)), [], []
-    for i in range(len(VARIABLES)):
-        row = p[i * width : (i + 1) * width]
-        one, *others = [a * b for a, b in zip(row[: k + 1], [*z[:k], u[0]], strict=True)]
-        moved = sum(others, one)
-        raw.append(let(part * moved + row[k + 1] * u[0] if i < 2 else moved))
-        v.append(let(held(raw[-1])))
-    own: list[Term] = [*zip(p[first:], z[:n], strict=False)]
-    straight: list[Term] = [*own[:k], *zip(p[first + n :], u, strict=False)]
-    scaled = straight[: k + 1]
-    odd = [*straight, *((m, *term) for term in scaled), *((m, m, *term) for term in scaled)]
-    odd += monomials(v, 3)
-    odd += [(v[i], v[i], v[i], v[j], v[j]) for i, j in product((0, 1), (0, 1))]
-    slides = [(v[i], abs(v[i])) for i in (0, 1)]
-    odd += [term for slide in slides for term in (slide, (m, *slide), (m, m, *slide))]
-    odd += [(*slide, *pair) for slide in slides for pair in monomials(v, 2)]
-    odd += [(m, *term) for term in monomials(v, 3)]
-    odd += [(*term, variable) for term in own[k:] for variable in v]
-    squares = monomials(v, 2)
-    even = [(listing.number(1.0),), (z[n],), *own[k:], *squares, *((m, *pair) for pair in squares)]
-    numbers = tuple(range(len(odd) + len(even)))
-    lateral, symmetric = numbers[: len(odd)], numbers[len(odd) :]
-    groups = ((lateral, (*range(k), n + 1, n + 3)), (symmetric, (*range(k, n + 1), n + 2)))
-    one, *others = map(abs, v)
-    steered = held(1.0 / MOVING * sum(others, one))
-    watched: list[tuple[Term, str]] = [
-        ((p[last + 2], value), meaning) for value, meaning in zip(raw, MEANINGS, strict=True)
-    ]
-    watched.append(((listing.number(hull / trusted), speed), "change of speed"))
-    # More of it than corners make is known only where the car runs straight.
+    samples: tuple[np.ndarray, np.ndarray],
+    edges: tuple[float, float],
+) -> None:
+    """Lines of the arguments in [-1, 1], `raw` where they are not held, and what is watched."""
+    (z, u), k, speed, linear = samples, made.lateral, made.speed, shape.linearised
+    sizes = largest(z[:, :speed])
+    roll = linear.output_a[shape.model.outputs.index("roll")]
+    seen = np.vstack([linear.motion_a[2], linear.motion_a[0], roll, roll @ linear.a])
+    rows = np.column_stack([seen @ modes.right[:, :k], seen @ modes.static_response])
+    values = np.column_stack([z[:, :k], u[:, 0]]) @ rows.T
+    values = np.where(OVER_SPEED, values / (shape.speed + z[:, speed:]), values)
+    reach = HULL * largest(np.column_stack([values, u[:, 0], z[:, speed], u[:, 1:]]))
+    part = made.let(1.0 / (made.parameter(shape.speed) + made.z[speed]))
+    lateral = [*made.z[:k], made.u[0]]
+    moved = [made.weighted(lateral, row / most) for row, most in zip(rows, reach[:4], strict=True)]
+    lines = [part * m if over else m for m, over in zip(moved, OVER_SPEED, strict=True)]
+    others = made.u[0], made.z[speed], *made.u[1:]
+    lines += [made.parameter(1.0 / most) * x for x, most in zip(others, reach[4:], strict=True)]
+    factor, names = made.parameter(edges[0]), (*NAMES, *DERIVATIVES[: len(made.u) - 1])
+    for i, (line, name) in enumerate(zip(lines, names, strict=True)):
+        raw = made.line(f"raw{i}", line)
+        # Alone of them the speed changes without steering.
+        watched = made.besides if name == NAMES[-1] else made.watched
+        watched.append((factor * raw, name))
+    for i, name in enumerate((*ARGUMENTS, "m")):
+        made.line(name, held(made.by_name[f"raw{i}"]))
+    if len(made.u) > 1:
+        most = edges[1] * largest(u[:, :1] * u[:, 1:2])
+        reversal = made.weighted([made.u[0] * made.u[1]], 1.0 / most)
+        made.watched.append((reversal, "reversal of the steering"))
+    for (name,), coordinate, most in zip(made.coordinates, made.z, sizes, strict=False):
+        made.line(name, made.parameter(1.0 / most) * coordinate)
+    # More heave and pitch than corners make is known only where the car runs straight.
+    first, *rest = map(abs, made.term(ARGUMENTS))
+    steered = held(1.0 / MOVING * sum(rest, first))
     alive = AFTER_LANDING + (1.0 / STEERED - AFTER_LANDING) * steered
-    watched += [((alive, *term), "heave and pitch") for term in own[k:]]
-    terms = (*odd, *even)
-    features = listing.features(terms, groups, watched, len(MEANINGS))
-    counts = k + inputs, 2 + n - k
-    return FeatureTable(features, parameters, list(lateral), list(symmetric), *counts, ranges)
+    symmetric = [made.by_name[name] for (name,) in made.coordinates[k:]]
+    made.besides += [(alive * own, "heave and pitch") for own in symmetric]
 
 
-def fitted_lifting(
-    shape: VehicleShape,
-    table: FeatureTable,
-    columns: np.ndarray,
-    deviations: np.ndarray,
-    ridge: float,
-) -> tuple[np.ndarray, Features]:
-    """Coefficients (terms, n) of the shape's deviations from straight running, and their features.
+def _add_axles(
+    made: SlowFeatures, model: DynamicModel, samples: ShapeSamples, z: np.ndarray
+) -> None:
+    """Lines of the axles' forces."""
+    odd = [*LINEAR, *made.derivatives, *CUBIC, *FASTER]
+    even = [ONE, FAST, *SQUARE, *FASTER_SQUARE]
+    columns = made.columns([*odd, *even], z, samples.inputs)
+    # Terms, their columns, and how many of the first ones every sum has.
+    of_odd = odd, columns[:, : len(odd)], len(LINEAR) + len(made.derivatives)
+    of_even = even, columns[:, len(odd) :], 1
+    # Zero in straight running at any speed.
+    of_turning = even[2:], columns[:, len(odd) + 2 :], 0
 
-    Parameters
-    ----------
-    columns, deviations
-        Features of the table (samples, terms), and deviations (samples, n) that they fit.
+    def fitted(values: np.ndarray, among: Table, more: int = WHEEL_TERMS) -> Value:
+        terms, table, given = among
+        chosen = forward_selection(table, values[:, None], given, more)
+        weights = ridge_fit(table[:, chosen], values, RIDGE)
+        return made.let(made.weighted((product(made.term(terms[i])) for i in chosen), weights))
+
+    def of_wheels(kind: str, wheels: Sequence[str]) -> np.ndarray:
+        return samples.outputs[:, [model.outputs.index(f"{kind}_{wheel}") for wheel in wheels]]
+
+    exact = set(FIALA) <= set(model.parameters.entries)
+    made.forces = FORCES if exact else FORCES[:3]
+    for axle, wheels in enumerate(AXLES):
+        slips = np.tan(of_wheels("slip_angle", wheels))
+        if not exact:
+            mean = slips @ MEAN
+            slip = made.let(held(fitted(mean / (HULL * largest(mean[:, None])), of_odd, 0)))
+            size = made.line(f"G{axle}", abs(slip))
+            force = made.line(f"F{axle}", slip * size)
+            made.line(f"M{axle}", force * size)
+            continue
+        loads = of_wheels("Fz", wheels)
+        slip, slip_half = fitted(slips @ MEAN, of_odd), fitted(slips @ HALF, of_turning)
+        load, load_half = fitted(loads @ MEAN, of_even), fitted(loads @ HALF, of_odd)
+        tire = {name: float(model.parameters[name]) for name in FIALA}, float(loads.mean())
+        left = add_fiala(made, wheels[0], slip + slip_half, load + load_half, tire)
+        right = add_fiala(made, wheels[1], slip - slip_half, load - load_half, tire)
+        for kind, one, other in zip(FORCES, left, right, strict=False):
+            made.line(f"{kind}{axle}", one + other)
+            made.line(f"{kind}D{axle}", one - other)
+
+
+def add_fiala(
+    made: SlowFeatures,
+    wheel: str,
+    slip: Value,
+    load: Value,
+    tire: tuple[Mapping[str, float], float],
+) -> tuple[Value, Value, Value]:
+    """Lateral force and aligning moment of a wheel, and its part that still sticks.
+
+    Forces as parts of the static load, moments as parts of it times the width, from the tangent of
+    the slip angle and the load in N.  Of the tire: its parameters and the static load in N.
     """
-    features, count = table.features, len(table.features.terms)
-    given = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
-    order = [*given, *np.setdiff1d(np.arange(count), given).tolist()]
-    outputs = deviations @ shape.linearised.output_a.T
-    values = np.hstack([part / largest(part) for part in (deviations, outputs)])
-    chosen = forward_selection(columns[:, order], values, len(given), LIFTED)
-    kept = sorted(order[i] for i in chosen)
-    return ridge_fit(columns[:, kept], deviations, ridge), features.with_terms(kept)
+    (values, static), parameter, let = tire, made.parameter, made.let
+    slip, load, least = let(slip), let(load), parameter(LEAST_LOAD * static)
+    load = let(0.5 * (load + least + abs(load - least)))
+    fall = parameter(values["largest_friction"] - values["smallest_friction"])
+    limit = let(load * (parameter(values["largest_friction"]) - fall * abs(slip)))
+    raw = let(parameter(values["cornering_stiffness"] / 3.0) * slip / limit)
+    made.watched.append((parameter(1.0 / SATURATION) * raw, f"saturation of the {wheel} tire"))
+    y = let(held(raw))
+    left = let(1.0 - abs(y))
+    sticking = let(left * left)
+    share = let(parameter(1.0 / static) * limit * y)
+    force = let(-share * (3.0 - 3.0 * abs(y) + y * y))
+    return force, let(share * sticking * left), sticking
 
 
-def _variables(shape: VehicleShape, modes: SlowModes) -> np.ndarray:
-    """Rows (5, k + 2) of the arguments of the nonlinear terms, per z, and per steering twice.
+def given_terms(made: SlowFeatures) -> tuple[list[Names], list[Names]]:
+    """Odd and even terms that the equations always have."""
+    k, forces = made.lateral, [(f"{kind}{axle}",) for kind in "FM" for axle in (0, 1)]
+    odd = [*made.coordinates[:k], LINEAR[-1], *made.derivatives, *forces]
+    return odd, [ONE, (f"z{made.speed}",), *made.coordinates[k:]]
 
-    The steering moves the shape (last but one) and the wheels themselves (last).
-    """
-    linear, outputs, k = shape.linearised, shape.model.outputs, modes.lateral
 
-    def row(name: str) -> np.ndarray:
-        a, b = linear.output_a[outputs.index(name)], linear.output_b[outputs.index(name), 0]
-        return np.concatenate([a @ modes.right[:, :k], [a @ modes.follow, b]])
+def odd_candidates(made: SlowFeatures) -> list[Names]:
+    """Odd terms that the equations may need besides."""
+    found = [*CUBIC, *FASTER]
+    for axle in (0, 1):
+        found += [("m", f"F{axle}"), ("m", f"M{axle}")]
+        found += [(f"GD{axle}",)] if "GD" in made.forces else []
+        factors = [kind for kind in ("G", "FD") if kind in made.forces]
+        found += [(f"{kind}{axle}", a) for kind in factors for a in ARGUMENTS]
+        found += [(f"F{axle}", *pair) for pair in SQUARE]
+    moved = (*ARGUMENTS, "F0", "F1")
+    return [*found, *((*own, a) for own in made.coordinates[made.lateral :] for a in moved)]
 
-    front = 0.5 * (row("slip_angle_FL") + row("slip_angle_FR"))
-    rear = 0.5 * (row("slip_angle_RL") + row("slip_angle_RR"))
-    roll = row("roll")
-    rolling = np.concatenate([roll[:k] @ modes.rates[:k, :k], [0.0, 0.0]])
-    steer = np.concatenate([np.zeros(k), [1.0, 0.0]])
-    return np.array([front, rear, roll, rolling, steer])
+
+def even_candidates(made: SlowFeatures) -> list[Names]:
+    """Even terms that the equations may need besides; zero in straight running at any speed."""
+    found = [*SQUARE, *FASTER_SQUARE]
+    for axle in (0, 1):
+        found += [(f"{kind}{axle}",) for kind in ("FD", "MD") if kind in made.forces]
+        force, moment = f"F{axle}", f"M{axle}"
+        found += [(force, force)]
+        found += [(*kind, a) for kind in ((force,), (moment,), ("m", force)) for a in ARGUMENTS]
+    return [*found, *((*rate, a) for rate in made.derivatives for a in ARGUMENTS)]

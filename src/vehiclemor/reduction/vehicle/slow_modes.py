@@ -28,13 +28,14 @@ class SlowModes:
     ----------
     lateral
         How many coordinates steering moves.
-    rates, drive
+    rates, input_matrix
         Of z' the matrix (k, k), blocks of two for conjugate pairs, and the steering's column (k,).
     left, right
         z = left d (k, n), and d = right z for slow motion (n, k).
-    feedthrough
-        What of the inputs (k, inputs) is subtracted, so that z' has no derivative of the steering.
-    follow
+    input_shift
+        What of the inputs (k + 1, inputs) is subtracted, so that z' has no derivative of the
+        steering; of the speed, which is last, nothing.
+    static_response
         Deviation (n,) of the shape that follows the steering without delay.
     speed_left, speed_right
         Mode of the speed (n,), scaled so that U grows by one.
@@ -46,21 +47,21 @@ class SlowModes:
     rates: np.ndarray
     left: np.ndarray
     right: np.ndarray
-    drive: np.ndarray
-    feedthrough: np.ndarray
-    follow: np.ndarray
+    input_matrix: np.ndarray
+    input_shift: np.ndarray
+    static_response: np.ndarray
     speed_left: np.ndarray
     speed_right: np.ndarray
     symmetric: Transient
 
-    def coordinates(
-        self, deviations: np.ndarray, inputs: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Slow coordinates (samples, k) and speed (samples,) of deviations and inputs."""
-        return (
-            deviations @ self.left.T - inputs @ self.feedthrough.T,
-            deviations @ self.speed_left,
-        )
+    @property
+    def encoding(self) -> np.ndarray:
+        """Slow coordinates and, last, the speed per deviation of the shape (k + 1, n)."""
+        return np.vstack([self.left, self.speed_left])
+
+    def coordinates(self, deviations: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Slow coordinates and speed (samples, k + 1) of deviations and inputs."""
+        return deviations @ self.encoding.T - inputs @ self.input_shift.T
 
 
 def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowModes:
@@ -92,7 +93,7 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         quiet = quiet[symmetric:]
     rates = w @ linear.a @ v
     b = w @ linear.b
-    feedthrough, drive = without_derivatives(rates, b)
+    shift, driven = without_derivatives(rates, b)
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.motion_a[1] @ right[:, still].real
     double = np.where(np.imag(values[quiet]) > 0.0, 2.0, 1.0)
@@ -101,9 +102,9 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         rates,
         w,
         v,
-        drive,
-        feedthrough,
-        static + v @ np.linalg.solve(rates, drive),
+        driven,
+        np.vstack([shift, np.zeros(shift.shape[1])]),
+        static + v @ np.linalg.solve(rates, driven),
         left[still].real * scale,
         right[:, still].real / scale,
         Transient(values[quiet], left[quiet], double[:, None] * right[:, quiet].T),

@@ -18,15 +18,14 @@ from vehiclemor.codegen.loops import loops
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.regression import surviving, unit_diagonal
+from vehiclemor.reduction.vehicle.regression import unit_diagonal
 from vehiclemor.reduction.vehicle.sensitivity_loops import AlongRun
-from vehiclemor.reduction.vehicle.slow_features import FeatureTable
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Errors that count the same: heading in rad, place in m, part of a slow coordinate's range.
 HEADING, PLACE, PART = 7.6e-5, 0.03, 0.02
-# The variational equations take by default every so many output times, runs are compared at every
-# so many of their steps.
+# The variational equations step over so many output times, runs are compared at every so many of
+# their steps.
 STRIDE, COMPARED = 2, 4
 # Where the slow coordinates have come to rest, to this part of their range, steps are longer.
 REST, LONG_STRIDE = 3e-4, 25
@@ -36,7 +35,7 @@ LOOPS = ("simulation.integrators.dense_solves", "reduction.vehicle.sensitivity_l
 NOTHING = 1e-12
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
-# (numbers of features, column) of the coefficients that may change.
+# (indices of features, column) of the coefficients that may change.
 Free = Sequence[tuple[Sequence[int], int]]
 
 
@@ -44,7 +43,7 @@ Free = Sequence[tuple[Sequence[int], int]]
 class Target:
     """One training run in reduced states (samples, states + 3), as a reduced run should be.
 
-    `steps` are numbers of the output times that the variational equations step on.
+    `steps` are indices of the output times that the variational equations step on.
     """
 
     run: TrainingRun
@@ -55,7 +54,7 @@ class Target:
 
     @cached_property
     def compared(self) -> np.ndarray:
-        """Numbers of the output times at which runs are compared, the last one among them."""
+        """Indices of the output times at which runs are compared, the last one among them."""
         return self.steps[(len(self.steps) - 1) % COMPARED :: COMPARED]
 
     @cached_property
@@ -65,13 +64,10 @@ class Target:
         return np.sqrt(widths / widths.sum())
 
 
-def targets(
-    reduced: ReducedVehicle,
-    training: Training,
-    runs: Sequence[Trajectory],
-    stride: int = STRIDE,
+def targets_of(
+    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory]
 ) -> list[Target]:
-    """Training runs in reduced states; the variational equations take every `stride`th time."""
+    """Training runs in reduced states."""
     k, result = reduced.features.states - 1, []
     for run, true in zip(training, runs, strict=True):
         states = reduced.encoded_path(true.states, true.inputs)
@@ -80,13 +76,13 @@ def targets(
         restless = np.flatnonzero(moved > REST * moved.max())
         last = len(z) - 1
         rest = int(restless[-1]) if len(restless) else 0
-        steps = [*range(0, rest, stride), *range(rest, last, LONG_STRIDE), last]
+        steps = [*range(0, rest, STRIDE), *range(rest, last, LONG_STRIDE), last]
         result.append(Target(run, true.time, true.inputs, states, np.array(steps)))
     return result
 
 
 def improved(
-    reduced: ReducedVehicle, goals: Sequence[Target], free: Free, sweeps: int, power: float = 2.0
+    reduced: ReducedVehicle, targets: Sequence[Target], free: Free, steps: int, power: float = 2.0
 ) -> ReducedVehicle:
     """The reduced vehicle after so many damped Gauss-Newton steps of its free coefficients.
 
@@ -97,56 +93,23 @@ def improved(
         the others (iteratively reweighted least squares): of use from a first guess on, where the
         errors of some are too large to say much.
     """
-    paths, error = _compared(reduced, goals, power)
+    paths, error = _compared(reduced, targets, power)
     change, moved, damping = np.zeros(sum(len(terms) for terms, _ in free)), reduced, DAMPING
-    for _ in range(sweeps):
+    for _ in range(steps):
         if not np.isfinite(error):
             break
-        normal, gradient = normal_equations(moved, goals, paths, free, power)
+        normal, gradient = normal_equations(moved, targets, paths, free, power)
         scaled, scale = unit_diagonal(normal)
         while damping < MOST_DAMPING:
             step = np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient / scale) / scale
             candidate = changed(reduced, free, change - step)
-            new, new_error = _compared(candidate, goals, power)
+            new, new_error = _compared(candidate, targets, power)
             if new_error < error:
                 change, moved, paths, error = change - step, candidate, new, new_error
                 damping *= 0.1
                 break
             damping *= 10.0
     return moved
-
-
-def finishes(reduced: ReducedVehicle, goals: Sequence[Target]) -> bool:
-    """Whether all reduced training runs come to their end."""
-    return bool(np.isfinite(_compared(reduced, goals)[1]))
-
-
-def pruned(
-    reduced: ReducedVehicle, table: FeatureTable, goals: Sequence[Target], kept: int
-) -> tuple[ReducedVehicle, FeatureTable]:
-    """A reduced vehicle of `kept` nonlinear terms; the lifting keeps its own.
-
-    Its coefficients are best near the goals, all of which it must finish.
-    """
-    paths, _ = _compared(reduced, goals)
-    normal, _ = normal_equations(reduced, goals, paths, table.free)
-    c = reduced.coefficients.copy()
-    rows, columns = np.array([(i, column) for terms, column in table.free for i in terms]).T
-    nonlinear = sorted([*table.odd_nonlinear, *table.even_nonlinear])
-    groups = [np.flatnonzero(rows == i).tolist() for i in nonlinear]
-    left, c[rows, columns] = surviving(normal, c[rows, columns], groups, kept)
-    linear = [*table.odd[: table.linear_count], *table.even[: table.straight_count]]
-    stay = sorted([*linear, *(nonlinear[i] for i in left)])
-    fewer = table.with_only(stay)
-    return (
-        replace(
-            reduced,
-            features=fewer.features,
-            coefficients=c[stay],
-            lifted_features=reduced.lifted_features or reduced.features,
-        ),
-        fewer,
-    )
 
 
 def changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVehicle:
@@ -159,47 +122,47 @@ def changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVeh
 
 
 def _compared(
-    reduced: ReducedVehicle, goals: Sequence[Target], power: float = 2.0
+    reduced: ReducedVehicle, targets: Sequence[Target], power: float = 2.0
 ) -> tuple[list[np.ndarray], float]:
     """Reduced runs, and the sum of powers of their errors; infinite if one has failed."""
     paths, total = [], 0.0
-    scale = _scale(goals)
-    for goal in goals:
-        path = reduced.path(goal.run.maneuver, goal.run.start)
+    scale = _scale(targets)
+    for target in targets:
+        path = reduced.path(target.run.maneuver, target.run.start)
         if path is None:
             return [], np.inf
         paths.append(path)
-        total += float(np.sum(_errors(goal, path, scale) ** 2) ** (0.5 * power))
+        total += float(np.sum(_errors(target, path, scale) ** 2) ** (0.5 * power))
     return paths, total
 
 
-def _scale(goals: Sequence[Target]) -> np.ndarray:
+def _scale(targets: Sequence[Target]) -> np.ndarray:
     """Weights (states + 3,) of errors; the speed counts by the place."""
-    slow = goals[0].states.shape[1] - PLANAR - 1
-    ranges = np.max([np.abs(goal.states[:, :slow]).max(axis=0) for goal in goals], axis=0)
+    slow = targets[0].states.shape[1] - PLANAR - 1
+    ranges = np.max([np.abs(target.states[:, :slow]).max(axis=0) for target in targets], axis=0)
     return np.concatenate([1.0 / (PART * ranges), [0.0, 1.0 / HEADING, 1.0 / PLACE, 1.0 / PLACE]])
 
 
-def _errors(goal: Target, path: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def _errors(target: Target, path: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Weighted errors (compared times, states + 3) of a reduced run."""
-    return (path - goal.states)[goal.compared] * scale * goal.shares[:, None]
+    return (path - target.states)[target.compared] * scale * target.shares[:, None]
 
 
 def normal_equations(
     reduced: ReducedVehicle,
-    goals: Sequence[Target],
+    targets: Sequence[Target],
     paths: Sequence[np.ndarray],
     free: Free,
     power: float = 2.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix and gradient of the sum of squares by the free coefficients."""
-    scale = _scale(goals)
+    scale = _scale(targets)
     size = sum(len(terms) for terms, _ in free)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
-    for goal, path in zip(goals, paths, strict=True):
-        rows = _sensitivities(reduced, goal, path, free, goal.shares[:, None] * scale)
+    for target, path in zip(targets, paths, strict=True):
+        rows = _sensitivities(reduced, target, path, free, target.shares[:, None] * scale)
         rows = rows.reshape(-1, size)
-        error = _errors(goal, path, scale).ravel()
+        error = _errors(target, path, scale).ravel()
         weight = max(error @ error, NOTHING) ** (0.5 * power - 1.0)
         normal += weight * (rows.T @ rows)
         gradient += weight * (rows.T @ error)
@@ -207,14 +170,15 @@ def normal_equations(
 
 
 def _sensitivities(
-    reduced: ReducedVehicle, goal: Target, path: np.ndarray, free: Free, weights: np.ndarray
+    reduced: ReducedVehicle, target: Target, path: np.ndarray, free: Free, weights: np.ndarray
 ) -> np.ndarray:
     """Derivatives (compared times, states + 3, free coefficients) of a reduced run.
 
     Those of each state at each time come times its weight (compared times, states + 3).
     """
     k, c = reduced.features.states, reduced.coefficients
-    path, inputs, times = path[goal.steps], goal.inputs[goal.steps], goal.times[goal.steps]
+    steps = target.steps
+    path, inputs, times = path[steps], target.inputs[steps], target.times[steps]
     z, samples = path[:, :k], len(times)
     # One copy as it is, then one with each coordinate moved.
     widths = DIFFERENCE * np.maximum(1.0, np.abs(z).max(axis=0))
@@ -231,13 +195,13 @@ def _sensitivities(
     by_heading = -forward * sine - sideward * cosine, forward * cosine - sideward * sine
     motion = np.column_stack([cosine, sine, *by_heading])
     terms = np.concatenate([some for some, _ in free])
-    targets = np.repeat([column for _, column in free], [len(some) for some, _ in free])
+    driven = np.repeat([column for _, column in free], [len(some) for some, _ in free])
     dim, m = k + PLANAR, len(terms)
-    result = np.empty((len(goal.compared), dim, m))
+    result = np.empty((len(target.compared), dim, m))
     scratch = np.empty((2 * dim + PLANAR) * m + 3 * k * k)
     run = AlongRun(times, columns[:samples], slopes, motion)
     pivots = np.empty(k, dtype=np.int64)
     loop = loops(LOOPS, ("sensitivities",))["sensitivities"]
-    if not loop(run, terms, targets, COMPARED, weights, result, scratch, pivots):
+    if not loop(run, terms, driven, COMPARED, weights, result, scratch, pivots):
         raise np.linalg.LinAlgError("a step of the variational equations is singular")
     return result

@@ -1,19 +1,24 @@
 """Slow manifold: shape, modes, features and their kernels, fits on trajectories."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from vehiclemor.inputs.steering import lane_change, rack_lane_change, straight_ahead
+from vehiclemor.multibody.components.tire_coefficients import FIALA
+from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.features import feature_columns
 from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.slow_features import FeatureText, add_fiala
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
-from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets
+from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets_of
 from vehiclemor.simulation.build import build
+from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 LANE_CHANGES = {
     "independent_suspension_vehicle": lane_change,
@@ -48,7 +53,7 @@ def fitted(model, dropped=True, **settings):
 
 @pytest.fixture(scope="module")
 def reduced(vehicle):
-    return fitted(vehicle, sweeps=1, tolerance=1e-4)
+    return fitted(vehicle, steps=1, tolerance=1e-4)
 
 
 def errors(reduced, maneuver, start="equilibrium"):
@@ -92,9 +97,10 @@ def test_slow_coordinates_obey_their_linear_equation_where_steering_is_small(car
     modes = slow_modes(shape, 45.0)
     np.testing.assert_allclose(modes.left @ modes.right, np.eye(len(modes.rates)), atol=1e-6)
     run = car.simulate(LANE_CHANGES[car.name].perturbed(1.0, 1e-3))
-    z, speed = modes.coordinates(shape.of(run.states) - shape.reference, run.inputs)
+    found = modes.coordinates(shape.of(run.states) - shape.reference, run.inputs)
+    z, speed = found[:, :-1], found[:, -1]
     rate = np.gradient(z, run.time, axis=0)
-    linear = z @ modes.rates.T + np.outer(run.inputs[:, 0], modes.drive)
+    linear = z @ modes.rates.T + np.outer(run.inputs[:, 0], modes.input_matrix)
     # Differences over 0.02 s are good to a few per cent of the fastest mode.
     inner = slice(60, 170)
     for j in range(len(modes.rates)):
@@ -144,11 +150,8 @@ def test_it_is_right_on_inputs_between_those_that_it_has_seen(reduced):
 
 
 def _without_curvature(reduced):
-    k = reduced.features.states - 1
-    c = reduced.coefficients.copy()
-    odd, even = (block[0] for block in reduced.features.blocks)
-    c[list(odd[k + 1 :])] = 0.0
-    c[list(even[2:])] = 0.0
+    c, terms = reduced.coefficients.copy(), reduced.features.terms
+    c[[i for i, term in enumerate(terms) if "F" in term or "M" in term or term.count("*") > 1]] = 0
     return c
 
 
@@ -168,7 +171,7 @@ def test_how_a_dropped_car_lands_is_learnt(vehicle, reduced):
     linear = replace(
         reduced,
         transient=replace(reduced.transient, left=modes.symmetric.left),
-        encoding=np.vstack([modes.left, modes.speed_left]),
+        encoding=modes.encoding,
     )
     # The speed of no training run.
     start = start_at(20.5, "dropped")
@@ -192,41 +195,119 @@ def test_symmetric_modes_are_modes_that_steering_does_not_move(car):
     left, right = modes.left[k:], modes.right[:, k:]
     np.testing.assert_allclose(left @ a, modes.rates[k:, k:] @ left, atol=1e-4)
     np.testing.assert_allclose(left @ right, np.eye(4), atol=1e-6)
-    assert np.abs(modes.drive[k:]).max() < 1e-6 * np.abs(modes.drive[:k]).max()
+    assert np.abs(modes.input_matrix[k:]).max() < 1e-6 * np.abs(modes.input_matrix[:k]).max()
 
 
 def test_sensitivities_are_the_differences_of_runs(vehicle):
-    reduced = replace(fitted(vehicle, sweeps=0), solver="dopri5", tolerance=1e-9)
+    reduced = replace(fitted(vehicle, steps=0), solver="dopri5", tolerance=1e-9)
     run = TrainingRun(vehicle, lane_change, "equilibrium")
-    goal = targets(reduced, [run], [run.at(lane_change.times)])[0]
+    target = targets_of(reduced, [run], [run.at(lane_change.times)])[0]
     term, k = 16, reduced.features.states
     free = [([term], 0), ([term], k)]
     path = reduced.path(lane_change, "equilibrium")
-    weights = np.ones((len(goal.compared), k + 3))
-    found = _sensitivities(reduced, goal, path, free, weights)
+    weights = np.ones((len(target.compared), k + 3))
+    found = _sensitivities(reduced, target, path, free, weights)
     for place, (_, column) in enumerate(free):
         changed = reduced.coefficients.copy()
         width = 1e-3 * np.abs(changed[:, column]).max()
         changed[term, column] += width
         other = replace(reduced, coefficients=changed).path(lane_change, "equilibrium")
-        difference = (other - path)[goal.compared] / width
+        difference = (other - path)[target.compared] / width
         size = np.abs(difference).max(axis=0)
         wrong = np.abs(found[:, :, place] - difference).max(axis=0)
         # The variational equations are solved with the output times as steps.
-        assert np.all(wrong <= 0.05 * size + 1e-9)
+        assert np.all(wrong <= 0.05 * size + 1e-8)
 
 
-def test_sweeps_bring_reduced_runs_nearer_to_the_training_runs(vehicle):
-    rough = replace(fitted(vehicle, sweeps=0, ridge=1e-6), solver="dopri5", tolerance=1e-7)
+def test_gauss_newton_steps_bring_reduced_runs_nearer_to_the_training_runs(vehicle):
+    rough = replace(fitted(vehicle, steps=0, ridge=1e-6), solver="dopri5", tolerance=1e-7)
     runs = [TrainingRun(vehicle, lane_change.perturbed(1.0, a), "equilibrium") for a in (0.8, 1.2)]
-    goals = targets(rough, runs, [run.at(run.maneuver.times) for run in runs])
+    targets = targets_of(rough, runs, [run.at(run.maneuver.times) for run in runs])
     k = rough.features.states
-    better = improved(rough, goals, [(rough.features.blocks[0][0], k)], 2)
+    better = improved(rough, targets, [(rough.features.blocks[0][0], k)], 2)
 
     def heading_error(vehicle):
-        paths = [vehicle.path(g.run.maneuver, g.run.start) for g in goals]
+        paths = [vehicle.path(t.run.maneuver, t.run.start) for t in targets]
         return max(
-            float(np.abs(p[:, k] - g.states[:, k]).max()) for p, g in zip(paths, goals, strict=True)
+            float(np.abs(p[:, k] - t.states[:, k]).max())
+            for p, t in zip(paths, targets, strict=True)
         )
 
     assert heading_error(better) < 0.2 * heading_error(rough)
+
+
+@cache
+def high_fidelity():
+    return build("high_fidelity_vehicle")
+
+
+def scenario(frequency, amplitude, speed):
+    return Scenario(rack_lane_change.perturbed(frequency, amplitude), "equilibrium", speed)
+
+
+@cache
+def with_tires():
+    """The other vehicle, whose features have the law of its tires."""
+    runs = (1.0, 1.4, 20.0), (0.8, -0.8, 18.5), (1.6, 1.2, 21.5), (0.8, 1.1, 22.0), (1.2, 0.4, 18.0)
+    training = [training_run(high_fidelity(), scenario(*run)) for run in runs]
+    given = {"terms": 4, "even_terms": 8}
+    settings = validated(slow_manifold.METHOD, "dae", given)
+    return slow_manifold.fit(high_fidelity(), training, settings)
+
+
+def simulated(*run):
+    """The reduced run, and the full one."""
+    case, car = scenario(*run), high_fidelity()
+    start = start_of(car, case)
+    return with_tires().simulate(case.maneuver, start), car.simulate(case.maneuver, start)
+
+
+def of(run, name):
+    return run.outputs[:, high_fidelity().outputs.index(name)]
+
+
+def test_the_tires_are_those_of_the_vehicle():
+    case, car = scenario(0.9, 1.4, 20.5), high_fidelity()
+    run = car.simulate(case.maneuver, start_of(car, case))
+    parameters = {name: float(car.parameters[name]) for name in FIALA}
+    for wheel in WHEELS:
+        text = FeatureText(1, 0, 0)
+        add_fiala(text, wheel, ("z0", "z1"), parameters, 1000.0)
+        terms = [f"1000.0 * F_{wheel}", f"1000.0 * M_{wheel}"]
+        slips = np.column_stack([np.tan(of(run, f"slip_angle_{wheel}")), of(run, f"Fz_{wheel}")])
+        columns = text.columns(terms, slips, np.zeros((len(slips), 0)))
+        moment = parameters["tire_width"] * columns[:, 1]
+        for given, name in ((columns[:, 0], "Fy"), (moment, "Mz")):
+            truth = of(run, f"{name}_{wheel}")
+            # What is left is the longitudinal slip of the free rolling wheel.
+            assert np.abs(given - truth).max() < 1e-3 * np.abs(truth).max()
+
+
+def test_steering_to_the_other_side_gives_the_mirror_image():
+    left, right = (simulated(1.1, amplitude, 21.0)[0] for amplitude in (1.2, -1.2))
+    for name, sign in (("lateral_position", -1), ("longitudinal_position", 1), ("yaw", -1)):
+        np.testing.assert_allclose(of(left, name), sign * of(right, name), atol=1e-8)
+
+
+@pytest.mark.parametrize("speed", [17.0, 23.0])
+def test_without_steering_it_goes_straight_on_at_its_speed(speed):
+    run, _ = simulated(1.0, 0.0, speed)
+    assert np.abs(of(run, "lateral_position")).max() < 1e-6
+    np.testing.assert_allclose(of(run, "longitudinal_position"), speed * run.time, rtol=1e-5)
+
+
+def test_exact_tires_predict_a_run_between_the_training_runs():
+    run, truth = simulated(1.1, -1.0, 20.5)
+    assert run.status == "ok"
+    for name in ("lateral_position", "longitudinal_position"):
+        assert np.abs(of(run, name) - of(truth, name)).max() < 0.1
+
+
+def test_it_tells_when_its_tires_slide():
+    case = scenario(0.75, 1.9, 22.0)
+    run = with_tires().simulate(case.maneuver, start_of(high_fidelity(), case))
+    assert run.status != "ok"
+    assert run.trust.indicator > 1.0
+    assert 1.0 < run.trust.until < run.time[-1]
+    watched = [what for _, what in with_tires().features.watched]
+    assert all(any(wheel in what for what in watched) for wheel in WHEELS)

@@ -1,4 +1,4 @@
-"""What training runs show of starts and durations, see `training_reach`.
+"""What training runs show of initial transients, and of durations and starts.
 
 A car that is dropped leaves the ground, so that its transient is not that of the linearised car;
 but soon after it has landed it is, with other amplitudes and a slightly lower speed.  How these
@@ -42,7 +42,7 @@ PATHS = ("time", "inputs", "coordinates", "speeds", "outputs")
 RANK = 1e-7
 
 
-def after_landing(transient: Transient, shape: VehicleShape, run: Trajectory) -> Trajectory:
+def after_transient(transient: Transient, shape: VehicleShape, run: Trajectory) -> Trajectory:
     """A run without what its car does in the air; the same if it starts on the ground."""
     deviation = shape.of(run.states[:1])[0] - shape.reference
     if np.abs(transient.left @ deviation).max(initial=0.0) < STILL:
@@ -51,7 +51,9 @@ def after_landing(transient: Transient, shape: VehicleShape, run: Trajectory) ->
     return replace(run, **{name: getattr(run, name)[later] for name in PATHS})
 
 
-def landed(reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]) -> ReducedVehicle:
+def with_transients(
+    reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]
+) -> ReducedVehicle:
     """The reduced vehicle with the transients and coordinates of runs before they are steered."""
     from scipy.linalg import block_diag, expm
 
@@ -60,7 +62,8 @@ def landed(reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]
     # What is seen of a deviation, and how it moves; the speed, which is last, does not.
     seeing = np.vstack([transient.left[slow], reduced.encoding[k:]])
     rates = block_diag(np.diag(transient.rates[slow]), modes.rates[k:, k:], 0.0)
-    starts, changes = [], []
+    # Another speed excites nothing.
+    starts, changes = [modes.speed_right], [np.zeros(len(seeing), dtype=complex)]
     for run in runs:
         steered = run.time[run.inputs.any(axis=1)]
         still = (run.time >= LANDED) & (run.time < np.append(steered, LONGEST)[0])
@@ -71,8 +74,6 @@ def landed(reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]
         moves = np.vstack([expm(rates * time) for time in run.time[still]])
         starts.append(start)
         changes.append(np.linalg.lstsq(moves, seen.ravel())[0] - seeing @ start)
-    if not starts:
-        return reduced
     change = (np.linalg.pinv(np.array(starts), rcond=RANK) @ np.array(changes)).T
     left, encoding = transient.left.copy(), reduced.encoding.copy()
     left[slow] += change[: slow.sum()]
@@ -102,7 +103,7 @@ def training_reach(
         if excited.size and len(at):
             faded.append(float(at[0]))
             amplitudes.append(np.hypot(*excited[1].T))
-        later = after_landing(transient, shape, run)
+        later = after_transient(transient, shape, run)
         moving = (sizes[-len(later.time) :] > MOVING).any(axis=1)
         deviations = shape.of(later.states) - shape.reference
         decaying.append(np.abs(deviations[moving] @ transient.left.T).max(axis=0, initial=0.0))
