@@ -159,6 +159,7 @@ def _fitted_on_rates(
     c[first + 2 : last, n + 2] = forward * scale[k:]
     c[last:, made.even_columns] = ridge_fit(columns[:, last:], symmetric, settings.ridge)
     decoded = chosen([*given, *straight], [*terms, *others], samples.deviations, DECODED)
+    decoded.sort(key=lambda term: term not in odd)
     return ReducedVehicle(
         shape.model,
         shape,
@@ -170,7 +171,7 @@ def _fitted_on_rates(
         modes.input_shift,
         np.concatenate([3.0 * scale, ABSOLUTE]),
         transient=modes.symmetric,
-        lifted_features=made.of_terms(decoded),
+        lifted_features=made.of_terms(decoded, sum(term in odd for term in decoded)),
     )
 
 
@@ -183,18 +184,23 @@ def _with_decoding(
 ) -> ReducedVehicle:
     """The reduced vehicle whose shapes are fitted to where its own runs are.
 
-    Where one of these fails it is to where the training runs are.
+    Where one of these fails it is to where the training runs are.  Of what the mirror reverses only
+    odd terms tell, of the rest only even ones.
     """
-    assert reduced.lifted_features is not None
-    states = reduced.features.states
+    features, states = reduced.lifted_features, reduced.features.states
+    assert features is not None
     paths = [reduced.path(run.maneuver, run.start) for run in training]
     parts = [
         reduced.encoded_path(true.states, true.inputs) if path is None else path[-len(true.time) :]
         for path, true in zip(paths, settled, strict=True)
     ]
     z = np.ascontiguousarray(np.concatenate(parts)[:, :states])
-    columns = feature_columns(reduced.lifted_features, z, samples.inputs, reduced.parameters)
-    return replace(reduced, lifting=ridge_fit(columns, samples.deviations, ridge))
+    columns = feature_columns(features, z, samples.inputs, reduced.parameters)
+    lifting, image = reduced.lifting.copy(), samples.deviations @ reduced.shape.mirror.T
+    for (terms, _), sign in zip(features.groups, (-1, 1), strict=True):
+        values = 0.5 * (samples.deviations + sign * image)
+        lifting[list(terms)] = ridge_fit(columns[:, list(terms)], values, ridge)
+    return replace(reduced, lifting=lifting)
 
 
 METHOD = Method(

@@ -20,6 +20,7 @@ from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.vehicle.features import Layout
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -27,6 +28,9 @@ STEP = 6e-6
 INPUT_STEP = 1e-5
 # Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
 CORNERING = 4.0
+# States that move less than this part of their range count as not moved; how often steering is
+# followed through the equations; relative singular values that are rounding.
+STILL, POWERS, RANK = 1e-6, 4, 1e-10
 # Error scales: a multiple of steady cornering; of the speed (m/s), heading (rad), place (m).
 MARGIN = 3.0
 SPEED, HEADING, PLACE = 10.0, 1.0, 10.0
@@ -152,6 +156,28 @@ class VehicleShape:
             slopes = (image[0::2] - image[1::2]).T / widths
             parts += [slopes[:, :n], slopes[:, n:]]
         return Linearisation(*parts)
+
+    @cached_property
+    def mirror(self) -> np.ndarray:
+        """Signed permutation (n, n): the deviation of the shape in the vehicle's mirror image.
+
+        Names tell the partners.  Signs follow from what steering moves, which changes its sign in
+        the mirror: of a state without a partner, and against its partner's of any other.
+        """
+        # Not its modes: a symmetric one of the same frequency would be mixed with a lateral one.
+        linear = self.linearised
+        parts = [np.linalg.lstsq(linear.a, linear.b[:, :1], rcond=RANK)[0], linear.b]
+        for _ in range(POWERS):
+            parts.append(linear.a @ parts[-1])
+        moved = np.hstack(parts)
+        moved /= np.abs(moved).max(axis=0)
+        partner = partners(self.names)
+        matrix = np.zeros((len(partner), len(partner)))
+        for i, j in enumerate(partner):
+            still = i == j and np.abs(moved[i]).max() <= STILL
+            turned_alike = i != j and moved[i] @ moved[j] <= 0.0
+            matrix[i, j] = 1.0 if still or turned_alike else -1.0
+        return matrix
 
     def _no_input(self, samples: int) -> np.ndarray:
         return np.zeros((samples, len(self.model.inputs)))

@@ -73,6 +73,14 @@ def test_a_shape_with_place_and_heading_is_the_state(car):
     np.testing.assert_allclose(again[:, kept], states[:, kept], rtol=0, atol=1e-12)
 
 
+def test_the_mirror_image_of_a_vehicle_is_the_vehicle(car):
+    shape = VehicleShape(car)
+    image, linear = shape.mirror, shape.linearised
+    np.testing.assert_array_equal(image @ image, np.eye(len(image)))
+    np.testing.assert_allclose(image @ linear.a @ image, linear.a, atol=1e-9 * abs(linear.a).max())
+    np.testing.assert_allclose(image @ linear.b, -linear.b, atol=1e-9 * abs(linear.b).max())
+
+
 def test_rates_of_the_shape_do_not_know_place_and_heading(car):
     maneuver = LANE_CHANGES[car.name]
     run, shape = car.simulate(maneuver), VehicleShape(car)
@@ -285,7 +293,7 @@ def test_the_tires_are_those_of_the_vehicle():
 
 def test_steering_to_the_other_side_gives_the_mirror_image():
     left, right = (simulated(1.1, amplitude, 21.0)[0] for amplitude in (1.2, -1.2))
-    for name, sign in (("lateral_position", -1), ("longitudinal_position", 1), ("yaw", -1)):
+    for name, sign in (("lateral_position", -1), ("yaw", -1), ("roll", -1), ("pitch", 1)):
         np.testing.assert_allclose(of(left, name), sign * of(right, name), atol=1e-8)
 
 
