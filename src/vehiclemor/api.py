@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start
     from vehiclemor.study.plans.training import Given
+    from vehiclemor.study.run import StudyStatus
     from vehiclemor.study.scenario import Scenario
-    from vehiclemor.study.status import StudyStatus
 
 RESULTS = Path("results")
 
@@ -300,7 +300,7 @@ def status(
         Study name -> cells that are done, failed (with reasons) and to do, and the estimated
         seconds left.
     """
-    from vehiclemor.study.status import status_of
+    from vehiclemor.study.run import status_of
 
     return status_of(str(file_path("study", study)), file_path("results", results), seed)
 

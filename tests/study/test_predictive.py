@@ -21,7 +21,7 @@ from vehiclemor.study.plans.results import judged_part
 from vehiclemor.study.plans.study_file import SpeedTarget
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import training_run
-from vehiclemor.study.store import read_cell
+from vehiclemor.study.store import read_run
 
 OTHER_TEST = '[[test]]\nmaneuver = "sine_travel"\npoints = [[2.0, 0.3]]\n'
 OUTSIDE = '\n[[outside]]\nmaneuver = "sine_travel"\npoints = [[1.0, 1.5]]\n'
@@ -53,7 +53,7 @@ def files(folder, name=""):
     labels = [s.label for s in load_protocol(str(folder / "small0.toml")).sets.get(name, ())]
     found = {}
     for path in (folder / "cells").glob("??/*"):
-        dataset = read_cell(folder, path.stem).dataset()
+        dataset = read_run(folder, path.stem).dataset()
         if not name or list(dataset["scenario"].values) == labels:
             found[path.name] = dataset.drop_vars([*SECONDS, "offline_seconds"], errors="ignore")
     assert found
@@ -138,7 +138,7 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
     changed = replace(fixed_basis.METHOD, fit=recorded_fit)
     monkeypatch.setattr(fixed_basis, "METHOD", changed)
     monkeypatch.setattr("vehiclemor.study.plans.protocol_run.choose", recorded_choice)
-    monkeypatch.setattr("vehiclemor.study.plans.protocol_run.timed_rows", no_timing)
+    monkeypatch.setattr("vehiclemor.study.plans.protocol_run._timed", no_timing)
     run_studies(study, tmp_path)
     last_choice = len(seen) - seen[::-1].index("choice")
     assert False in seen[:last_choice]
@@ -148,8 +148,8 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
     assert not inputs & set(trained)
 
 
-def no_timing(protocol, rows, *_):
-    shape = len(rows), len(protocol.sets["test"])
+def no_timing(_, rows, scenarios, *__):
+    shape = len(rows), len(scenarios)
     return xr.Dataset(
         {
             **{name: (("label", "scenario"), np.ones(shape)) for name in SECONDS},
@@ -167,7 +167,7 @@ def test_a_second_run_computes_nothing_and_processes_change_nothing(
     again = run_studies(study, folder)["small0"]
     assert {path: path.stat().st_mtime_ns for path in (folder / "cells").rglob("*")} == written
     xr.testing.assert_identical(again, dataset)
-    monkeypatch.setattr("vehiclemor.study.plans.protocol_run.timed_rows", no_timing)
+    monkeypatch.setattr("vehiclemor.study.plans.protocol_run._timed", no_timing)
     run_studies(study_of(tmp_path, protocol_text), tmp_path, jobs=2)
     assert_same(files(folder), files(tmp_path))
 

@@ -59,11 +59,8 @@ def run(
 def status(study: Study, *, results: Results = RESULTS, seed: Seed = None) -> None:
     """Show how far a study is, without computing anything."""
     for name, found in vm.status(study, results, seed).items():
-        text = f"{name}: {found.done} of {found.cells} cells done"
-        if found.to_do:
-            known = found.seconds_left == found.seconds_left
-            left = f"about {found.seconds_left:.3g} s in one process" if known else "time unknown"
-            text += f", {found.to_do} to do ({left})"
+        text = f"{name}: {found.done} of {found.runs} runs done"
+        text += f", {found.to_do} to do" if found.to_do else ""
         text += f", {found.later}" if found.later and not found.result else ""
         if found.ends:
             text += f"; {ends_text(kind for kind, _ in found.ends.elements())}"

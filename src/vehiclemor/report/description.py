@@ -212,7 +212,7 @@ def _grid(study: StudyFile) -> Description:
     return {
         "maneuver": study.maneuver or component("model", study.model).maneuver,
         "starts": study.start or ["the model's first"],
-        "training": study.training_words,
+        "training": study.trained_on,
         "parameters": _listed(study.parameters),
         "grid points": study.points,
         "keeps": study.keep,

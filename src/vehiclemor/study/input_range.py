@@ -19,7 +19,7 @@ from vehiclemor.simulation.input_polynomials import extent_of
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.sizes import shaped
-from vehiclemor.study.scenario import Scenario, car_of, own_speed
+from vehiclemor.study.scenario import Scenario, model_of_run, own_speed
 
 # Least part of the speed by which a run may start faster or slower.
 SPEED_SLACK = 0.01
@@ -32,18 +32,11 @@ CLOSE = 0.01
 class InputRange:
     """Inputs and speeds of the training runs.
 
-    Attributes
-    ----------
-    largest
-        Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a dynamic
-        model sizes of whole signals (3, inputs), see `Extent`.
-    speed, reach
-        Middle of the initial speeds in m/s, and how far they lie from it.
-    longest
-        Duration of the longest run in s; a kinematic model has no memory, and any is known.
-    histories
-        Inputs of the training runs (runs, samples, inputs) at equidistant times of the first, where
-        the model follows the times of its training; else none.
+    `largest` are magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a
+    dynamic one sizes of whole signals (3, inputs), see `Extent`.  `speed` is the middle of the
+    initial speeds in m/s, `reach` how far they lie from it, `longest` the duration of the longest
+    run in s (a kinematic model has no memory).  Where a model follows the times of its training,
+    `histories` are its inputs (runs, samples, inputs) at equidistant times of the first.
     """
 
     largest: np.ndarray
@@ -128,4 +121,4 @@ def input_range(
 
 def _speed(model: Model, scenario: Scenario) -> float:
     """Initial speed in m/s; zero of a model that has none."""
-    return scenario.speed or own_speed(car_of(model, scenario)) or 0.0
+    return scenario.speed or own_speed(model_of_run(model, scenario)) or 0.0
