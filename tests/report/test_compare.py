@@ -9,8 +9,13 @@ from regenerate import regenerate_tables
 
 from vehiclemor.cli import main
 from vehiclemor.report import comparison, screens
-from vehiclemor.report.comparison import claim_criterion, of_published_start, paper_comparison
-from vehiclemor.report.costs import cost_table, timing_of
+from vehiclemor.report.comparison import (
+    claim_criterion,
+    cost_table,
+    of_published_start,
+    paper_comparison,
+    timing_of,
+)
 from vehiclemor.report.findings import LARGEST_SPREAD
 from vehiclemor.report.printed_numbers import TIMING, number_criterion
 from vehiclemor.report.published import load_published
@@ -190,7 +195,7 @@ def test_tables_are_byte_identical(results_folder, tmp_path, monkeypatch, rows):
 
 
 def test_perturbed_errors_are_of_their_start_and_failures_are_named(monkeypatch, tmp_path):
-    monkeypatch.setattr(screens, "costs_text", lambda *_: "")
+    monkeypatch.setattr(screens, "cost_text", lambda *_: "")
     angle = "second_euler_angle"
     table = pd.DataFrame(
         [

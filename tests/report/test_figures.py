@@ -12,11 +12,10 @@ from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component
-from vehiclemor.report.figures.catalogue import FIGURES
+from vehiclemor.report.figures.catalogue import FIGURES, left_out
 from vehiclemor.report.figures.errors import luminance
-from vehiclemor.report.figures.pareto import figure_pareto
+from vehiclemor.report.figures.paper import figure_pareto
 from vehiclemor.report.figures.theme import panels, save_figure, styled
-from vehiclemor.report.regenerate import left_out
 from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.run import run_studies
 

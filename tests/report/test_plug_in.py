@@ -14,7 +14,7 @@ from vehiclemor.registry import component
 from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.default_studies import nominal, unseen
 from vehiclemor.report.figures import theme
-from vehiclemor.report.shown import tabled_outputs, timing_cases
+from vehiclemor.report.labels import tabled_outputs, timing_cases
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
 CAR = "quarter_car"

@@ -87,8 +87,8 @@ def simulate(
     how: dict[str, Any] = {"maneuver": maneuver, "start": start, "preset": preset}
     how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
     dataset = vm.simulate(ready, method, **how, **chosen)
+    from vehiclemor.report.labels import tabled_outputs
     from vehiclemor.report.printing import simulation_text
-    from vehiclemor.report.shown import tabled_outputs
     from vehiclemor.study.netcdf_file import write_dataset
 
     shown = ready.outputs if all_outputs else tabled_outputs(ready.definition)

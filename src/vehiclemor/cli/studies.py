@@ -131,8 +131,7 @@ def figures(
     only
         Names of figures, separated by commas: those of the paper, such as 6, or histories-,
         errors-, map- or pareto- and the name of a model; or a study, collection or protocol by name
-        or TOML file, of which is drawn what its dimensions ask for.  The paper's by default, but
-        Pareto figures only where their study is stored.
+        or TOML file, of which is drawn what its dimensions ask for.  The paper's by default.
     out
         Folder of the figures; by default `figures` in the results folder.
     style
@@ -143,21 +142,13 @@ def figures(
     chosen = [name.strip() for name in (only or "").split(",") if name.strip()]
     if only is not None and not chosen:
         raise InputError(f"--only {only!r} names no figure")
-    from vehiclemor.report import regenerate
-
     failed: dict[str, str] = {}
     with shown_progress():
-        written = regenerate.figures(
-            chosen, out, results, jobs, style=style, dpi=dpi, failed=failed
-        )
+        written = vm.figures(chosen, out, results, jobs, style=style, dpi=dpi, failed=failed)
     for path in written:
         print(path)
     for name, why in failed.items():
         print(f"figure {name} can't be drawn: {why}", file=sys.stderr)
-    missing = {} if chosen else regenerate.left_out(results)
-    if missing:
-        made = "vehiclemor run predictive makes their studies"
-        print(f"left out: {', '.join(missing)} ({made})")
     return FAILED if failed else 0
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from vehiclemor.errors import InputError
 from vehiclemor.registry import component, names
+from vehiclemor.report.labels import default_rank, tabled_outputs
 from vehiclemor.report.published import rms_numbers
-from vehiclemor.report.shown import default_rank, tabled_outputs
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import complete_settings, default_settings

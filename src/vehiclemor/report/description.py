@@ -41,13 +41,7 @@ def description(
     parameters: Mapping[str, object] | None = None,
     parameter_file: Path | None = None,
 ) -> Description:
-    """What a name stands for; lists of dictionaries are the rows of tables.
-
-    Raises
-    ------
-    InputError
-        If nothing has that name, or a parameter is wrong.
-    """
+    """What a name stands for; lists of dictionaries are the rows of tables."""
     if not isinstance(name, str):
         raise InputError(f"name is {quoted(name)}, not a text")
     if name in names("model"):

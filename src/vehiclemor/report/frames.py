@@ -26,14 +26,9 @@ MEDIANS = ("seconds", "offline_seconds", "evaluations")
 def frame(dataset: xr.Dataset, variables: Iterable[str] = ()) -> pd.DataFrame:
     """A row for each run, in the order of the grid; histories are left out.
 
-    Columns are what varies (factors, parameters, start, label and its method, scenario), then
-    variables, such as `status`; one with further dimensions has a column for each of their values:
-    `rms_error.toe`.
-
-    Parameters
-    ----------
-    variables
-        Those that are wanted; all by default.
+    Columns are what varies (factors, parameters, start, label and its method, scenario), then the
+    wanted variables, all by default; one with further dimensions has a column for each of their
+    values: `rms_error.toe`.
     """
     import xarray as xr
 
@@ -83,11 +78,10 @@ def column_meanings(dataset: xr.Dataset) -> pd.DataFrame:
 def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """A row for each start, method and output of a combined dataset.
 
-    `runs` are different ones, `failures` says how those that have `failed` ended, `reason` why,
-    `warned` counts those that aren't trusted (`warned_runs`), `trained` those that the method was
-    trained on; of those that have ended `median` and `largest` are RMS errors over the grid,
-    `largest_at` is the place of the largest, `floor` that of the best approximation there.
-    `seconds` (of the compiled loop), `offline_seconds` and `evaluations` are medians.
+    `runs` are different ones; `failures` says how those that have `failed` ended, `reason` why.  Of
+    those that have ended there are `median` and `largest` RMS errors over the grid, and at the
+    place of the largest that of the best approximation (`floor`).  Seconds (of the compiled loop)
+    and evaluations are medians.
     """
     attributes = {key: str(dataset.attrs[key]) for key in ("study", "title", "model", "training")}
     head = {"kind": ERRORS, **attributes, "grid": _grid_words(dataset)}

@@ -19,8 +19,8 @@ from vehiclemor.report.findings import (
     at_point,
     scatter,
 )
+from vehiclemor.report.labels import timing_cases
 from vehiclemor.report.published import Model, Number, load_published, rms_numbers
-from vehiclemor.report.shown import timing_cases
 
 NOMINAL_ERROR = "nominal-only: trained on the run that it is tested on, where replay is exact"
 SAVED = "share of the time of {} that is saved; the paper names neither its {} nor its machine"

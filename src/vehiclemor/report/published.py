@@ -19,13 +19,7 @@ Count = Annotated[int, Field(ge=1)]
 
 
 class Printed(FileSchema):
-    """One thing that the paper prints, and where.
-
-    Attributes
-    ----------
-    page, section, figure
-        As printed: "031007-4", "3.1", and the number of the figure, if there is one.
-    """
+    """One thing that the paper prints, and where."""
 
     id: str = Field(pattern=r"^[a-z0-9]+(_[a-z0-9]+)*$")
     page: str = Field(pattern=r"^031007-[1-8]$")
@@ -34,19 +28,10 @@ class Printed(FileSchema):
 
 
 class Number(Printed):
-    """A printed number.
+    """A printed number, and the settings behind it, as far as the paper prints them.
 
-    Attributes
-    ----------
-    kind
-        What the number says. A time reduction is 1 - reduced time / full time, a perturbation the
-        relative increase of the input's frequency or amplitude.
-    quantity
-        Name of the model's output that the number is about, if it is about one.
-    states, control_period, snapshots
-        Settings of the reduction behind the number, as far as the paper prints them.
-    note
-        How the printed words were read, where they leave a choice.
+    A time reduction is 1 - reduced time / full time, a perturbation the relative increase of the
+    input's frequency or amplitude; `note` says how the printed words were read.
     """
 
     model: Model
@@ -81,17 +66,10 @@ class Measured(FileSchema):
 
 
 class Claim(Printed):
-    """A printed statement in our words.
+    """A printed statement in our words; without a model it is about all three.
 
-    Attributes
-    ----------
-    model
-        None if the statement is about all three models.
-    kind
-        `setup`: how something was made; `result`: what the paper says it saw; `expectation`: what
-        it expects or explains without showing it.
-    measured
-        Of a claim that no criterion is for.
+    A `setup` says how something was made, a `result` what the paper says it saw, an `expectation`
+    what it explains without showing it; `measured` is of a claim that no criterion is for.
     """
 
     model: Model | None = None
@@ -126,13 +104,7 @@ class Published(FileSchema):
 
 @cache
 def load_published(path: Path | None = None) -> Published:
-    """Load and validate what the paper prints, by default from the package's own file.
-
-    Raises
-    ------
-    FileError
-        If the file is unreadable, does not fit the schema, or has an id twice.
-    """
+    """Load and validate what the paper prints, by default from the package's own file."""
     return read_toml(path or data_folder() / "published" / "masoudi2015.toml", Published)
 
 

@@ -52,14 +52,14 @@ def method_rows(dataset: xr.Dataset, protocol: StudyFile) -> list[Row]:
     """One row for each method, full-order integrators as measures.
 
     `runs` of the `test_set` are judged, `apart` ones more are not: the full order is sensitive
-    there.  Of the runs `misses` miss a bound, `silent` ones with the status ok; `flagged` are those
-    of which the model says that it has left what it knows.  `score` is the largest error of a
-    bounded output as a multiple of its bound (infinite if a run has failed), `worst_MEASURE_OUTPUT`
-    and `most_...` the largest error and the 99 % quantile.  `seconds` is the mean of whole calls,
-    `loop_seconds` of their compiled loops, with the `spread` of the rounds (interquartile range
-    over median).  `ratio_equal` and `ratio_equal_loop` are against the full order interpolated at
-    the row's own score on the rows `equal_rows`, `ratio_within` against `within`, the fastest
-    full-order row within the bounds.
+    there.  Of the runs `misses` miss a bound, `silent` ones with the status ok; of `flagged` ones
+    the model says that it has left what it knows.  `score` is the largest error of a bounded output
+    as a multiple of its bound (infinite if a run has failed), `worst_MEASURE_OUTPUT` and `most_...`
+    the largest error and the 99 % quantile.  `seconds` is the mean of whole calls, `loop_seconds`
+    of their compiled loops, with the `spread` of the rounds (interquartile range over median).
+    `ratio_equal` and `ratio_equal_loop` are against the full order interpolated at the row's own
+    score on the rows `equal_rows`, `ratio_within` against `within`, the fastest full-order row
+    within the bounds.
     """
     part = judged_part(dataset)
     rows = [_method_row(dataset, part, str(label), protocol) for label in part["label"].values]
@@ -149,14 +149,9 @@ def ratio(other: Row | None, row: Row) -> float:
 
 
 class Equal(NamedTuple):
-    """The fastest full order at an error.
+    """The fastest full order at an error: seconds of a run, and the rows between which it lies.
 
-    Attributes
-    ----------
-    seconds
-        Of a run; NaN if no ladder reaches the error.
-    rows
-        The rows between which it lies or which are continued, or the one that is used.
+    The seconds are NaN if no ladder reaches the error.
     """
 
     seconds: float
@@ -222,10 +217,12 @@ def target_rows(dataset: xr.Dataset, protocol: StudyFile, methods: list[Row]) ->
     if winner is None:
         return []
     runs, misses = f"of {winner['runs']} runs", winner["misses"]
-    flagged = f"{winner['flagged']} flagged {runs}"
+    warned = f"{winner['flagged']} warned {runs}"
     rows = [
-        _target("silent misses", 0, winner["silent"], runs),
-        _target("flagged misses", protocol.flagged_misses, misses - winner["silent"], flagged),
+        _target("undetected failures", 0, winner["silent"], runs),
+        _target(
+            "failures with a warning", protocol.flagged_misses, misses - winner["silent"], warned
+        ),
     ]
     if protocol.failure_rate is not None:
         rate, reason = upper_bound(misses, winner["runs"]), "Clopper-Pearson, 95 %"
@@ -233,10 +230,10 @@ def target_rows(dataset: xr.Dataset, protocol: StudyFile, methods: list[Row]) ->
         rows.append(_target("failure rate below", protocol.failure_rate, rate, reason))
     if winner["outside_runs"]:
         reason = (
-            f"of {winner['outside_runs']} runs, {winner['outside_flagged']} flagged, "
+            f"of {winner['outside_runs']} runs, {winner['outside_flagged']} warned, "
             f"{winner['outside_misses']} outside of the bounds"
         )
-        rows.append(_target("silent misses outside", 0, winner["outside_silent"], reason))
+        rows.append(_target("undetected failures outside", 0, winner["outside_silent"], reason))
     if straight := protocol.straight:
         here = [str(s).startswith(f"{straight.maneuver},") for s in dataset["scenario"].values]
         part = dataset["largest_output"].isel(scenario=here)

@@ -7,8 +7,7 @@ import pytest
 from tests.unit import standard_problems
 from vehiclemor.registry import component, names
 from vehiclemor.report.default_studies import of_paper, smaller_rank
-from vehiclemor.report.published import load_published
-from vehiclemor.report.shown import (
+from vehiclemor.report.labels import (
     default_rank,
     main_outputs,
     of_kind,
@@ -16,6 +15,7 @@ from vehiclemor.report.shown import (
     tables_file,
     timing_cases,
 )
+from vehiclemor.report.published import load_published
 from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings
 

@@ -51,10 +51,7 @@ def figure_errors(
 ) -> Figure:
     """RMS errors of studies over all that they vary.
 
-    Parameters
-    ----------
-    methods
-        Labels with their texts; by default all but the full order.
+    `methods` are labels with their texts, by default all but the full order.
     """
     first = next(iter(results.values()))
     if not {"rms_error", "signal_range"} <= set(first):

@@ -100,12 +100,7 @@ def _both_sides(
 ) -> list[tuple[Points, float]]:
     """Left points and their mirror images, with points on the road and the centre of mass.
 
-    Parameters
-    ----------
-    height, radius
-        Of the centre of mass above the road, and of the tires, in m.
-    behind
-        From the front axle to the centre of mass of the whole car in m.
+    That stands at a `height`, so far `behind` the front axle; tires have a `radius` (all in m).
     """
     road = {
         f"{end} {side}": points[f"{end}_wheel_centre"] * [1.0, sign, 0.0]

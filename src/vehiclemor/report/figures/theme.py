@@ -1,5 +1,6 @@
 """One look for all figures: lines, panels, axes, legends, and the files they are written to."""
 
+import string
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from itertools import cycle
@@ -18,7 +19,6 @@ from vehiclemor.arguments import count, quoted
 from vehiclemor.errors import InputError
 from vehiclemor.files import write_whole
 from vehiclemor.report.labels import MARK, TRAINED
-from vehiclemor.report.printing import alphabetic
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
 Results = Mapping[str, "xr.Dataset"]
@@ -86,20 +86,14 @@ def panels(
 
 def letter(number: int, title: str = "") -> str:
     """Title of a panel, counted from 0."""
-    return f"({alphabetic(number)}) {title}".rstrip()
+    name = string.ascii_lowercase[number % 26] * (number // 26 + 1)
+    return f"({name}) {title}".rstrip()
 
 
 class Places(NamedTuple):
-    """Places of the values of a dimension.
+    """Places of the values of a dimension, with the label of its axis.
 
-    Attributes
-    ----------
-    at
-        Perturbations in %, numbers, or 0, 1, 2 ... of what has `names` (values,).
-    label
-        Of the axis, with its unit.
-    names
-        Texts at the places, none where the axis is one of numbers.
+    They are perturbations in %, numbers, or 0, 1, 2 ... of what has `names`.
     """
 
     at: np.ndarray
@@ -191,13 +185,7 @@ def tell_empty(figure: Figure) -> None:
 
 
 def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[None]:
-    """The package's style, with a style of Matplotlib (name or file) on top, and dots an inch.
-
-    Raises
-    ------
-    InputError
-        If there is no such style, or the resolution makes no sense.
-    """
+    """The package's style, with a style of Matplotlib (name or file) on top, and dots an inch."""
     dots = {} if dpi is None else {"savefig.dpi": count("dpi", dpi, 10, 2400)}
     changes = [OWN_STYLE, *([style] if style else []), dots]
     try:
@@ -210,13 +198,7 @@ def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[No
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure whole; its format is the file's suffix.
-
-    Raises
-    ------
-    InputError, FileError
-        If the format is not one of `FORMATS`, or the file can't be written.
-    """
+    """Write a figure whole; its format is the file's suffix."""
     suffix = path.suffix.removeprefix(".").lower()
     if suffix not in FORMATS:
         raise InputError(f"{path}: a figure is one of {', '.join(FORMATS)}")
