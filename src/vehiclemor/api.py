@@ -256,11 +256,11 @@ def run_study(
     results
         Results folder.
     progress
-        Called with (study, finished cells, all cells).
+        Called with (study, finished runs, all runs).
     scheduler
-        Address of a dask scheduler whose workers compute the cells.
+        Address of a dask scheduler whose workers compute.
     seed
-        Draws fresh test runs of protocols, for an audit; by default the file's seed.
+        Samples fresh test runs of protocols, for an audit; by default the file's seed.
 
     Returns
     -------
@@ -297,8 +297,7 @@ def status(
     Returns
     -------
     dict
-        Study name -> cells that are done, failed (with reasons) and to do, and the estimated
-        seconds left.
+        Study name -> runs that are done, failed (with reasons) and to do.
     """
     from vehiclemor.study.run import status_of
 

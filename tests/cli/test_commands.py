@@ -1,7 +1,6 @@
 """Commands: what they print and write is what was declared, and fits into 80 columns."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component, names
 from vehiclemor.report.description import SCHEMAS
 from vehiclemor.resources import data_names, handbook_folder
-from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.toml_files import FileSchema
@@ -71,43 +69,6 @@ def test_simulate_writes_what_the_interface_returns(tmp_path, printed, monkeypat
         np.testing.assert_array_equal(written["coordinates"], expected["coordinates"])
         assert list(written["coordinate"].values) == list(model.coordinates)
         assert json.loads(written.attrs["configuration"])["parameters"]["wheel_centre"] == point
-
-
-@pytest.mark.parametrize("model", names("model"))
-def test_simulate_prints_errors_in_a_table(printed, model):
-    assert "nan" not in printed("simulate", model)
-    text, dataset = (
-        printed("simulate", model, "--method", "pod", "--all-outputs"),
-        vm.simulate(model, "pod"),
-    )
-    rows = {row[0]: row[1:5] for row in map(str.split, text.splitlines()) if len(row) >= 6}
-    for output in dataset["output"].values[:6]:
-        # What is zero or missing is a dash.
-        measures = ("rms_error", "floor_rms_error", "max_error", "signal_range")
-        values = [dataset[name].sel(output=output).item() for name in measures]
-        assert rows[output] == [f"{v:.1e}" if v and v == v else "-" for v in values]
-
-
-def test_pictures_are_named_and_written(tmp_path, printed, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    simulate = ["simulate", "double_wishbone", "--method", "pod", "--out", "run.nc"]
-    text = printed(*simulate, "--plot") + printed(*simulate, "--plot", "mine.svg")
-    printed("run", "figures-6-7", "--results", "results")
-    text += printed("plot", "run.nc", "--kind", "errors")
-    text += printed("plot", "figures-6-7", "--select", "rank=4", "--out", "study.pdf")
-    pictures = ["double_wishbone-pod.png", "mine.svg", "study.pdf", "run-errors.png"]
-    assert {path.name for path in tmp_path.iterdir()} == {*pictures, "run.nc", "results"}
-    for name in pictures:
-        assert f"written: {name}" in text
-        assert Path(name).stat().st_size > 1000
-
-
-def test_a_result_draws_itself(tmp_path):
-    dataset = vm.simulate("double_wishbone", "pod")
-    dataset.vehiclemor.plot("histories", tmp_path / "a.png")
-    write_dataset(dataset, tmp_path / "run.nc")
-    vm.plot(tmp_path / "run.nc", out=tmp_path / "b.png")
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 def test_text_of_the_command_line_gets_its_kind():
@@ -202,17 +163,3 @@ def test_a_model_that_was_not_derived_is_shown_without_deriving_it(monkeypatch, 
     assert "pod" in vm.describe("high_fidelity_vehicle")["methods"]
     assert {row["accepted"] for row in vm.describe("slow_manifold")["models"]} == {"no", "?"}
     assert list(tmp_path.iterdir()) == []
-
-
-def test_bounds_are_shown():
-    settings = vm.describe("full_order")["settings, kind ode and dae"]
-    types = {row["name"]: row["type"] for row in settings}
-    assert types["solver"].startswith("dopri5, rodas4, ros34pw2")
-    assert types["tolerance"] == "number 1e-13 to 0.1"
-
-
-def test_an_audit_is_followed_apart(printed, tmp_path):
-    study = "predictive-double_wishbone"
-    text = printed("status", study, "--seed", "7", "--results", tmp_path)
-    assert text.startswith(f"{study}-seed-7: 0 of ")
-    assert [*vm.status(study, tmp_path)] == [study]

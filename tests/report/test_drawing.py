@@ -1,7 +1,6 @@
 """Any result is drawn: runs that end in every way, over any axes, of one to seven methods."""
 
 import json
-from collections import Counter
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.report.figures import result_plot, theme
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
-from vehiclemor.report.figures.runs import PATH
 from vehiclemor.report.labels import readable_unit
 from vehiclemor.study.netcdf_file import read_dataset
 
@@ -130,12 +128,6 @@ def test_a_run_far_from_full_order_is_cut_where_it_leaves(folder):
     assert high - low < 3.0 * float(full.max() - full.min())
 
 
-def test_what_has_no_values_says_so(folder):
-    legend, notes = said(vm.plot("alone-unreachable", results=folder))
-    assert legend == ["unreachable 0 (unreachable)"]
-    assert notes == ["no finite values"] * 2
-
-
 def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeypatch):
     names = ("numbers", "map-4", "alone-diverged")
     only = ["--only", ",".join(str(folder / f"{name}.toml") for name in names)]
@@ -164,17 +156,6 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeyp
     assert "RMS errors" in rest
 
 
-def test_paths_of_runs_that_have_failed(folder):
-    data = stored(folder, "all").sel(output=["spindle_x", "spindle_y"])
-    data = data.assign_coords(output=list(PATH)).squeeze()
-    figure = checked(vm.plot(data, "paths"))
-    assert "diverged 2* (diverged)" in said(figure)[0]
-    (line,) = (x for x in figure.axes[1].lines if x.get_label() == "ok 0*")
-    error = (data["outputs"] - data["reference_outputs"]).sel(label="ok_0")
-    away = np.hypot(*(error.sel(output=output).values for output in PATH))
-    np.testing.assert_allclose(line.get_ydata(), np.where(away > 0.0, away, np.nan), rtol=1e-12)
-
-
 def test_what_was_not_compared_is_drawn_alone(tmp_path):
     rom = vm.reduce("double_wishbone", "pod", rank=3)
     for result in (rom.dataset(rom.simulate()), vm.simulate("double_wishbone", errors=False)):
@@ -189,20 +170,6 @@ def test_what_was_not_compared_is_drawn_alone(tmp_path):
             vm.plot(result, "errors")
 
 
-def test_a_study_is_drawn_by_the_name_of_its_results(folder, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["plot", "all", "--results", str(folder)]) == 0
-    assert (tmp_path / "all-histories.png").exists()
-    # Another study of that name is stored beside it.
-    other = tmp_path / "all.toml"
-    other.write_text(study("ok", grid=CURVE))
-    vm.run_study(other, results=folder)
-    shown = vm.plot(other, "errors", results=folder).axes[0]
-    assert shown.get_xlabel() == "frequency perturbation (%)"
-    assert main(["plot", "al", "--results", str(folder)]) == 2
-    assert "'al'" in capsys.readouterr().err
-
-
 def test_errors_are_drawn_over_what_is_not_chosen(folder):
     data = stored(folder, "map-4")
     chosen = vm.plot(data, "errors", label="untrusted_1")
@@ -212,23 +179,6 @@ def test_errors_are_drawn_over_what_is_not_chosen(folder):
     lines = {line.get_label(): line for line in curve.lines}
     place = {"label": "ok_0", "amplitude_factor": 1.2, "output": "second_euler_angle"}
     np.testing.assert_array_equal(lines["ok 0"].get_ydata(), data["rms_error"].sel(place).squeeze())
-
-
-def test_counts_agree(folder, capsys):
-    path, name = str(folder / "numbers.toml"), "numbers"
-    assert main(["run", path, "--results", str(folder)]) == 1
-    printed = " ".join(capsys.readouterr().out.split())
-    data = stored(folder, name)
-    found = Counter(data["status"].values.ravel().tolist())
-    doubted = int(data["remark"].str.contains("not to be trusted").sum())
-    assert doubted
-    counts = ", ".join(f"{found[end]} {end}" for end in sorted(found))
-    told = counts.replace(" ok", f" ok ({doubted} not to be trusted)")
-    assert f"{name}: 8 grid points, 8 cells: {told};" in printed
-    assert main(["status", path, "--results", str(folder)]) == 0
-    assert f" {counts};" in " ".join(capsys.readouterr().out.split())
-    page = vm.write_report([path], folder / "page.html", folder)
-    assert f": {told}" in page.read_text(encoding="utf-8")
 
 
 def test_a_picture_shows_both_runs_and_their_difference(results):
@@ -345,12 +295,3 @@ def test_samples_are_drawn_over_what_was_sampled():
     assert len(figure.axes) == 6
     # Of four quantities the errors follow the third.
     assert figure.axes[3].get_xlabel() == "third (kg)"
-
-
-def test_full_and_wide_maps_have_their_published_line(folder):
-    values = ", ".join(f"{value:.3f}" for value in np.linspace(0.8, 1.2, 51))
-    grid = f"frequency_factor = [{values}]\namplitude_factor = [1.0, 1.1]"
-    text = study("ok", grid=grid, keep="metrics").replace("0.01", "1e-4")
-    (folder / "wide.toml").write_text(text)
-    figure = checked(vm.plot(vm.run_study(folder / "wide.toml", results=folder), "errors"))
-    assert len(figure.axes[0].collections) == 2

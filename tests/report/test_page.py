@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from xml.etree import ElementTree
 
 import pandas as pd
@@ -135,18 +134,6 @@ def test_targets_tell_detected_misses_and_full_order_within_the_bounds(made):
     assert [row["within"] for row in method_rows(wrong, protocol)] == ["", ""]
 
 
-def test_a_large_grid_is_summed_up(made, monkeypatch):
-    monkeypatch.setattr(page, "MOST_ROWS", 5)
-    out = vm.write_report(str(made[0] / "hostile.toml"), made[0] / "b.html", made[0])
-    read = parsed(out.read_text(encoding="utf-8"))
-    assert "cell" not in texts(read, "th")
-    errors = dataset_of(made[0], "hostile")["rms_error"].sel(
-        label="pod", output="second_euler_angle"
-    )
-    row = next(r for r in table(read, "largest") if r["largest"] == float(errors.max()))
-    assert row["median"] == float(errors.median())
-
-
 def test_the_paper_is_judged(made, monkeypatch):
     rows = pd.DataFrame(
         {
@@ -165,28 +152,3 @@ def test_the_paper_is_judged(made, monkeypatch):
     read = parsed(out.read_text(encoding="utf-8"))
     verdicts = [row["verdict"] for row in table(read, "settings") if "verdict" in row]
     assert verdicts == ["missed", "not comparable"]
-
-
-def test_a_damaged_file_is_named_and_left_out(made, tmp_path):
-    (tmp_path / "studies").mkdir()
-    shutil.copy(made[0] / "studies" / "unseen.nc", tmp_path / "studies")
-    (tmp_path / "studies" / "broken.nc").write_bytes(b"nothing")
-    text = vm.write_report(out=tmp_path / "c.html", results=tmp_path).read_text(encoding="utf-8")
-    assert "broken.nc" in texts(parsed(text), "p")[1]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ([], "no results of a study"),
-        (["--out", "report.pdf"], "ends with .html"),
-        (["nonsense"], "nonsense"),
-    ],
-)
-def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["report", *arguments]) == 2
-    told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    assert words in told
-    assert list(tmp_path.glob("*.html")) == []

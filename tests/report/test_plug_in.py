@@ -14,7 +14,7 @@ from vehiclemor.registry import component
 from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.default_studies import nominal, unseen
 from vehiclemor.report.figures import theme
-from vehiclemor.report.labels import tabled_outputs, timing_cases
+from vehiclemor.report.labels import tabled_outputs
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
 CAR = "quarter_car"
@@ -29,15 +29,6 @@ def folder(plug_in_package, tmp_path_factory):
 @pytest.fixture(scope="module")
 def tables(folder):
     return model_tables(CAR, folder)
-
-
-def test_costs_have_a_row_for_every_case_and_start(tables):
-    costs = tables["costs"].set_index(["start", "case"])
-    cases = [case.id for case in timing_cases(component("model", CAR))]
-    assert list(costs.loc["equilibrium"].index) == cases
-    assert list(costs.loc["dropped"].index) == cases
-    assert costs.loc[("dropped", "baseline"), "speed_up"] == 1.0
-    assert (costs["status"] == "ok").all()
 
 
 def test_errors_have_every_method_and_output(tables):

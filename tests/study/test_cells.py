@@ -7,8 +7,6 @@ import pytest
 
 import vehiclemor as vm
 from vehiclemor.codegen import cache
-from vehiclemor.errors import InputError
-from vehiclemor.inputs.signal import Signal
 from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods import pod, slow_manifold
 from vehiclemor.registry import component
@@ -104,30 +102,6 @@ def test_a_method_that_fits_others_has_their_source_in_its_key(vehicle, monkeypa
     assert code("guarded") != before["guarded"]
 
 
-def test_inputs_are_known_by_their_values_and_names():
-    def constant(value):
-        return dataclasses.replace(
-            sine_travel, signal=lambda times, *_: np.full((len(times), 2), value)
-        )
-
-    def log(name):
-        return Signal.from_samples([0.0, 1.0], [0.0, 0.01], inputs=[name])
-
-    given = constant(0.0), constant(-0.0), constant(0.01), log("z"), log("s0")
-    zero, minus_zero, *others = [Scenario(each, "equilibrium").run_key for each in given]
-    assert zero == minus_zero
-    assert len({zero, *others}) == 4
-
-
-def test_another_geometry_gives_another_key_and_result(cell):
-    moved = build("double_wishbone", overrides={"tie_rod_inner": [-0.2, 0.4921, -0.0962]})
-    other = make_cell(moved, sine_travel, "full_order", {})
-    assert other.key != cell.key
-    # The low-bump-steer tie rod of the source: toe within 0.06 deg over +-0.1 m.
-    toe = evaluate(other)["outputs"].sel(output="toe")
-    assert float(abs(toe).max()) < 0.06 * 3.15 / 180.0
-
-
 def test_a_bug_of_a_plug_in_model_in_the_reference_spoils_only_its_cell(cell, model, monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("in a plug-in")
@@ -136,27 +110,6 @@ def test_a_bug_of_a_plug_in_model_in_the_reference_spoils_only_its_cell(cell, mo
     dataset = evaluate(cell)
     assert dataset["status"].item() == "error"
     assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
-
-
-def test_a_training_set_needs_and_uses_its_factors():
-    model = build("double_wishbone")
-    with pytest.raises(InputError, match="training_set"):
-        make_cell(model, sine_travel, "pod", {}, training="set")
-    errors = {}
-    for factors in (((1.0, 1.0),), ((1.0, 1.0), (1.2, 1.0))):
-        faster, trained = sine_travel.perturbed(1.2), {"training": "set", "factors": factors}
-        cell = make_cell(model, faster, "pod", {"rank": 4}, **trained)
-        errors[len(factors)] = float(evaluate(cell)["rms_error"].sel(output="spindle_y"))
-    assert errors[2] < 0.5 * errors[1]
-
-
-def test_settings_of_a_method_that_refuses_the_model_are_not_judged():
-    cell = make_cell(build("double_wishbone"), sine_travel, "two_track", {"rnk": 3})
-    assert cell.settings == {}
-    dataset = evaluate(cell)
-    assert dataset["status"].item() == "rejected"
-    assert "double_wishbone" in dataset["message"].item()
-    assert np.isnan(dataset["coordinates"]).all()
 
 
 def test_a_run_is_measured_the_same_way_in_grids_and_protocols(vehicle):
@@ -221,16 +174,6 @@ def test_a_run_of_another_car_is_that_of_a_model_made_with_its_parameters(vehicl
     own = vm.model(CAR, dict(HEAVY) | {"initial_speed": 31.0})
     faster = dataclasses.replace(change, speed=31.0)
     np.testing.assert_array_equal(start_of(vehicle, faster), own.start("dropped"))
-
-
-def test_a_component_of_a_point_is_a_parameter(model):
-    x, y, _ = model.parameters["tie_rod_inner"]
-    whole = vm.model(model.name, {"tie_rod_inner": [x, y, -0.09]})
-    moved = vm.model(model.name, dict(MOVED))
-    np.testing.assert_array_equal(moved.constants, whole.constants)
-    for wrong in ({"tie_rod_inner.w": 0.0}, {"tie_rod_inner.z": [0.0, 0.0]}):
-        with pytest.raises(InputError, match=next(iter(wrong))):
-            vm.model(model.name, wrong)
 
 
 def test_a_method_is_not_used_on_a_model_that_it_was_not_trained_on(model):

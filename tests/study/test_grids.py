@@ -5,7 +5,6 @@ import pytest
 
 import vehiclemor as vm
 from tests.study.small import small_study
-from vehiclemor.cli import main
 from vehiclemor.errors import FileError
 from vehiclemor.study.plans.grid import expand, sampled
 from vehiclemor.study.plans.loading import load_studies, write_study
@@ -79,24 +78,6 @@ def test_a_plan_has_one_point_in_every_slice_of_every_range(plan):
     assert sampled(given) != sampled(given.model_copy(update={"seed": 2}))
 
 
-def test_trainings_and_maneuvers_are_axes():
-    axes = {
-        "training": ["matched", "nominal", "travel_and_rack"],
-        "maneuver": ["sine_travel", "chirp_travel"],
-        "amplitude_factor": [0.9],
-        "parameters.tie_rod_inner.z": [-0.09],
-    }
-    seen = {
-        (run.maneuver.name, run.maneuver.amplitude_factor, run.parameters)
-        for cell in grid_of(grid=axes).experiments.values()
-        for run in cell.training
-    }
-    # The tested ones, the model's own, and the named one.
-    runs = [("sine_travel", 0.9), ("chirp_travel", 0.9), ("sine_travel", 1.0)]
-    runs.append(("travel_and_rack", 1.0))
-    assert seen == {(*run, (("tie_rod_inner.z", -0.09),)) for run in runs}
-
-
 def test_rows_of_different_models_keep_their_units_and_counts(tmp_path):
     car = small_study(tmp_path, "", "full_order", model=CAR)
     rows = flattened(run_studies("figures-6-7", tmp_path) | run_studies(str(car), tmp_path))
@@ -157,24 +138,3 @@ def test_what_can_not_be_run_is_told_before_the_first_cell(tmp_path, model, text
         vm.run_study(path, results=tmp_path / "results")
     assert "\n" not in str(error.value)
     assert not (tmp_path / "results").exists()
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"count": 6, "plan": "sobol"}, "count"),
-        ({"ranges": {"parameters.a": [2.0, 1.0]}}, "parameters.a"),
-        ({"ranges": {"a": [1.0, 2.0]}}, "a is neither"),
-    ],
-)
-def test_wrong_samplings_are_told(change, words):
-    given = {"plan": "latin_hypercube", "count": 2, "seed": 0, "ranges": {"parameters.a": [0, 1]}}
-    with pytest.raises(ValueError, match=words):
-        Sampling.model_validate(given | change)
-
-
-def test_a_run_says_why_cells_are_rejected(tmp_path, capsys):
-    path = small_study(tmp_path, 'keep = "metrics"\n', "two_track", model=CAR)
-    assert main(["run", str(path), "--results", str(tmp_path)]) == 0
-    printed = " ".join(capsys.readouterr().out.split())
-    assert f"1 rejected: {CAR} has no y_dot" in printed

@@ -1,7 +1,6 @@
 """The runner of protocols: nothing is chosen by what it is tested on."""
 
 import json
-import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -89,15 +88,6 @@ def test_all_full_order_candidates_are_kept_and_one_of_every_other(done):
     assert [c["chosen"] for c in candidates] == [False, False, True]
 
 
-def test_everything_has_a_meaning_and_every_time_a_unit(done):
-    _, _, dataset = done
-    for name, variable in dataset.variables.items():
-        assert variable.attrs.get("long_name"), name
-        assert variable.attrs.get("units", "s") == "s" or "seconds" not in str(name)
-    assert set(dataset["rms_error"]["output_unit"].values) == {"m", "rad"}
-    assert "cell" not in dataset.attrs
-
-
 def test_the_choice_does_not_read_the_test_set(done, tmp_path, protocol_text):
     folder, _, dataset = done
     head = protocol_text[: protocol_text.index("[[test]]")]
@@ -172,20 +162,6 @@ def test_a_second_run_computes_nothing_and_processes_change_nothing(
     assert_same(files(folder), files(tmp_path))
 
 
-def test_a_protocol_that_was_renamed_is_the_same(done, tmp_path, monkeypatch):
-    folder, _, dataset = done
-    place = shutil.copytree(folder, tmp_path / "place")
-    (place / "small0.toml").rename(place / "renamed.toml")
-    (place / "mine.toml").write_text(f'title = "mine"\nstudies = ["{place}/renamed.toml"]\n')
-    for name in ("workers.evaluate", "timing.timed_tests"):
-        monkeypatch.setattr(f"vehiclemor.study.{name}", None)
-    again = run_studies(str(place / "mine.toml"), place)["renamed"]
-    xr.testing.assert_equal(again, dataset)
-    for name in ("test_set", "content"):
-        assert again.attrs[name] == dataset.attrs[name]
-    assert (place / "studies" / "renamed.nc").exists()
-
-
 def test_the_comparison_marks_the_winner_and_judges_it(done):
     folder, study, _ = done
     rows = study_comparison(study, folder)
@@ -228,18 +204,6 @@ def test_a_failed_run_is_a_row_with_its_reason(done):
     assert (row["score"], row["stable_share"]) == (np.inf, 0.8)
     assert (row["runs"], row["misses"], row["silent"], row["flagged"]) == (5, 1, 0, 1)
     assert first in row["failure"]
-
-
-def test_a_method_that_refuses_the_model_is_reported(tmp_path, protocol_text):
-    head = protocol_text[: protocol_text.index("[[methods]]")]
-    refused = '[[methods]]\nlabel = "mine"\nmethod = "slow_manifold"\n'
-    newton = protocol_text[protocol_text.index("[[methods]]") :].split("\n\n", maxsplit=1)[0]
-    dataset = run_studies(study_of(tmp_path, f"{head}{newton}\n\n{refused}"), tmp_path)["small0"]
-    rejected = dataset.sel(label="mine")
-    assert set(rejected["status"].values) == {"rejected"}
-    # Of a run that has failed nothing counts.
-    assert np.isnan(rejected["rms_error"]).all()
-    assert (rejected["iterations"] == 0).all()
 
 
 def test_protocols_of_one_name_stand_side_by_side(tmp_path, protocol_text):

@@ -10,12 +10,7 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.simulation import input_polynomials
-from vehiclemor.simulation.build import build
-from vehiclemor.study import evaluate
-from vehiclemor.study import scenario as scenario_module
 from vehiclemor.study.plans.choice import Validation, choose, outcomes, reasons
-from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import (
     load_protocol,
     protocol_names,
@@ -23,7 +18,6 @@ from vehiclemor.study.plans.protocol import (
     sampled_sets,
 )
 from vehiclemor.study.plans.study_file import Bound, Box, Draw
-from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 SAME_POINT = "f 1.01, a 1.435, equilibrium, 18.548 m/s"
@@ -45,22 +39,6 @@ def protocol(tmp_path_factory, protocol_text):
 # What the files of the package say
 
 
-def test_the_study_names_every_protocol(protocols):
-    assert sorted(load_studies("predictive")) == sorted(protocol_names().values())
-
-
-@pytest.mark.parametrize("name", VEHICLES)
-def test_training_reaches_as_far_as_what_is_drawn(protocols, name):
-    training, definition = protocols[name].sets["training"], protocols[name].definition
-    frequencies = [s.maneuver.frequency_factor for s in training]
-    largest = max(abs(s.maneuver.amplitude_factor) for s in training)
-    for box in definition.drawn.boxes:
-        assert min(frequencies) <= box.frequency[0]
-        assert max(frequencies) >= box.frequency[1]
-        assert largest >= box.amplitude[1]
-    assert largest < max(box.amplitude[1] for box in definition.drawn_outside.boxes)
-
-
 @pytest.mark.parametrize(
     ("name", "first", "digest"),
     [
@@ -78,47 +56,6 @@ def test_the_test_set_of_every_commit_and_machine(protocols, name, first, digest
     assert sets["drawn"][0].label == first
     labels = [run.label for runs in sets.values() for run in runs]
     assert hashlib.sha256("\n".join(labels).encode()).hexdigest()[:16] == digest
-
-
-def test_rows_and_what_they_learn_from(protocols):
-    entries = {e.label: e for e in protocols[VEHICLES[0]].entries}
-    names, tolerances = zip(*map(str.split, entries["ros34pw2"].row_labels), strict=True)
-    assert set(names) == {"ros34pw2"}
-    used = [settings["tolerance"] for settings in entries["ros34pw2"].candidates]
-    assert [float(tolerance) for tolerance in tolerances] == used
-    assert not any(".0e" in tolerance or "e-0" in tolerance for tolerance in tolerances)
-    assert entries["replay"].row_labels == ["replay"]
-    other = protocols[VEHICLES[1]]
-    (fixed,) = (e for e in other.entries if e.label == "fixed basis")
-    assert {s.maneuver.name for s in fixed.training} == {"rack_lane_change"}
-    assert len(fixed.training) < len(other.sets["training"])
-
-
-def test_another_speed_is_a_state_and_the_own_speed_a_name():
-    model = build(VEHICLES[0])
-    own, faster = (
-        Scenario.of("lane_change", (1.0, 1.0), "dropped", speed) for speed in (20.0, 26.0)
-    )
-    assert start_of(model, own) == "dropped"
-    assert isinstance(start_of(model, faster), np.ndarray)
-    run = training_run(model, replace(faster, start="equilibrium"))
-    speeds = run.at(np.array([0.0, 0.1])).outputs[:, model.outputs.index("longitudinal_speed")]
-    np.testing.assert_allclose(speeds, 26.0, rtol=1e-3)
-
-
-def test_what_all_rows_need_of_a_run_is_kept_until_the_next_row(protocols):
-    kept = (
-        input_polynomials._recorded,
-        input_polynomials._found_signal,
-        evaluate.kept_reference,
-        scenario_module._state_at,
-        scenario_module.input_hash,
-    )
-    for protocol in protocols.values():
-        draws = (protocol.definition.drawn, protocol.definition.drawn_outside)
-        runs = len(protocol.sets["test"]) + sum(draw.runs for draw in draws if draw)
-        # Of a smaller cache nothing would be left when the next row comes.
-        assert all(runs <= function.cache_parameters()["maxsize"] for function in kept)
 
 
 # Drawn runs

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from vehiclemor.errors import ConvergenceError
-from vehiclemor.inputs.signal import Signal
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study.evaluate import fresh_fit, kept_fit
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.failure import Failure
-from vehiclemor.study.scenario import Scenario, input_hash
+from vehiclemor.study.scenario import Scenario
 
 FAILING = 3
 SCENARIOS = (Scenario(component("maneuver", "lane_change"), "equilibrium"),)
@@ -93,10 +92,3 @@ def test_a_registered_maneuver_that_was_sent_is_the_same_again():
     assert sent(maneuver) == maneuver
     # Of two batches it is one, by which a worker finds what it has fitted.
     assert sent(maneuver) is sent(maneuver)
-
-
-def test_a_maneuver_of_ones_own_is_sent_whole(nominal):
-    own = replace(nominal, duration=2.0 * nominal.duration)
-    assert sent(own) == own != nominal
-    log = Signal.from_samples([0.0, 1.0, 2.0], [0.0, 0.1, 0.0], inputs="delta").perturbed(1.0, 2.0)
-    assert input_hash(sent(log)) == input_hash(log)

@@ -77,21 +77,6 @@ def test_a_run_of_the_training_is_marked_by_its_content(case):
     assert not vm.simulate(WISHBONE, training=training, maneuver=tested)["in_training"]
 
 
-@pytest.mark.parametrize(
-    ("changed", "marked"),
-    [
-        ({}, True),
-        ({"start": "dropped"}, True),
-        ({"training": "step_steer"}, False),
-        ({"training": Scenario(component("maneuver", "lane_change"), "dropped")}, False),
-    ],
-)
-def test_another_start_is_another_run(changed, marked):
-    # From the training alone: what it is tested on has the model's own parameters.
-    given = {"training": "nominal", "rank": 3} | changed
-    assert bool(vm.simulate(CAR, "fixed_basis", errors=False, **given)["in_training"]) is marked
-
-
 def test_the_models_own_parameters_are_the_same_run_and_others_are_refused():
     own = vm.model(WISHBONE).parameters.values()["tie_rod_inner"]
     told = Scenario(OWN, "equilibrium", None, (("tie_rod_inner", tuple(own.tolist())),))
@@ -143,21 +128,3 @@ def test_runs_of_the_training_are_marked_in_a_study_its_tables_and_pictures(tmp_
     for factor, name in ((1.0, "replay*"), (0.9, "replay")):
         (legend,) = vm.plot(dataset, amplitude_factor=factor).legends
         assert {name, "other"} <= {text.get_text() for text in legend.get_texts()}
-
-
-def test_training_of_the_command_line(capsys):
-    simulate = ["simulate", WISHBONE, "--method", "replay", "--training", "chirp_travel"]
-    assert main([*simulate, "--training", "nominal"]) == 0
-    assert "trained on this run" in capsys.readouterr().out
-    assert main(simulate) == 0
-    assert "trained on this run" not in capsys.readouterr().out
-
-
-def test_a_maneuver_by_its_name_and_factors_beside_its_own():
-    given = vm.maneuver("sine_travel", frequency=1.2, amplitude=0.8)
-    assert given == OWN.perturbed(1.2, 0.8)
-    run = vm.simulate(WISHBONE, maneuver=given, frequency=1.5, amplitude=0.5)
-    same = vm.simulate(WISHBONE, frequency=1.2 * 1.5, amplitude=0.8 * 0.5)
-    np.testing.assert_array_equal(run["outputs"], same["outputs"])
-    with pytest.raises(InputError, match="lane_change"):
-        vm.maneuver("lane_chnge")

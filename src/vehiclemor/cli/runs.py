@@ -8,8 +8,8 @@ from cyclopts import Parameter
 
 import vehiclemor as vm
 from vehiclemor.api import RESULTS
-from vehiclemor.cli.ending import FAILED
 from vehiclemor.cli.options import (
+    FAILED,
     ParameterFile,
     Parameters,
     Results,

@@ -257,10 +257,10 @@ def _unseen_parts(rows: list[Row]) -> list[Part]:
     title = "Reduced models on inputs that they were not trained on"
     title += f": of their targets {counted(targets)}" if targets else ""
     parts: list[Part] = [wrapped(f"{title}.")]
-    *protocols, last = _by(rows, "study").values()
+    protocols = list(_by(rows, "study").values())
     for own in protocols:
-        parts += _protocol_parts(_by(own, "kind"), explain=False)
-    return parts + _protocol_parts(_by(last, "kind"), explain=True)
+        parts += _protocol_parts(_by(own, "kind"), explain=own is protocols[-1])
+    return parts
 
 
 def _protocol_parts(rows: Mapping[str, list[Row]], explain: bool) -> list[Part]:

@@ -77,11 +77,6 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
     assert table([{"t": 2.5e-6}], micro).split() == ["time,", "us", "2.5"]
 
 
-def test_errors_of_outputs_have_headings_without_an_entry():
-    assert "pitch" in column("rms_pitch").heading
-    assert column("never_heard_of").heading == "never heard of"
-
-
 def test_a_simulation_prints_the_errors_of_each_output_and_a_dash_for_zero():
     run = vm.simulate("double_wishbone", "pod", rank=3)
     run["floor_rms_error"].loc["toe"] = 0.0

@@ -56,11 +56,3 @@ def test_defaults_follow_the_kind():
         assert default_rank(coordinates) == rank
     assert tabled_outputs(PLAIN) == tuple(output.name for output in PLAIN.outputs)
     assert main_outputs(PLAIN) == ("angle", "tracked", "angular_speed")
-
-
-def test_outputs_are_those_that_a_model_declares():
-    chosen = replace(PLAIN, tabled_outputs=("tracked",))
-    assert tabled_outputs(chosen) == main_outputs(chosen) == ("tracked",)
-    chosen = replace(PLAIN, main_outputs=("tracked",))
-    assert main_outputs(chosen) == ("tracked",)
-    assert tabled_outputs(chosen) == tabled_outputs(PLAIN)
