@@ -10,7 +10,6 @@ import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.cli.app import COMMANDS
 from vehiclemor.cli.options import key_values
-from vehiclemor.codegen import cache, derivation
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component, names
 from vehiclemor.report.description import SCHEMAS
@@ -152,14 +151,3 @@ def test_the_schema_of_a_file_has_every_key(name):
         for row, field in zip(shown[title], part.model_fields.values(), strict=True):
             assert row["meaning"] == (field.description or "")
             assert (row["default"] == "required") is field.is_required()
-
-
-def test_a_model_that_was_not_derived_is_shown_without_deriving_it(monkeypatch, tmp_path):
-    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(derivation, "cache_folder", lambda: tmp_path)
-    starts = {name: vm.describe(name)["starts"] for name in names("model")}
-    assert starts["independent_suspension_vehicle"] == ["equilibrium", "dropped"]
-    assert starts["high_fidelity_vehicle"] == ["known once the model has been simulated"]
-    assert "pod" in vm.describe("high_fidelity_vehicle")["methods"]
-    assert {row["accepted"] for row in vm.describe("slow_manifold")["models"]} == {"no", "?"}
-    assert list(tmp_path.iterdir()) == []

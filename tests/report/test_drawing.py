@@ -220,19 +220,6 @@ def test_what_cannot_be_drawn_is_refused(results, study, drawn, word):
         vm.plot(results[study], **drawn)
 
 
-def test_pictures_need_a_point_a_method_and_outputs(results):
-    starts, study = results["figures-2-4"], results["figure-11"].isel(rank=0)
-    alone = study.sel({"label": ["full_order"]})
-    without = study.isel(output=slice(0)), study.drop_vars("signal_range")
-    kinds = {"histories": [starts], "errors": [alone, *without]}
-    for kind, lacking in kinds.items():
-        for dataset in lacking:
-            with pytest.raises(InputError):
-                plot_result(dataset, None, kind)
-    with pytest.raises(InputError, match="jobs"):
-        vm.figures(["5"], jobs=10**39)
-
-
 FACTOR = {"frequency_factor": [0.8, 1.0, 1.2, 1.4]}
 MANY = {"rank": [*range(1, 9)]}
 

@@ -128,7 +128,7 @@ def test_targets_tell_detected_misses_and_full_order_within_the_bounds(made):
     assert won["within"] == full["label"]
     targets = target_rows(dataset, protocol, [full, won | {"misses": 3, "silent": 1}])
     found = {row["item"]: row["measured"] for row in targets}
-    assert (found["silent misses"], found["flagged misses"]) == (1, 2)
+    assert (found["undetected failures"], found["failures with a warning"]) == (1, 2)
     wrong = dataset.copy(deep=True)
     wrong["rms_error"].loc[{"label": full["label"]}] = 1.0
     assert [row["within"] for row in method_rows(wrong, protocol)] == ["", ""]

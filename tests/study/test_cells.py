@@ -16,7 +16,7 @@ from vehiclemor.study import provenance
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set
-from vehiclemor.study.scenario import Scenario, start_of, training_run
+from vehiclemor.study.scenario import Scenario
 
 CAR = "independent_suspension_vehicle"
 HEAVY = (("sprung_mass", 1500.0), ("initial_speed", 25.0))
@@ -102,16 +102,6 @@ def test_a_method_that_fits_others_has_their_source_in_its_key(vehicle, monkeypa
     assert code("guarded") != before["guarded"]
 
 
-def test_a_bug_of_a_plug_in_model_in_the_reference_spoils_only_its_cell(cell, model, monkeypatch):
-    def broken(*_):
-        raise ZeroDivisionError("in a plug-in")
-
-    monkeypatch.setattr(type(model), "simulate", broken)
-    dataset = evaluate(cell)
-    assert dataset["status"].item() == "error"
-    assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
-
-
 def test_a_run_is_measured_the_same_way_in_grids_and_protocols(vehicle):
     tests = [
         Scenario.of("lane_change", (1.0, amplitude), "equilibrium", 20.0) for amplitude in (1, 1.5)
@@ -161,19 +151,6 @@ def test_of_a_run_that_has_failed_nothing_counts_in_a_protocol(model):
 
 
 # Runs of other cars
-
-
-def test_a_run_of_another_car_is_that_of_a_model_made_with_its_parameters(vehicle):
-    alone = vm.model(CAR, dict(HEAVY))
-    change = Scenario.of("lane_change", (1.0, 1.0), "dropped", None, HEAVY)
-    run = training_run(vehicle, change).recorded()
-    expected = alone.simulate(component("maneuver", "lane_change"), "dropped")
-    np.testing.assert_array_equal(run.states, expected.states)
-    # It stands lower on its springs, and starts faster.
-    assert not np.array_equal(alone.start("dropped"), vehicle.start("dropped"))
-    own = vm.model(CAR, dict(HEAVY) | {"initial_speed": 31.0})
-    faster = dataclasses.replace(change, speed=31.0)
-    np.testing.assert_array_equal(start_of(vehicle, faster), own.start("dropped"))
 
 
 def test_a_method_is_not_used_on_a_model_that_it_was_not_trained_on(model):

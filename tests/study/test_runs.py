@@ -40,7 +40,7 @@ from vehiclemor.study.netcdf_file import write_dataset
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.workers import KILLED, TRIES, Done, batch_size, evaluate_and_store
+from vehiclemor.study.workers import KILLED, TRIES, Done, batch_size
 
 GRID = """
 training = "nominal"
@@ -111,16 +111,6 @@ def test_two_drivers_at_once_give_the_same_dataset(study, alone, tmp_path):
     assert [driver.wait(timeout=240) for driver in drivers] == [0, 0]
     assert not list(tmp_path.rglob(f"{TEMPORARY}*"))
     assert_same(alone, run_studies(str(study), tmp_path)["small"])
-
-
-def test_what_another_driver_has_stored_is_not_computed_again(study, tmp_path):
-    (definition,) = load_studies(str(study)).values()
-    batch = list(expand("small", definition).experiments.values())[:2]
-    (tmp_path / "cells").mkdir()
-    evaluate_and_store(batch[:1], tmp_path)
-    before = stored(tmp_path)
-    assert evaluate_and_store(batch, tmp_path).finished == [e.key for e in batch]
-    assert before.items() < stored(tmp_path).items()
 
 
 def test_workers_end_with_a_run_and_one_that_is_killed_is_replaced(study, tmp_path, caplog):

@@ -208,10 +208,9 @@ def test_of_two_studies_of_one_name_the_last_is_stored_and_told(place, computed,
     assert len(computed) == 1
 
 
-def test_a_study_that_was_renamed_is_the_same(place, computed, monkeypatch):
+def test_a_study_that_was_renamed_is_combined_again(place, computed):
     path = (place / "small.toml").rename(place / "renamed.toml")
     before = reread(place)
-    monkeypatch.setattr("vehiclemor.study.run.combined", None)
     after = run_studies(str(path), place / "out")["renamed"]
     xr.testing.assert_equal(after.drop_vars(TIMED), before)
     assert after.attrs["study"] == "renamed"

@@ -1,12 +1,11 @@
 """What the paper prints: its numbers and claims, each with its place; and how to cite."""
 
-from collections import Counter
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from vehiclemor.registry import component, names
 from vehiclemor.resources import data_folder
@@ -44,15 +43,6 @@ class Number(Printed):
     control_period: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     snapshots: Count | None = None
     note: Line | None = None
-
-    @model_validator(mode="after")
-    def _in_range(self) -> "Number":
-        if self.kind == "rms_error" and not (self.value > 0.0 and self.quantity):
-            raise ValueError(f"{self.id}: an rms_error is positive and names its quantity")
-        # A percentage left as it is printed (65 instead of 0.65) ends here.
-        if self.kind == "time_reduction" and not (0.0 < self.value < 1.0 and self.unit == "1"):
-            raise ValueError(f"{self.id}: a time_reduction is between 0 and 1, in unit '1'")
-        return self
 
 
 class Measured(FileSchema):
@@ -93,13 +83,6 @@ class Published(FileSchema):
     def claims(self) -> dict[str, Claim]:
         """Id -> claim, in the order of the file."""
         return {claim.id: claim for claim in self.claim}
-
-    @model_validator(mode="after")
-    def _ids_once(self) -> "Published":
-        ids = Counter(entry.id for entry in (*self.number, *self.claim))
-        if twice := [key for key, times in ids.items() if times > 1]:
-            raise ValueError(f"id {twice[0]!r} occurs twice")
-        return self
 
 
 @cache

@@ -14,7 +14,7 @@ import json
 import logging
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -222,11 +222,9 @@ def stored(
     sources: Callable[[], Iterable[Path]] = list,
     content: str = "",
 ) -> xr.Dataset:
-    """What is stored for this key, here or under another name, else what `make` gives.
+    """What is stored for this key, else what `make` gives, which is then stored.
 
-    The results of a study are then stored at `path`, in the place of those of another study of that
-    name, which can be combined again.  Where the file is tells the encoding `source` of what is
-    returned.
+    That takes the place of the results of another study of that name, which can be combined again.
 
     Parameters
     ----------
@@ -235,34 +233,23 @@ def stored(
     sources
         Files that it is made from; it is made again if one is missing, or a bug has ended a run.
     content
-        Hash of what a study file says: a file that was renamed is still the same study.
+        Hash of what a study file says.
     """
-    dataset = next(_current(path, attribute, key, sources), None)
-    if dataset is not None and (not content or dataset.encoding["source"] == str(path)):
-        return dataset
-    make_folder(path.parent)
     held = global_attributes(path)
+    if held.get(attribute) == key and all(source.exists() for source in sources()):
+        dataset = read_dataset(path, "source", "vehiclemor")
+        # What a bug has ended is tried again.
+        if "status" not in dataset or "error" not in dataset["status"].values:
+            dataset.encoding["source"] = str(path)
+            return dataset
+    make_folder(path.parent)
     if path.exists() and held.get("source") != "vehiclemor":
         quarantine(path, path.parent, "not as it was written, or no result of this package")
-    dataset = make() if dataset is None else dataset
-    dataset = dataset.assign_attrs({attribute: key})
+    dataset = make().assign_attrs({attribute: key})
     if content:
-        dataset = dataset.assign_attrs(study=path.stem, content=content)
+        dataset = dataset.assign_attrs(content=content)
         if held.get("content", content) != content:
             _LOG.info("%s: in the place of the results of another %s.toml", path, path.stem)
     write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset
-
-
-def _current(
-    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
-) -> Iterator[xr.Dataset]:
-    """What is stored for a key, at this path or beside it: its study may have been renamed."""
-    for place in (path, *sorted(path.parent.glob("[!.]*.nc"))):
-        if global_attributes(place).get(attribute) == key and all(p.exists() for p in sources()):
-            dataset = read_dataset(place, "source", "vehiclemor")
-            dataset.encoding["source"] = str(place)
-            # What a bug has ended is tried again.
-            if "status" not in dataset or "error" not in dataset["status"].values:
-                yield dataset
