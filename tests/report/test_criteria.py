@@ -91,55 +91,54 @@ def amplitude_worse(dataset):
     dataset["rms_error"] = dataset["rms_error"] + 1.0
 
 
-COARSE = off("pitch", variable="floor_rms_error")
 NO_CALL_SAVED = same("rhs_calls", "control_period", 0.5, 2.5)
-COUNTEREXAMPLES = [
-    ("hfv_fig10_one_state_excellent", "figures-9-10", off("vertical_speed", rank=1)),
-    ("hfv_fig10_one_state_excellent", "figures-9-10", diverged(rank=1)),
-    ("gv_fig3_closely_matches", "figures-2-4", off("yaw")),
-    ("gv_fig3_closely_matches", "figures-2-4", diverged(rank=3)),
-    ("gv_three_states_suffice", "figures-2-4", COARSE),
-    (
-        "gv_control_periods_sharpen_basis",
-        "vehicle-control-period",
-        same("floor_rms_error", "control_period", 5.0, 0.5),
+SAME_FLOOR = same("floor_rms_error", "control_period", 5.0, 0.5)
+PERIOD, QUANTITIES = "vehicle-control-period", ("figure-13-frequency", "figure-13-amplitude")
+# Claim -> study, and what in it would refute the claim.
+COUNTEREXAMPLES = {
+    "hfv_fig10_one_state_excellent": (
+        "figures-9-10",
+        [off("vertical_speed", rank=1), diverged(rank=1)],
     ),
-    ("gv_longer_period_saves_time", "vehicle-control-period", NO_CALL_SAVED),
-    ("dw_fig6_nearly_identical", "figures-6-7", off(ANGLE, 0.02)),
-    ("dw_fig6_nearly_identical", "figures-6-7", off(DISPLACEMENT, 0.02)),
-    ("dw_fig11_displacement_unaffected", "figure-11", off(DISPLACEMENT)),
-    ("dw_fig11_angle_diverges_at_end", "figure-11", history(0.0)),
-    ("dw_fig11_angle_diverges_at_end", "figure-11", history(2.0 * VISIBLE, slice(0.0, 1.0))),
-    (
-        "dw_fig11_shorter_period_reduces_deviation",
+    "gv_fig3_closely_matches": ("figures-2-4", [off("yaw"), diverged(rank=3)]),
+    "gv_three_states_suffice": ("figures-2-4", [off("pitch", variable="floor_rms_error")]),
+    "gv_control_periods_sharpen_basis": (PERIOD, [SAME_FLOOR]),
+    "gv_longer_period_saves_time": (PERIOD, [NO_CALL_SAVED]),
+    "dw_fig6_nearly_identical": ("figures-6-7", [off(ANGLE, 0.02), off(DISPLACEMENT, 0.02)]),
+    "dw_fig11_displacement_unaffected": ("figure-11", [off(DISPLACEMENT)]),
+    "dw_fig11_angle_diverges_at_end": (
+        "figure-11",
+        [history(0.0), history(2.0 * VISIBLE, slice(0.0, 1.0))],
+    ),
+    "dw_fig11_shorter_period_reduces_deviation": (
         "figure-11-control-period",
-        put("rms_error", 1.0, control_period=1.0),
+        [put("rms_error", 1.0, control_period=1.0)],
     ),
-    ("dw_fig12_no_divergence", "figure-12", off(ANGLE)),
-    ("dw_fig13_not_monotone_frequency", "figure-13-frequency", rising("frequency_factor")),
+    "dw_fig12_no_divergence": ("figure-12", [off(ANGLE)]),
     # A fall too small to matter is none.
-    ("dw_fig13_not_monotone_frequency", "figure-13-frequency", rising("frequency_factor", 0.995)),
-    ("dw_fig13_not_monotone_amplitude", "figure-13-amplitude", rising("amplitude_factor")),
-    (
-        "dw_fig13_angle_more_sensitive",
-        "figure-13-frequency",
-        put("rms_error", 1.0, output=DISPLACEMENT),
+    "dw_fig13_not_monotone_frequency": (
+        QUANTITIES[0],
+        [rising("frequency_factor"), rising("frequency_factor", 0.995)],
     ),
-    ("dw_fig14_three_states_fail", "figure-14", off(ANGLE, 0.0)),
-    ("dw_fig14_six_states_follow", "figure-14-spread", one_rounding(1.0)),
-    ("dw_fig14_six_states_follow", "figure-14-spread", one_rounding(np.nan)),
-    ("dw_more_robust_to_amplitude", "figure-13-amplitude", amplitude_worse),
-    ("all_may_deviate", "figure-14", off(ANGLE, 0.0)),
-    ("all_three_equation_kinds", "figures-2-4", diverged(rank=3)),
-    ("all_follow_precisely", "figures-6-7", off(ANGLE)),
-    ("all_accuracy_buys_time", "vehicle-control-period", NO_CALL_SAVED),
-]
+    "dw_fig13_not_monotone_amplitude": (QUANTITIES[1], [rising("amplitude_factor")]),
+    "dw_fig13_angle_more_sensitive": (QUANTITIES[0], [put("rms_error", 1.0, output=DISPLACEMENT)]),
+    "dw_fig14_three_states_fail": ("figure-14", [off(ANGLE, 0.0)]),
+    "dw_fig14_six_states_follow": ("figure-14-spread", [one_rounding(1.0), one_rounding(np.nan)]),
+    "dw_more_robust_to_amplitude": (QUANTITIES[1], [amplitude_worse]),
+    "all_may_deviate": ("figure-14", [off(ANGLE, 0.0)]),
+    "all_three_equation_kinds": ("figures-2-4", [diverged(rank=3)]),
+    "all_follow_precisely": ("figures-6-7", [off(ANGLE)]),
+    "all_accuracy_buys_time": (PERIOD, [NO_CALL_SAVED]),
+}
 
 
-@pytest.mark.parametrize(("claim", "study", "change"), COUNTEREXAMPLES)
-def test_a_criterion_fails_on_a_counterexample(judged, claim, study, change):
+@pytest.mark.parametrize("claim", COUNTEREXAMPLES)
+def test_a_criterion_fails_on_a_counterexample(judged, claim):
+    study, changes = COUNTEREXAMPLES[claim]
     label, *_ = CRITERIA[claim].variants
-    assert not CRITERIA[claim](changed(judged, study, change), label).within
+    assert study in CRITERIA[claim].studies
+    for change in changes:
+        assert not CRITERIA[claim](changed(judged, study, change), label).within
     if claim not in MISSED_ANYWAY:
         assert CRITERIA[claim](judged, label).within
 
@@ -147,9 +146,7 @@ def test_a_criterion_fails_on_a_counterexample(judged, claim, study, change):
 def test_every_criterion_has_a_counterexample_and_a_claim():
     # Those that need no study measure subspaces.
     needed = {claim for claim, own in CRITERIA.items() if own.studies}
-    assert {claim for claim, _, _ in COUNTEREXAMPLES} == needed
-    for claim, study, _ in COUNTEREXAMPLES:
-        assert study in CRITERIA[claim].studies
+    assert set(COUNTEREXAMPLES) == needed
     assert {s for own in CRITERIA.values() for s in own.studies} <= set(load_studies("paper"))
     assert set(CRITERIA) <= set(load_published().claims)
 

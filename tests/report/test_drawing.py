@@ -11,8 +11,7 @@ from tests.report.figure_texts import checked, varied
 from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.report.figures import result_plot, theme
-from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
-from vehiclemor.report.labels import readable_unit
+from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.study.netcdf_file import read_dataset
 
 ENDS = ("ok", "untrusted", "diverged", "rejected", "unreachable", "error", "exact")
@@ -179,28 +178,6 @@ def test_errors_are_drawn_over_what_is_not_chosen(folder):
     lines = {line.get_label(): line for line in curve.lines}
     place = {"label": "ok_0", "amplitude_factor": 1.2, "output": "second_euler_angle"}
     np.testing.assert_array_equal(lines["ok 0"].get_ydata(), data["rms_error"].sel(place).squeeze())
-
-
-def test_a_picture_shows_both_runs_and_their_difference(results):
-    run = results["figures-6-7"].sel({"label": "pod", "rank": 3}).squeeze(drop=False)
-    figure = checked(plot_result(run))
-    upper, lower = figure.axes[0], figure.axes[2]
-    angle = run.sel(output="second_euler_angle")
-    full, reduced = angle["reference_outputs"], angle["outputs"]
-    for line, outputs in zip(upper.lines, (full, reduced), strict=False):
-        np.testing.assert_array_equal(line.get_ydata(), 1e3 * outputs)
-    assert "mrad" in upper.get_ylabel()
-    factor, unit = readable_unit(float(abs(full - reduced).max()), "rad")
-    np.testing.assert_allclose(lower.lines[0].get_ydata(), factor * (reduced - full), atol=1e-9)
-    assert unit in lower.get_ylabel()
-    (shade,) = (p for p in lower.patches if "best approximation" in p.get_label())
-    best = factor * angle["floor_rms_error"].item()
-    assert shade.get_height() == pytest.approx(2.0 * best)
-    others = [name for name in run["output"].values if name not in shown_outputs(run)]
-    assert plot_result(run.sel(output=others)).axes[0].get_ylabel().startswith("spindle disp")
-    point = results["figures-2-4"].sel(start="dropped")
-    for kind in ("histories", "paths", "errors"):
-        assert checked(plot_result(point, None, kind)).get_suptitle()
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,9 @@ import json
 import re
 from xml.etree import ElementTree
 
-import pandas as pd
 import pytest
 
-import vehiclemor as vm
 from vehiclemor.cli import main
-from vehiclemor.report import page
 from vehiclemor.report.unseen import method_rows, protocol_of, target_rows
 from vehiclemor.study.netcdf_file import read_dataset
 
@@ -132,23 +129,3 @@ def test_targets_tell_detected_misses_and_full_order_within_the_bounds(made):
     wrong = dataset.copy(deep=True)
     wrong["rms_error"].loc[{"label": full["label"]}] = 1.0
     assert [row["within"] for row in method_rows(wrong, protocol)] == ["", ""]
-
-
-def test_the_paper_is_judged(made, monkeypatch):
-    rows = pd.DataFrame(
-        {
-            "id": ["a", "b"],
-            "model": "m",
-            "item": ["that it holds", "that it does not"],
-            **dict.fromkeys(("variant", "measure", "reason", "threshold_source"), "x"),
-            **dict.fromkeys(("published", "bound", "reproduced", "floor", "replay"), 0.5),
-            "unit": "1",
-            "verdict": ["missed", "not_comparable"],
-        }
-    )
-    monkeypatch.setattr(page, "paper_comparison", lambda *_: rows)
-    monkeypatch.setattr(page, "run_studies", lambda *_: {})
-    out = vm.write_report("paper", made[0] / "paper.html", made[0])
-    read = parsed(out.read_text(encoding="utf-8"))
-    verdicts = [row["verdict"] for row in table(read, "settings") if "verdict" in row]
-    assert verdicts == ["missed", "not comparable"]

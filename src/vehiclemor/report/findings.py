@@ -36,7 +36,7 @@ Results = Mapping[str, xr.Dataset]
 class Finding(NamedTuple):
     """Outcome of one criterion: the number that decides, its bound, and whether it is met.
 
-    That is None if it can't be told.  `measure` says what the number is, `reason` what else was
+    That is None if it can't be judged.  `measure` says what the number is, `reason` what else was
     seen, `threshold_source` whose the bound is.  An error has beside it that of the best
     approximation in the subspaces (`floor`) and the RMS of the signal (a bound above that is empty:
     zero would meet it); a time the time over that of the `strongest` full-order solver.
@@ -127,6 +127,6 @@ def scatter(spreads: Mapping[str, float]) -> str:
 
 
 def counted(verdicts: Iterable[str]) -> str:
-    """How many rows there are of each verdict, in words."""
+    """How many rows there are of each verdict, as text."""
     found = list(verdicts)
-    return ", ".join(f"{found.count(v)} {words}" for v, words in VERDICTS.items() if v in found)
+    return ", ".join(f"{found.count(v)} {text}" for v, text in VERDICTS.items() if v in found)

@@ -84,13 +84,13 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     and evaluations are medians.
     """
     attributes = {key: str(dataset.attrs[key]) for key in ("study", "title", "model", "training")}
-    head = {"kind": ERRORS, **attributes, "grid": _grid_words(dataset)}
+    head = {"kind": ERRORS, **attributes, "grid": _grid_text(dataset)}
     count = EVALUATIONS[component("model", head["model"]).kind]
-    told = dataset.assign(
+    extended = dataset.assign(
         warned=warned_runs(dataset), trained=trained_runs(dataset), evaluations=dataset[count]
     )
     kept = ["rms_error", "floor_rms_error", "cell_key", "status", "message"]
-    runs: Any = frame(told, [*kept, *MEDIANS, "effective_rank", "warned", "trained"])
+    runs: Any = frame(extended, [*kept, *MEDIANS, "effective_rank", "warned", "trained"])
     rows: list[dict[str, Any]] = []
     for start, label in itertools.product(dataset["start"].values, dataset["label"].values):
         own = runs[(runs["start"] == start) & (runs["label"] == label)]
@@ -144,19 +144,19 @@ def _median(values: Any) -> float:
     return float(values[np.isfinite(values.astype(float))].median())
 
 
-def _grid_words(dataset: xr.Dataset) -> str:
+def _grid_text(dataset: xr.Dataset) -> str:
     """The grid's dimensions with their values, and the ranges of a sample."""
-    words = []
+    parts = []
     for name in (d for d in map(str, dataset["status"].dims) if d not in ("label", "start")):
         values = [f"{v:g}" if isinstance(v, float) else str(v) for v in dataset[name].values]
         if len(values) > 8:
-            words.append(f"{name} {values[0]} to {values[-1]} ({len(values)})")
+            parts.append(f"{name} {values[0]} to {values[-1]} ({len(values)})")
         elif values != ["1"]:
-            words.append(f"{name} {', '.join(values)}")
+            parts.append(f"{name} {', '.join(values)}")
     for name, values in dataset.coords.items():
         if values.dims == ("sample",) and name != "sample":
-            words.append(f"{name} {float(values.min()):.4g} to {float(values.max()):.4g}")
-    return "; ".join(words)
+            parts.append(f"{name} {float(values.min()):.4g} to {float(values.max()):.4g}")
+    return "; ".join(parts)
 
 
 def warned_runs(dataset: xr.Dataset) -> xr.DataArray:
@@ -168,12 +168,12 @@ def warned_runs(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def counted_ends(dataset: xr.Dataset) -> str:
-    """How the runs of a study have ended; a cell that stands at several places counts once."""
-    # A protocol's runs have no cells of their own.
-    told = dataset.assign(
+    """How the runs of a study have ended; a run that stands at several points counts once."""
+    # A protocol's runs have no files of their own.
+    extended = dataset.assign(
         warned=(dataset["status"] == "ok") & warned_runs(dataset), trained=trained_runs(dataset)
     )
-    runs: Any = frame(told, ["status", "cell_key", "warned", "trained"])
+    runs: Any = frame(extended, ["status", "cell_key", "warned", "trained"])
     runs = runs.drop_duplicates("cell_key") if "cell_key" in runs else runs
     trained = int(runs["trained"].sum())
     note = f"; {trained} trained on the tested run" if trained else ""

@@ -116,7 +116,7 @@ def _studies_of(name: str, folder: Path) -> list[str]:
 
 
 def _stored(folder: Path, left_out: dict[str, str]) -> dict[str, xr.Dataset]:
-    """All combined datasets of studies that are stored; `left_out` is told what can't be read."""
+    """All combined datasets of studies that are stored; in `left_out` what can't be read."""
     found: dict[str, xr.Dataset] = {}
     for path in sorted((folder / "studies").glob("*.nc")):
         try:
@@ -178,11 +178,11 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
 
 
 def error_table(dataset: xr.Dataset) -> pd.DataFrame:
-    """Errors of every run of a study, with its status and cell."""
+    """Errors of every run of a study, with its status and file."""
     units = {output: unit_of(dataset, output) for output in shown_outputs(dataset)}
     heads = {f"rms_error.{o}": f"RMS error of {o} ({unit})" for o, unit in units.items()}
-    told = dataset.assign(warned=warned_runs(dataset), trained=trained_runs(dataset))
-    runs: Any = frame(told).rename(columns=heads)
+    extended = dataset.assign(warned=warned_runs(dataset), trained=trained_runs(dataset))
+    runs: Any = frame(extended).rename(columns=heads)
     said = runs["message"] + runs["remark"].where(runs["warned"] & (runs["status"] == "ok"), "")
     marks = runs["trained"].map({True: f" ({TRAINED})", False: ""})
     status = runs["status"] + marks + said.map(lambda text: f": {text}" if text else "")

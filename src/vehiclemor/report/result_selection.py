@@ -59,7 +59,7 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
             raise InputError(f"a single run has no dimension to choose, such as {quoted(key)}")
         if key not in grid:
             raise unknown("dimension of the result", key, grid)
-    words = []
+    parts = []
     # A grid has methods; what has none, such as a timing, is refused where it is drawn.
     for dimension in grid if "label" in grid else ():
         values = dataset[dimension].values.tolist()
@@ -74,8 +74,8 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
             raise InputError(f"{dimension} is {quoted(value)}, not one of {known}")
         dataset = dataset.isel({dimension: places[0]})
         if len(values) > 1:
-            words.append(f"{dimension} {value}")
-    return dataset, ", ".join(words)
+            parts.append(f"{dimension} {value}")
+    return dataset, ", ".join(parts)
 
 
 @xr.register_dataset_accessor("vehiclemor")

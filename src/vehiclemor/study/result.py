@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Length (s) from the start within which the largest value of every output is stored.
 FIRST_SECONDS = 10.0
-# Time (s) after which the smallest value of every output is stored: a dropped car has landed.
+# Time (s) after which the smallest value of every output is stored: a dropped vehicle has landed.
 LANDED = 1.0
 
 

@@ -27,6 +27,8 @@ from vehiclemor.study.workers import Workers, cluster
 if TYPE_CHECKING:
     import xarray as xr
 
+# Grids of so many points are announced before they are expanded.
+LARGE = 10_000
 LATER = "then the chosen ones are tested"
 # What differs from run to run of one reason.
 NUMBER = re.compile(r"-?\d[\d.e+-]*")
@@ -91,7 +93,9 @@ def _plans(study: str, seed: int | None) -> list[Grid | Protocol]:
         if definition.bounds:
             plans.append(load_protocol(str(path), seed if definition.drawn else None, name))
         else:
-            with telling(f"{name}: checking {definition.points} grid points"):
+            large = definition.points >= LARGE
+            text = f"{name}: checking {definition.points} grid points"
+            with telling(text) if large else nullcontext():
                 plans.append(expand(name, definition))
     return plans
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 QUARANTINE = "quarantine"
-ENDING, SCHEMA = ".safetensors", "vehiclemor cell 3"
+ENDING, SCHEMA = ".safetensors", "vehiclemor run 4"
 # Bytes that say how long the header is; and where the hash stands, for which there are zeros while
 # it is computed.
 PREFIX, HASH, ZEROS = 8, '"sha256":"{}"', "0" * 64

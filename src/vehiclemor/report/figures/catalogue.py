@@ -116,10 +116,10 @@ def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
             draw="pareto" if study.bounds else "result",
             studies=[path.stem if data_folder() in path.parents else str(path)],
             datasets=[name],
-            caption=f"{study.title}: {words}.",
+            caption=f"{study.title}: {content}.",
             options={} if study.bounds else {"kind": kind},
         )
-        for kind, words in kinds.items()
+        for kind, content in kinds.items()
     ]
 
 

@@ -75,7 +75,7 @@ def figure_errors(
             errors = errors.max(rest)
             lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
             notes += [f"{dataset.sizes[axis]} samples"] if sampled else []
-            notes += [f"the largest error over {_words(rest)}"] if rest else []
+            notes += [f"the largest error over {_listed(rest)}"] if rest else []
         if mapped:
             notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
             figure = _map(dataset, errors, methods, outputs, shown)
@@ -106,8 +106,8 @@ def _finish(
     held = [labels.trained_runs(dataset).sel(label=list(methods)) for dataset in results.values()]
     count, size = sum(int(runs.sum()) for runs in held), sum(runs.size for runs in held)
     trained = f"{count} of {size} runs were in their own training" if count else ""
-    if words := "\n".join(filter(None, (", ".join(notes), trained))):
-        figure.suptitle(words, fontsize="medium")
+    if text := "\n".join(filter(None, (", ".join(notes), trained))):
+        figure.suptitle(text, fontsize="medium")
     theme.legend_below(figure, figure.axes)
     return figure
 
@@ -133,7 +133,7 @@ def _varied(dataset: xr.Dataset) -> list[str]:
     return sorted(names, key=order, reverse=True)
 
 
-def _words(dimensions: Sequence[str]) -> str:
+def _listed(dimensions: Sequence[str]) -> str:
     *head, last = (d.removeprefix(PARAMETER).replace("_", " ") for d in dimensions)
     return f"{', '.join(head)} and {last}" if head else last
 
@@ -146,13 +146,13 @@ def _lines(errors: xr.DataArray, methods: Mapping[str, str], others: Sequence[st
         own = [d for d in others if not bool((line == line.isel({d: 0})).all())]
         line = line.isel({d: 0 for d in others if d not in own}, drop=True)
         for place in itertools.product(*(line[d].values.tolist() for d in own)):
-            words = []
+            parts = []
             for name, value in zip(own, place, strict=True):
                 unit = str(errors[name].attrs.get("units", "")).removesuffix("1")
                 shown = value if isinstance(value, str) else f"{value:g}"
-                words.append(f"{_words([name])} {shown} {unit}".rstrip())
+                parts.append(f"{_listed([name])} {shown} {unit}".rstrip())
             chosen = line.sel(dict(zip(own, place, strict=True)))
-            found[", ".join([label, *words])] = ", ".join([text, *words]), chosen
+            found[", ".join([label, *parts])] = ", ".join([text, *parts]), chosen
     return found
 
 
@@ -168,7 +168,7 @@ def _sampled(dataset: xr.Dataset, sample: str) -> list[Places]:
 
     names = sorted(names, key=follows, reverse=True)[:SAMPLED]
     found = [places_of(dataset, name) for name in names]
-    return found or [Places(np.arange(len(ranks)), f"{_words([sample])}, {SORTED}")]
+    return found or [Places(np.arange(len(ranks)), f"{_listed([sample])}, {SORTED}")]
 
 
 def _draw_panel(

@@ -245,9 +245,9 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> None:
     hide_rounding(axis)
     axis.set_ylim(bottom=min([axis.get_ylim()[0], *(0.5 * rms for rms in marked)]))
     tick_decades(axis.yaxis, *axis.get_ylim())
-    words = f"largest error of {labels.label_of(output).symbol}"
-    words = words if len(words) <= LINE else words.replace(" of ", "\nof ", 1)
-    axis.set_ylabel(f"{words}\nin each {period:.2g} s ({labels.unit_of(runs.full, output)})")
+    label = f"largest error of {labels.label_of(output).symbol}"
+    label = label if len(label) <= LINE else label.replace(" of ", "\nof ", 1)
+    axis.set_ylabel(f"{label}\nin each {period:.2g} s ({labels.unit_of(runs.full, output)})")
 
 
 DRAWN: Mapping[str, Callable[[Axes, Runs, str], None]] = {

@@ -129,13 +129,13 @@ class Places(NamedTuple):
 
 def places_of(dataset: xr.Dataset, name: str) -> Places:
     """Places of a dimension of a grid, or of a coordinate on one."""
-    values, words = dataset[name].values, name.removeprefix(PARAMETER).replace("_", " ")
+    values, text = dataset[name].values, name.removeprefix(PARAMETER).replace("_", " ")
     if name in FACTORS:
-        return Places(100.0 * (values - 1.0), f"{words.removesuffix(' factor')} perturbation (%)")
+        return Places(100.0 * (values - 1.0), f"{text.removesuffix(' factor')} perturbation (%)")
     if not np.issubdtype(values.dtype, np.number):
-        return Places(np.arange(len(values)), words, [str(value) for value in values])
+        return Places(np.arange(len(values)), text, [str(value) for value in values])
     unit = str(dataset[name].attrs.get("units", UNITS.get(name, "1")))
-    return Places(values, words if unit == "1" else f"{words} ({unit})")
+    return Places(values, text if unit == "1" else f"{text} ({unit})")
 
 
 def tick_decades(axis: Axis, low: float, high: float) -> None:
@@ -180,8 +180,8 @@ def tell_empty(figure: Figure) -> None:
         lines = [line for line in axis.lines if line.get_transform() == axis.transData]
         points = [found for line in lines if np.size(found := line.get_xydata())]
         if points and not any(np.isfinite(found).all(axis=1).any() for found in points):
-            words = f"no finite values{' above 0' if axis.get_yscale() == 'log' else ''}"
-            axis.text(0.5, 0.5, words, ha="center", va="center", transform=axis.transAxes)
+            text = f"no finite values{' above 0' if axis.get_yscale() == 'log' else ''}"
+            axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes)
 
 
 def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[None]:

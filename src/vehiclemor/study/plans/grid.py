@@ -137,10 +137,12 @@ def _of_method(
     for point in points:
         given = entry.settings | {d: point[d] for d in study.grid if d in names}
         settings = _complete(model, entry.method, tuple(given.items()), entry.preset)
-        car = {n.removeprefix(PARAMETER): v for n, v in point.items() if n.startswith(PARAMETER)}
+        parameters = {
+            n.removeprefix(PARAMETER): v for n, v in point.items() if n.startswith(PARAMETER)
+        }
         maneuver = point.get("maneuver", study.maneuver or model.definition.maneuver)
         test = _checked(
-            model, maneuver, tuple(point[f] for f in FACTORS), point["start"], overrides(car)
+            model, maneuver, tuple(point[f] for f in FACTORS), point["start"], overrides(parameters)
         )
         training = entry.training or point.get("training", study.training)
         training = tuple(training) if isinstance(training, list) else (training,)
@@ -164,15 +166,15 @@ def _complete(model: Model, method: str, given: tuple[tuple[str, Any], ...], pre
 
 @lru_cache(maxsize=4096)
 def _checked(
-    model: Model, maneuver: str, factors: tuple[float, float], start: str, car: Overrides
+    model: Model, maneuver: str, factors: tuple[float, float], start: str, parameters: Overrides
 ) -> Scenario:
     """A test scenario; `InputError` if the model can't be run or made so."""
     try:
-        with_parameters(model, car)
+        with_parameters(model, parameters)
     except VehiclemorError as error:
-        given = ", ".join(f"{name} = {value}" for name, value in car)
+        given = ", ".join(f"{name} = {value}" for name, value in parameters)
         raise InputError(f"{given}: {error}") from None
-    scenario = Scenario.of(maneuver, factors, start, None, car)
+    scenario = Scenario.of(maneuver, factors, start, None, parameters)
     check(model, scenario)
     return scenario
 

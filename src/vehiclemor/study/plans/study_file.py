@@ -179,7 +179,7 @@ class SpeedTarget(FileSchema):
 
 
 class Straight(FileSchema):
-    """Scenarios without steering, in which the car must stay on its line."""
+    """Scenarios without steering, in which the vehicle must stay on its line."""
 
     maneuver: str = Field(description="registered name")
     output: str = Field(description="its lateral position")
@@ -226,7 +226,7 @@ class StudyFile(FileSchema):
     model: str = Field("", description="registered name; needed for a grid")
     parameters: dict[str, float | list[float]] = Field(
         default_factory=dict,
-        description="parameter -> value in SI units where the study's car is not the model's",
+        description="parameter -> value in SI units where the study's are not the model's",
     )
     maneuver: str = Field("", description="registered name; the model's own by default")
     start: list[str] = Field(
@@ -289,7 +289,7 @@ class StudyFile(FileSchema):
     flagged_misses: int = Field(
         3, ge=0, description="runs outside of the bounds that the chosen model may have flagged"
     )
-    straight: Straight | None = Field(None, description="whether a car drives straight on")
+    straight: Straight | None = Field(None, description="whether a vehicle drives straight on")
 
     @property
     def labelled(self) -> dict[str, MethodEntry]:
@@ -304,7 +304,7 @@ class StudyFile(FileSchema):
 
     @property
     def points(self) -> int:
-        """Number of points of the grid, or of tests; one cell may stand at several of them."""
+        """Number of points of the grid, or of tests; one run may stand at several of them."""
         if self.bounds:
             listed = sum(group.scenarios for group in (*self.test, *self.outside))
             draws = sum(draw.runs for draw in (self.drawn, self.drawn_outside) if draw)
