@@ -102,8 +102,7 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: S
         errors = errors[np.isfinite(errors)]
         row |= {f"worst_{name}": float(errors.max()), f"most_{name}": float(errors.quantile(0.99))}
     # Means over the runs that were timed; the spread of all of them together.
-    clocks = [name for name in (*CLOCKS, "seconds_lower", "seconds_upper") if name in part]
-    times = {name: float(part[name].mean()) for name in clocks}
+    times = {n: float(part[n].mean()) for n in (*CLOCKS, "seconds_lower", "seconds_upper")}
     spread = times.pop("seconds_upper") - times.pop("seconds_lower")
     return row | times | {"spread": spread / times["seconds"] if times["seconds"] > 0.0 else 0.0}
 
@@ -127,7 +126,7 @@ def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
     """Ratios of a row to the full order."""
     within = (other for other in full if other["misses"] == 0)
     best = min(within, key=lambda other: other["seconds"], default=None)
-    equal = {clock: at_error(ladders, row["score"], clock) for clock in CLOCKS if clock in row}
+    equal = {clock: at_error(ladders, row["score"], clock) for clock in CLOCKS}
     # A recording that is played again is no solution of anything.
     solves = row["method"] != "replay"
     ratios = {
@@ -138,7 +137,6 @@ def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
         "equal_rows": ", ".join(equal["seconds"].rows),
         "within": best["label"] if best else "",
         "ratio_within": ratio(best, row),
-        **dict.fromkeys(CLOCKS.values(), math.nan),
         **ratios,
     }
 
