@@ -108,6 +108,7 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
 def _counts(runs: Any) -> dict[str, Any]:
     """How runs have ended, and what they took."""
     failed = runs[~runs["status"].isin(FINISHED)]
+    ended = runs.drop(failed.index).astype(dict.fromkeys(MEDIANS, float))
     ends = Counter(map(str, failed["status"])).most_common()
     return {
         "effective_rank": int(runs["effective_rank"].max()),
@@ -116,7 +117,7 @@ def _counts(runs: Any) -> dict[str, Any]:
         "failures": ", ".join(f"{n} {status}" for status, n in ends),
         "reason": next(iter(failed["message"]), ""),
         **{name: int(runs[name].sum()) for name in ("warned", "trained")},
-        **{name: _median(runs.drop(failed.index)[name]) for name in MEDIANS},
+        **{name: float(ended[name][np.isfinite(ended[name])].median()) for name in MEDIANS},
     }
 
 
@@ -138,10 +139,6 @@ def _errors(ended: Any, output: str, varied: list[str]) -> dict[str, Any]:
 
 def _value(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _median(values: Any) -> float:
-    return float(values[np.isfinite(values.astype(float))].median())
 
 
 def _grid_text(dataset: xr.Dataset) -> str:

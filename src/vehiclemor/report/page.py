@@ -89,7 +89,10 @@ def write_report(
     left_out: dict[str, str] = {}
     sections: list[Section] = []
     if studies:
-        chosen = [name for study in studies for name in _studies_of(study, folder)]
+        chosen: list[str] = []
+        for name in studies:
+            of_model = (kind(name, folder) for kind in (nominal, perturbed, unseen))
+            chosen += of_model if name in names("model") else [name]
         jobs = count("jobs", jobs, most=MOST_JOBS)
         every = [d for n in chosen for d in run_studies(n, folder, jobs).values()]
         # Two studies may have one name, but not one file.
@@ -107,12 +110,6 @@ def write_report(
     if not sections:
         raise InputError("; ".join(f"{name}: {why}" for name, why in left_out.items()))
     return write_text(path, _page(sections, left_out))
-
-
-def _studies_of(name: str, folder: Path) -> list[str]:
-    if name not in names("model"):
-        return [name]
-    return [kind(name, folder) for kind in (nominal, perturbed, unseen)]
 
 
 def _stored(folder: Path, left_out: dict[str, str]) -> dict[str, xr.Dataset]:

@@ -251,5 +251,5 @@ def width() -> int:
 
 def wrapped(text: str, first: int = 0, rest: int = 0) -> str:
     """A paragraph in lines of the width of a table, indented; a path stays whole."""
-    indents = {"initial_indent": " " * first, "subsequent_indent": " " * rest}
+    indents: dict[str, Any] = {"initial_indent": " " * first, "subsequent_indent": " " * rest}
     return textwrap.fill(text, width(), **indents, break_long_words=False, break_on_hyphens=False)

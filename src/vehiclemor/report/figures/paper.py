@@ -78,18 +78,18 @@ def _draw_bars(axis: Axes, curves: Sequence[Curve]) -> None:
     errors = [c.run["max_error"].sel(output="lateral_position").item() for c in curves]
     colors = [curve.style["color"] for curve in curves]
     bars = axis.barh([c.text for c in curves], np.maximum(errors, SHORTEST), 0.6, color=colors)
-    axis.bar_label(bars, [*map(_length, errors)], padding=4)
+    factors = [readable_unit(error, "m") for error in errors]
+    texts = [
+        f"{two_digits(factor * error)} {unit}" if error >= MEASURABLE else "< 0.1 mm"
+        for error, (factor, unit) in zip(errors, factors, strict=True)
+    ]
+    axis.bar_label(bars, texts, padding=4)
     axis.set_ylim(len(curves) - 0.5, -0.5)
     axis.set_xscale("log")
     axis.set_xlim(SHORTEST, LONGEST)
     axis.set_xticks([1e-3, 1e-1, 1e1], ["0.001", "0.1", "10"])
     axis.minorticks_off()
     axis.grid(visible=False, axis="y")
-
-
-def _length(error: float) -> str:
-    factor, unit = readable_unit(error, "m")
-    return f"{two_digits(factor * error)} {unit}" if error >= MEASURABLE else "< 0.1 mm"
 
 
 def figure_spread(results: Results) -> Figure:

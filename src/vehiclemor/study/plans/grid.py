@@ -65,15 +65,13 @@ def expand(name: str, study: StudyFile) -> Grid:
             _check_histories(model, study, dimensions)
         keys = np.empty([len(entry) for entry in dimensions.values()], KEY)
         experiments: dict[str, Experiment] = {}
-        names = {m.method: set(default_settings(model, m.method)) for m in study.methods}
+        own = {name: found for name, found in dimensions.items() if name != "label"}
         for number, entry in enumerate(study.methods):
-            # A setting that a method does not have makes no further experiment of it.
-            others = set().union(*names.values()) - names[entry.method]
-            own = {d: v[:1] if d in others else v for d, v in dimensions.items() if d != "label"}
             made = list(_of_method(model, study, entry, _points(own, samples)))
+            # Settings that a method does not have make no further experiments of it.
             experiments |= {experiment.key: experiment for experiment in made}
             found = np.array([experiment.key for experiment in made], KEY)
-            keys[..., number] = found.reshape([len(part) for part in own.values()])
+            keys[..., number] = found.reshape(keys.shape[:-1])
     except PlugInError:
         raise
     except (InputError, GeometryError) as error:

@@ -1,20 +1,27 @@
-"""Experiments: identity follows from content, and each run is what a model of its car gives."""
+"""Experiments: identity follows from content, runs are measured, what is common is fitted once."""
 
 import dataclasses
+import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import vehiclemor as vm
 from vehiclemor.codegen import cache
+from vehiclemor.errors import ConvergenceError
 from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods import pod, slow_manifold
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study import provenance
-from vehiclemor.study.evaluate import evaluate
+from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit
 from vehiclemor.study.experiment import complete_settings, make_experiment
+from vehiclemor.study.failure import Failure
+from vehiclemor.study.input_range import input_range
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Scenario
 
@@ -160,3 +167,125 @@ def test_a_method_is_not_used_on_a_model_that_it_was_not_trained_on(model):
     assert "another" in found["message"].item()
     with pytest.raises(ValueError, match="of one model"):
         of_runs(model, "pod", runs[:1], runs, rank=3)
+
+
+FAILING = 3
+SCENARIOS = (Scenario(component("maneuver", "lane_change"), "equilibrium"),)
+
+
+def experiment(model, method, **settings):
+    complete = complete_settings(model, method, settings)
+    return make_experiment(model, method, complete, SCENARIOS, SCENARIOS, "errors")
+
+
+@pytest.fixture
+def fits(monkeypatch):
+    """Fits of the slow manifold that are made: their arguments."""
+    method, found = component("method", "slow_manifold"), []
+
+    def fit(*given):
+        found.append(given)
+        if given[-1].terms == FAILING:
+            raise ConvergenceError("no fit")
+        return method.fit(*given)
+
+    def spied(kind, name):
+        return replace(method, fit=fit) if name == method.name else component(kind, name)
+
+    monkeypatch.setattr("vehiclemor.study.evaluate.component", spied)
+    return found
+
+
+def guarded(terms):
+    words = f"terms = {terms}, sweeps = 0"
+    return {"fast": "slow_manifold", "fast_settings": words, "tolerance": 5e-3}
+
+
+def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(vehicle, fits):
+    alone = kept_fit(vehicle, experiment(vehicle, "slow_manifold", terms=2, sweeps=0))
+    both = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
+    assert len(fits) == 1
+    assert both.ahead.tolerance == 5e-3
+    assert both.fast.coefficients is alone.coefficients
+    assert both.offline.seconds == pytest.approx(alone.offline.seconds)
+    # What a user fits is fitted for itself, and is the same.
+    anew = fresh_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
+    assert anew.fast.coefficients is not alone.coefficients
+    np.testing.assert_array_equal(anew.fast.coefficients, alone.coefficients)
+    failed = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(FAILING)))
+    assert failed == Failure("diverged", "no fit")
+
+
+def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
+    method, raised = component("method", "slow_manifold"), []
+
+    def fit(*given):
+        raised.append(given)
+        raise ZeroDivisionError if len(raised) < 3 else ConvergenceError("no fit")
+
+    broken = replace(method, fit=fit)
+    monkeypatch.setattr("vehiclemor.study.evaluate.component", lambda *_: broken)
+    wanted = experiment(vehicle, "slow_manifold", terms=1, sweeps=0)
+    found = [kept_fit(vehicle, wanted).status for _ in range(4)]
+    assert found == ["error", "error", "diverged", "diverged"]
+    assert len(raised) == 3
+
+
+def sent(maneuver):
+    """What another process gets of a scenario's maneuver."""
+    return pickle.loads(pickle.dumps(Scenario(maneuver, "equilibrium"))).maneuver  # noqa: S301 - own
+
+
+def test_a_registered_maneuver_that_was_sent_is_the_same_again():
+    # Its functions are made by another, which no process could find by name.
+    maneuver = component("maneuver", "lane_change").perturbed(1.1, 0.9)
+    assert sent(maneuver) == maneuver
+    # Of two batches it is one, by which a worker finds what it has fitted.
+    assert sent(maneuver) is sent(maneuver)
+
+
+MODELS = {
+    "independent_suspension_vehicle": "lane_change",
+    "high_fidelity_vehicle": "rack_multisine",
+}
+
+
+def scenario(model, frequency=1.0, amplitude=1.0, speed=20.0):
+    maneuver = component("maneuver", MODELS[model]).perturbed(frequency, amplitude)
+    return Scenario(maneuver, "equilibrium", speed)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@settings(max_examples=20)
+@given(frequency=st.floats(0.5, 2.0), amplitude=st.floats(-2.0, 2.0), speed=st.floats(15.0, 25.0))
+def test_a_run_is_trusted_exactly_within_the_range(model, frequency, amplitude, speed):
+    training = (scenario(model, 1.0, 1.2, 18.0), scenario(model, 1.3, -0.8, 22.0))
+    known = input_range(build(model), training)
+    found = known.trust(build(model), scenario(model, frequency, amplitude, speed))
+    if abs(amplitude) > 1.201 or not 17.99 < speed < 22.01:
+        assert found.indicator > 1.0
+        assert found.reason
+    # Slower and clearly smaller than a training run.
+    elif abs(amplitude) <= 1.0 and frequency <= 1.0:
+        assert found.indicator <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("method", "amplitude", "status"),
+    [
+        ("linear_single_track", 1.0, "ok"),
+        ("linear_single_track", 1.5, "untrusted"),
+        ("full_order", 1.5, "ok"),
+        ("replay", 1.5, "ok"),
+    ],
+)
+def test_no_trained_method_is_silent_beyond_its_training(method, amplitude, status):
+    model = build("independent_suspension_vehicle")
+    tests = (scenario(model.name, 1.0, amplitude),)
+    chosen = complete_settings(model, method)
+    training = (scenario(model.name, 1.0, 1.1),)
+    found = evaluate(make_experiment(model, method, chosen, training, tests, "errors"))
+    assert found["status"].item() == status
+    if status == "untrusted":
+        assert "input delta is beyond its known range" in found["message"].item()
+        assert found["trust_indicator"].item() == pytest.approx(amplitude / 1.1, rel=1e-5)
