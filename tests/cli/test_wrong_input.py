@@ -1,12 +1,10 @@
-"""Wrong arguments and files: one clear line, the same from both interfaces, and nothing is lost."""
+"""Wrong arguments and files: one clear line, and nothing is lost."""
 
 from pathlib import Path
 
 import pytest
 
-import vehiclemor as vm
 from vehiclemor.cli import main
-from vehiclemor.cli.options import key_values
 from vehiclemor.parameters import parameter_path
 
 TRAVEL = "simulate double_wishbone"
@@ -89,7 +87,6 @@ PARAMETERS = {
 CARS = [
     (f"{car} --parameter {given}", word) for car in PARAMETERS for given, word in PARAMETERS[car]
 ]
-FUNCTIONS = {"run": vm.run_study, "show": vm.describe}
 
 
 @pytest.fixture
@@ -109,42 +106,8 @@ def fails(capsys):
     return run
 
 
-def from_python(command):
-    """The same call, of values as the command line reads its texts."""
-    name, *rest = command.split()
-    first = [] if rest[0].startswith("--") else [rest.pop(0)]
-    given = {"--set": [], "--parameter": []}
-    how = {}
-    for option, value in zip(rest[::2], rest[1::2], strict=True):
-        if option in given:
-            given[option].append(value)
-        else:
-            how |= key_values(option, [f"{option.removeprefix('--')}={value}"])
-    settings, parameters = (key_values(option, texts) for option, texts in given.items())
-    if name == "simulate":
-        vm.simulate(vm.model(*first, parameters), **how, **settings)
-    elif name == "show":
-        vm.describe(*first, parameters)
-    elif name == "figures":
-        vm.figures(str(how["only"]))
-    else:
-        FUNCTIONS.get(name, getattr(vm, name, None))(*first, **how)
-
-
-@pytest.mark.parametrize(("command", "word"), WRONG + CARS)
-def test_wrong_values_are_one_line_wherever_they_are_given(
-    fails, command, word, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    line = fails(command.split(), word)
-    with pytest.raises(vm.VehiclemorError) as error:
-        from_python(command)
-    assert line == f"vehiclemor: {error.value}\n"
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(("command", "word"), TEXTS)
-def test_wrong_texts(fails, command, word, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("command", "word"), WRONG + TEXTS + CARS)
+def test_wrong_values_are_one_line_and_leave_nothing(fails, command, word, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fails(command.split(), word)
     assert list(tmp_path.iterdir()) == []

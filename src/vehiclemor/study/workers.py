@@ -47,7 +47,7 @@ Groups = Sequence[Sequence[Experiment]]
 # How often what the machine has broken is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
 # Batches for each worker, so that all end together; and most experiments of a batch.
-EACH, LARGEST = 16, 100
+EACH, LARGEST = 32, 100
 # Seconds to reach a scheduler.
 REACH = 10.0
 KILLED = "a worker process was killed, perhaps for lack of memory"
