@@ -49,7 +49,7 @@ def convert(
     """
     from vehiclemor.report.frames import column_meanings, frame
     from vehiclemor.report.result_selection import stored_result
-    
+
     choice("format", to, FORMATS)
     engine = ENGINES.get(to)
     if engine and not find_spec(engine):
