@@ -12,7 +12,6 @@ from vehiclemor.errors import InputError
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component
 from vehiclemor.report.figures.catalogue import FIGURES
-from vehiclemor.report.figures.errors import luminance
 from vehiclemor.report.figures.paper import figure_pareto
 from vehiclemor.report.figures.theme import panels, save_figure, styled
 from vehiclemor.study.run import run_studies
@@ -21,6 +20,13 @@ PARETO = "predictive-double_wishbone"
 
 
 FACTORS = np.linspace(0.7, 1.3, 7)
+
+
+def luminance(color):
+    """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
+    parts = np.array(color)
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def grid_of(entry):

@@ -13,7 +13,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from vehiclemor.errors import InputError
 from vehiclemor.report import labels
@@ -39,9 +38,9 @@ SORTED = "sorted by error"
 FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5, "label": "best approximation"}
 # Columns of maps, cells of a map with their number, and cells that a contour must enclose.
 COLUMNS, WRITTEN, ENCLOSED = 3, 100, 4
-# In % of the cells, those whose small errors the colours leave out; luminance of a colour on which
+# In % of the cells, those whose small errors the colours leave out; part of the colours on which
 # white has more contrast than black.
-LEAST, DARK = 2.0, 0.179
+LEAST, DARK = 2.0, 120 / 256
 # Label -> text, errors on the dimensions output and the axis.
 Lines = Mapping[str, tuple[str, xr.DataArray]]
 
@@ -275,21 +274,14 @@ def _draw_cells(
     failed = ~np.isfinite(values)
     style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
     cells = np.where(failed, np.nan, np.maximum(values, norm.vmin or 0.0))
-    mesh = axis.pcolormesh(x, y, cells, norm=norm, **style)
+    axis.pcolormesh(x, y, cells, norm=norm, **style)
     j, i = np.nonzero(failed)
     axis.plot(x[i], y[j], color="#D55E00", **theme.CROSS)
     axis.grid(visible=False)
     for j, i in np.argwhere(~failed) if written else ():
-        color = "white" if luminance(mesh.get_cmap()(norm(cells[j, i]))[:3]) < DARK else "black"
+        color = "white" if norm(cells[j, i]) < DARK else "black"
         text: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
         axis.text(float(x[i]), float(y[j]), two_digits(float(values[j, i])), **text)
-
-
-def luminance(color: ArrayLike) -> float:
-    """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
-    parts = np.asarray(color, dtype=float)
-    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
-    return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def two_digits(value: float) -> str:
