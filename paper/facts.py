@@ -99,8 +99,7 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     import pandas as pd
     from regenerate import operation_table
 
-    from vehiclemor.report.comparison import study_comparison
-    from vehiclemor.report.costs import cost_table
+    from vehiclemor.report.comparison import cost_table, study_comparison
     from vehiclemor.report.published import load_published
     from vehiclemor.study.run import run_studies
 

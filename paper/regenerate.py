@@ -17,8 +17,7 @@ from vehiclemor import VehiclemorError
 from vehiclemor.files import write_text
 from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import names
-from vehiclemor.report.comparison import paper_comparison, study_comparison
-from vehiclemor.report.costs import cost_table
+from vehiclemor.report.comparison import cost_table, paper_comparison, study_comparison
 from vehiclemor.report.default_studies import nominal, of_paper, perturbed
 from vehiclemor.report.printing import Format, table
 from vehiclemor.report.spectrum import spectrum_table

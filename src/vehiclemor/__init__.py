@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from vehiclemor.reduction.reduced_model import load as load
     from vehiclemor.reduction.reduced_model import rom as rom
     from vehiclemor.report.comparison import compare as compare
+    from vehiclemor.report.figures.catalogue import figures as figures
     from vehiclemor.report.page import write_report as write_report
-    from vehiclemor.report.regenerate import figures as figures
     from vehiclemor.report.study_formats import convert as convert
     from vehiclemor.simulation.batches import simulate_many as simulate_many
 
@@ -46,7 +46,7 @@ _DEFINED_IN = {
     "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
     "compare": "vehiclemor.report.comparison",
-    "figures": "vehiclemor.report.regenerate",
+    "figures": "vehiclemor.report.figures.catalogue",
     "maneuver": "vehiclemor.inputs.maneuver",
     "many_signals": "vehiclemor.inputs.signal",
     "write_report": "vehiclemor.report.page",

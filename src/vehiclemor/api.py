@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start, Trajectory
     from vehiclemor.study.plans.training import Given
+    from vehiclemor.study.run import StudyStatus
     from vehiclemor.study.scenario import Scenario
-    from vehiclemor.study.status import StudyStatus
 
 RESULTS = Path("results")
 
@@ -227,7 +227,7 @@ def simulate(
         If the input is wrong or asks for a position that can't be reached.  A reduced model that
         diverges is a result: its status says so.
     """
-    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
+    import vehiclemor.report.result_selection  # noqa: F401  (results draw themselves)
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
@@ -306,11 +306,11 @@ def run_study(
     results
         Results folder.
     progress
-        Called with (study, finished cells, all cells).
+        Called with (study, finished runs, all runs).
     scheduler
-        Address of a dask scheduler whose workers compute the cells.
+        Address of a dask scheduler whose workers compute.
     seed
-        Draws fresh test runs of protocols, for an audit; by default the file's seed.
+        Samples fresh test runs of protocols, for an audit; by default the file's seed.
 
     Returns
     -------
@@ -319,7 +319,7 @@ def run_study(
         cell of its studies on the dimension `cell`, without histories; the studies' own datasets
         are in the folder `studies`.
     """
-    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
+    import vehiclemor.report.result_selection  # noqa: F401  (results draw themselves)
     from vehiclemor.progress import listening
     from vehiclemor.study.plans.results import flattened
     from vehiclemor.study.run import run_studies
@@ -347,10 +347,9 @@ def status(
     Returns
     -------
     dict
-        Study name -> cells that are done, failed (with reasons) and to do, and the estimated
-        seconds left.
+        Study name -> runs that are done, failed (with reasons) and to do.
     """
-    from vehiclemor.study.status import status_of
+    from vehiclemor.study.run import status_of
 
     return status_of(str(file_path("study", study)), file_path("results", results), seed)
 
@@ -435,8 +434,7 @@ def plot(
     """
     import xarray as xr
 
-    from vehiclemor.report.accessor import ResultAccessor
-    from vehiclemor.report.result_selection import stored_result
+    from vehiclemor.report.result_selection import ResultAccessor, stored_result
     from vehiclemor.simulation.trajectory import Trajectory
 
     if isinstance(result, str | Path):

@@ -33,7 +33,7 @@ class FileError(VehiclemorError):
     """A file is missing, unreadable, foreign or can't be written."""
 
 
-class SpoiledError(FileError):
+class CorruptError(FileError):
     """A stored result is damaged, or not the one that belongs there: never read, made again.
 
     Attributes
@@ -50,7 +50,7 @@ class SpoiledError(FileError):
 class MachineError(VehiclemorError):
     """The machine has failed, not the input: no space, no memory, a killed process.
 
-    Never a result: what it has spoiled is computed again.  Exit status 1.
+    Never a result: what is lost by it is computed again.  Exit status 1.
     """
 
 

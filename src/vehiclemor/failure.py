@@ -33,17 +33,8 @@ class Failure:
 def attempt(run: Callable[[], Result], whose: str = "") -> Result | Failure:
     """Result of a call, or how it has failed.
 
-    Parameters
-    ----------
-    whose
-        Put before the reason of a failure that is not due to what was asked for.
-
-    Raises
-    ------
-    MachineError
-        If the machine has failed.
-    VehiclemorError
-        If the model or a file of it is wrong: it would fail everywhere.
+    `MachineError` and errors of files pass: they would come up everywhere.  `whose` is put before
+    the reason of a failure that is not due to what was asked for.
     """
     try:
         return run()

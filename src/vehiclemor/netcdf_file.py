@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.errors import FileError, MachineError, SpoiledError, machine_reason
+from vehiclemor.errors import CorruptError, FileError, MachineError, machine_reason
 from vehiclemor.files import write_whole
 
 if TYPE_CHECKING:
@@ -59,18 +59,12 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
 
 
 def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
-    """Read a result file of this package into memory.
-
-    Parameters
-    ----------
-    attribute, expected
-        Global attribute that tells whose file it is, and its value.
+    """A result file of this package, whose global `attribute` has the `expected` value.
 
     Raises
     ------
     FileError
-        If the file is missing; `SpoiledError` if it is corrupt, or not the expected one. It is left
-        as it is.
+        If the file is missing; `CorruptError` if it is corrupt, or not the expected one.
     """
     import xarray as xr
     from xarray.backends import NetCDF4DataStore
@@ -79,7 +73,7 @@ def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
     with opened(path, "result file", mend) as file:
         if getattr(file, attribute, None) != expected:
             reason = f"not the result that belongs here ({attribute} is not {expected})"
-            raise SpoiledError(reason, path, mend)
+            raise CorruptError(reason, path, mend)
         file.set_auto_maskandscale(True)
         return xr.open_dataset(NetCDF4DataStore(file)).load()
 
@@ -101,16 +95,13 @@ def global_attributes(path: Path) -> dict[str, Any]:
 def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
     """A netCDF file that is as it was written; of others, one that the library can read.
 
-    Parameters
-    ----------
-    kind, mend
-        What an error calls it, and what it tells to do.
+    An error calls it a `kind`, and tells how to `mend` it.
     """
     import netCDF4
 
     if not path.is_file():
         if path.exists():
-            raise SpoiledError(f"is a folder, not a {kind}", path)
+            raise CorruptError(f"is a folder, not a {kind}", path)
         raise FileError(f"{path}: no such {kind}")
     try:
         sealed = _sealed(path)
@@ -128,7 +119,7 @@ def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
             raise FileError(f"{path}: can't be read ({error.strerror})") from None
         detail = getattr(error, "strerror", None) or str(error).splitlines()[0][:80]
         detail = DAMAGED if "NetCDF:" in detail else detail
-        raise SpoiledError(f"not a readable {kind} ({detail})", path, mend) from None
+        raise CorruptError(f"not a readable {kind} ({detail})", path, mend) from None
 
 
 def _seal(path: Path) -> None:

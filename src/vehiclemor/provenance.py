@@ -71,12 +71,11 @@ def _own_source() -> str:
 
 
 def code_digest(model: str, method: str, settings: Mapping[str, object]) -> str:
-    """Hash of the source that computes a result.
+    """Hash of the source that computes a result: results of other source are never taken for it.
 
     These are the layers of this package and, for a plug-in, all of its top-level package; and the
     versions of the packages that the method declares.  Of a method that fits others, they are of
-    those that its settings name too.  Results computed by other source are never taken for finished
-    ones.
+    those that its settings name too.
     """
     used = [component("method", method)]
     if used[0].fits_others:
@@ -89,5 +88,5 @@ def code_digest(model: str, method: str, settings: Mapping[str, object]) -> str:
 
 @cache
 def layout_digest() -> str:
-    """Hash of the source that combines cells: a dataset laid out by other source is made again."""
+    """Hash of the source that combines runs: a dataset laid out by other source is made again."""
     return source_digest((), ("study/plans/results.py", "study/result.py"))

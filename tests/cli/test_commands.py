@@ -1,7 +1,12 @@
-"""Commands: what they print and write is what was declared, and fits into 80 columns."""
+"""Commands: what they print and write is what was declared, and how they end."""
 
+import errno
+import io
 import json
-from pathlib import Path
+import os
+import signal
+import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,14 +14,15 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.cli import main
-from vehiclemor.cli.app import COMMANDS
+from vehiclemor.cli.app import COMMANDS, ended
 from vehiclemor.cli.options import key_values
-from vehiclemor.codegen import cache, derivation
-from vehiclemor.netcdf_file import write_dataset
+from vehiclemor.errors import MachineError
 from vehiclemor.parameters import load_parameters
+from vehiclemor.reduction.methods import replay
 from vehiclemor.registry import component, names
 from vehiclemor.report.description import SCHEMAS
 from vehiclemor.resources import data_names, handbook_folder
+from vehiclemor.study import run as study_run
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.toml_files import FileSchema
@@ -71,43 +77,6 @@ def test_simulate_writes_what_the_interface_returns(tmp_path, printed, monkeypat
         np.testing.assert_array_equal(written["coordinates"], expected["coordinates"])
         assert list(written["coordinate"].values) == list(model.coordinates)
         assert json.loads(written.attrs["configuration"])["parameters"]["wheel_centre"] == point
-
-
-@pytest.mark.parametrize("model", names("model"))
-def test_simulate_prints_errors_in_a_table(printed, model):
-    assert "nan" not in printed("simulate", model)
-    text, dataset = (
-        printed("simulate", model, "--method", "pod", "--all-outputs"),
-        vm.simulate(model, "pod"),
-    )
-    rows = {row[0]: row[1:5] for row in map(str.split, text.splitlines()) if len(row) >= 6}
-    for output in dataset["output"].values[:6]:
-        # What is zero or missing is a dash.
-        measures = ("rms_error", "floor_rms_error", "max_error", "signal_range")
-        values = [dataset[name].sel(output=output).item() for name in measures]
-        assert rows[output] == [f"{v:.1e}" if v and v == v else "-" for v in values]
-
-
-def test_pictures_are_named_and_written(tmp_path, printed, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    simulate = ["simulate", "double_wishbone", "--method", "pod", "--out", "run.nc"]
-    text = printed(*simulate, "--plot") + printed(*simulate, "--plot", "mine.svg")
-    printed("run", "figures-6-7", "--results", "results")
-    text += printed("plot", "run.nc", "--kind", "errors")
-    text += printed("plot", "figures-6-7", "--select", "rank=4", "--out", "study.pdf")
-    pictures = ["double_wishbone-pod.png", "mine.svg", "study.pdf", "run-errors.png"]
-    assert {path.name for path in tmp_path.iterdir()} == {*pictures, "run.nc", "results"}
-    for name in pictures:
-        assert f"written: {name}" in text
-        assert Path(name).stat().st_size > 1000
-
-
-def test_a_result_draws_itself(tmp_path):
-    dataset = vm.simulate("double_wishbone", "pod")
-    dataset.vehiclemor.plot("histories", tmp_path / "a.png")
-    write_dataset(dataset, tmp_path / "run.nc")
-    vm.plot(tmp_path / "run.nc", out=tmp_path / "b.png")
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 
 def test_text_of_the_command_line_gets_its_kind():
@@ -193,26 +162,61 @@ def test_the_schema_of_a_file_has_every_key(name):
             assert (row["default"] == "required") is field.is_required()
 
 
-def test_a_model_that_was_not_derived_is_shown_without_deriving_it(monkeypatch, tmp_path):
-    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(derivation, "cache_folder", lambda: tmp_path)
-    starts = {name: vm.describe(name)["starts"] for name in names("model")}
-    assert starts["independent_suspension_vehicle"] == ["equilibrium", "dropped"]
-    assert starts["high_fidelity_vehicle"] == ["known once the model has been simulated"]
-    assert "pod" in vm.describe("high_fidelity_vehicle")["methods"]
-    assert {row["accepted"] for row in vm.describe("slow_manifold")["models"]} == {"no", "?"}
-    assert list(tmp_path.iterdir()) == []
+STUDY = """
+title = "for the tests"
+model = "double_wishbone"
+keep = "metrics"
+training = "nominal"
+grid = { rank = [2, 3], amplitude_factor = [1.0, 1.3] }
+methods = [{ method = "pod" }, { method = "replay" }]
+"""
 
 
-def test_bounds_are_shown():
-    settings = vm.describe("full_order")["settings, kind ode and dae"]
-    types = {row["name"]: row["type"] for row in settings}
-    assert types["solver"].startswith("dopri5, rodas4, ros34pw2")
-    assert types["tolerance"] == "number 1e-13 to 0.1"
+@pytest.fixture
+def run(tmp_path):
+    """Run the study; its exit status."""
+    path = tmp_path / "車.toml"
+    path.write_text(STUDY)
+    return lambda: main(["run", str(path), "--results", str(tmp_path / "out")])
 
 
-def test_an_audit_is_followed_apart(printed, tmp_path):
-    study = "predictive-double_wishbone"
-    text = printed("status", study, "--seed", "7", "--results", tmp_path)
-    assert text.startswith(f"{study}-seed-7: 0 of ")
-    assert [*vm.status(study, tmp_path)] == [study]
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_run_with_a_hint(run, monkeypatch, capsys, number):
+    killed = lambda _: os.kill(os.getpid(), number) or {}  # noqa: E731
+    monkeypatch.setattr(study_run, "studies_and_files", killed)
+    before = signal.getsignal(number)
+    assert run() == 128 + number
+    assert capsys.readouterr().err.count("\n") == 1
+    assert signal.getsignal(number) is before
+
+
+def raising(error):
+    raise error
+
+
+@pytest.mark.parametrize(
+    "error", [MachineError("killed"), MemoryError("7 TiB"), OSError(errno.ENOSPC, "No space")]
+)
+def test_what_the_machine_does_is_one_line_and_status_1(capsys, error):
+    assert ended(lambda: raising(error)) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert str(error.args[-1]) in line
+
+
+def test_runs_are_counted_and_those_with_errors_tried_again(run, monkeypatch, capsys):
+    with monkeypatch.context() as patch:
+        broken = replace(replay.METHOD, check=lambda *_: raising(ZeroDivisionError()))
+        patch.setattr(replay, "METHOD", broken)
+        assert run() == 1
+        assert "2 error, 4 ok" in capsys.readouterr().out
+    for missing in ("車: 2 of 6 to compute", ""):
+        assert run() == 0
+        printed = capsys.readouterr()
+        assert printed.err.partition("\n")[0] == missing
+        assert "8 grid points, 6 runs: 6 ok (2 not to" in " ".join(printed.out.split())
+    shown = io.BytesIO()
+    # A terminal that can't show a name ends no study.
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(shown, encoding="ascii"))
+    assert run() == 0
+    sys.stdout.flush()
+    assert shown.getvalue().startswith(rb"\u8eca: 8 grid points")

@@ -1,12 +1,10 @@
-"""Wrong arguments and files: one clear line, the same from both interfaces, and nothing is lost."""
+"""Wrong arguments and files: one clear line, and nothing is lost."""
 
 from pathlib import Path
 
 import pytest
 
-import vehiclemor as vm
 from vehiclemor.cli import main
-from vehiclemor.cli.options import key_values
 from vehiclemor.parameters import parameter_path
 
 TRAVEL = "simulate double_wishbone"
@@ -26,22 +24,15 @@ WRONG = [
     (f"{POD} rnak=3", "rank"),
     (f"{POD} rank=0", "rank is 0"),
     (f"{POD} rank=2.5", "rank"),
-    (f"{POD} rank=9 --set snapshots=20", "rank 9"),
-    (f"{POD} rank=6 --set snapshots=5", "snapshots 5"),
     (f"{POD} snapshots=1000000000", "snapshots"),
-    (f"{POD} test_space=petrov", "test_space"),
-    (f"{POD} control_period=1e-9", "control_period"),
     (f"{POD} control_period=nan", "control_period"),
-    (f"{POD} reversed_coordinates=theta", "theta"),
     (f"{TRAVEL} --frequency 0", "frequency factor: 0"),
     (f"{TRAVEL} --amplitude 3", "out of reach"),
-    (f"{TRAVEL} --amplitude -2.2", "out of reach"),
     ("run figure-15", "figure-1"),
     ("run no-such.toml", "no-such.toml"),
     ("run figures-6-7 --jobs 0", "jobs is 0"),
     ("run figures-6-7 --seed 3", "seed"),
     ("status figure-15", "figure-1"),
-    ("status figure-12 --seed -3", "seed"),
     ("status figure-12 --seed 3", "seed"),
     ("compare papper", "paper"),
     ("figures --only 55", "'55'"),
@@ -62,11 +53,7 @@ TEXTS = [
     (f"{TRAVEL} --plot a.png b.png", "--plot"),
     (f"{TRAVEL} --plot a.txt", "a.txt"),
     ("simulate", "model"),
-    ("simulat double_wishbone", "simulat"),
-    ("list cars", "cars"),
-    ("convert figure-11 --to zar", "zar"),
     ("run figures-6-7 --jobs 1.5", "1.5"),
-    ("run figure-12 --seed 1.5", "1.5"),
     ("figures --only ,", "names no figure"),
     ("export double_wishbone --to c --set rank=3", "--method"),
     ("export double_wishbone --to c --method shipped --set rank=3", "settings"),
@@ -80,34 +67,17 @@ PARAMETERS = {
     ],
     CAR: [
         ("sprung_mass=-900", "-900 kg"),
-        ("unsprung_mass=0", "0 kg"),
         ("initial_speed=0", "0 m/s"),
-        ("tire_stiffness=nan", "not finite"),
-        ("front_damping=-1", "-1 N s/m"),
         ("front_track=1386.84", "1386.84 m"),
         # The sprung mass hangs over an axle: the wheels at the other end had to hold it down.
         ("front_axle_distance=0.05", "rear wheels leave the ground"),
-        ("rear_axle_distance=0.05", "front wheels leave the ground"),
-        ("tire_stiffness=5000", "can't stand"),
-        ("whole_car_yaw_inertia=100", "yaw inertia"),
     ],
     FULL: [
         ("cup_holders=4", "not a parameter"),
         ("chassis_mass=-1515", "-1515 kg"),
         ("chassis_mass=1,2,3", "a number is needed"),
-        ("gravity=0", "0 m/s^2"),
-        ("gravity=1e3", "1000 m/s^2"),
-        ("baumgarte_a=-50", "-50 1/s"),
-        ("baumgarte_b=2e4", "20000 1/s"),
-        ("initial_speed=0.5", "0.5 m/s"),
-        ("largest_friction=11", "11"),
-        ("drop_height=5", "5 m"),
-        ("rear_stiffness=0", "0 N/m"),
-        ("carrier_inertia=1,0,1", "0 kg m^2"),
         ("tie_rod_outer=-150,770,-120", "millimetres"),
         ("chassis_centre=1.7,0,0.2", "lifts the rear wheels"),
-        ("chassis_centre=-1.7,0,0.2", "lifts the front wheels"),
-        ("chassis_centre=0,0.3,0.2", "beside the midplane"),
         ("tire_stiffness=9000", "presses the front tires flat"),
         ("rear_wheel_centre=2,0.8,0", "not ahead of the rear"),
         ("upper_arm_front_pivot=-0.25,0.51,0.11", "upper arm axis"),
@@ -117,7 +87,6 @@ PARAMETERS = {
 CARS = [
     (f"{car} --parameter {given}", word) for car in PARAMETERS for given, word in PARAMETERS[car]
 ]
-FUNCTIONS = {"run": vm.run_study, "show": vm.describe}
 
 
 @pytest.fixture
@@ -137,42 +106,8 @@ def fails(capsys):
     return run
 
 
-def from_python(command):
-    """The same call, of values as the command line reads its texts."""
-    name, *rest = command.split()
-    first = [] if rest[0].startswith("--") else [rest.pop(0)]
-    given = {"--set": [], "--parameter": []}
-    how = {}
-    for option, value in zip(rest[::2], rest[1::2], strict=True):
-        if option in given:
-            given[option].append(value)
-        else:
-            how |= key_values(option, [f"{option.removeprefix('--')}={value}"])
-    settings, parameters = (key_values(option, texts) for option, texts in given.items())
-    if name == "simulate":
-        vm.simulate(vm.model(*first, parameters), **how, **settings)
-    elif name == "show":
-        vm.describe(*first, parameters)
-    elif name == "figures":
-        vm.figures(str(how["only"]))
-    else:
-        FUNCTIONS.get(name, getattr(vm, name, None))(*first, **how)
-
-
-@pytest.mark.parametrize(("command", "word"), WRONG + CARS)
-def test_wrong_values_are_one_line_wherever_they_are_given(
-    fails, command, word, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    line = fails(command.split(), word)
-    with pytest.raises(vm.VehiclemorError) as error:
-        from_python(command)
-    assert line == f"vehiclemor: {error.value}\n"
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(("command", "word"), TEXTS)
-def test_wrong_texts(fails, command, word, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("command", "word"), WRONG + TEXTS + CARS)
+def test_wrong_values_are_one_line_and_leave_nothing(fails, command, word, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fails(command.split(), word)
     assert list(tmp_path.iterdir()) == []

@@ -15,7 +15,7 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
-from vehiclemor.report.shown import main_outputs, of_kind, tabled_outputs, timing_cases
+from vehiclemor.report.labels import main_outputs, of_kind, tabled_outputs, timing_cases
 from vehiclemor.simulation.build import build
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")

@@ -50,8 +50,8 @@ def test_a_name_stands_wherever_the_template_has_its_own(here, capsys):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["My-Car"], "what about my_car?"),
-        (["../car"], "what about car?"),
+        (["My-Car"], "'My-Car' can't name"),
+        (["../car"], "'../car' can't name"),
         (["class"], "'class' can't name"),
         (["3"], "'3' can't name"),
         ([""], "'' can't name"),

@@ -5,7 +5,6 @@ from importlib.metadata import EntryPoint
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from vehiclemor import registry
 from vehiclemor.errors import InputError, UnreachableError
@@ -16,12 +15,12 @@ from vehiclemor.simulation.trajectory import Trust
 
 
 class EndSettings(Settings):
-    """How a run ends, whose input goes beyond a value, and how far it is off until then."""
+    """How a run ends whose input goes above a value: after a part of it, off by a share."""
 
-    end: str = Field("ok", description="a status, or exact")
-    above: float = Field(0.0, description="largest input from which on it ends so")
-    part: float = Field(0.5, description="of the run, after which it diverges")
-    off: float = Field(0.01, description="share of the outputs")
+    end: str = "ok"
+    above: float = 0.0
+    part: float = 0.5
+    off: float = 0.01
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Ending:
     order: int = 1
 
     def simulate(self, maneuver, start):
-        """The full-order run, spoiled."""
+        """The full-order run, changed."""
         largest = abs(maneuver.at(maneuver.times)).max()
         end = self.settings.end if largest > self.settings.above else ""
         if end == "unreachable":
@@ -71,9 +70,5 @@ METHOD = Method("endings", "ends as it is told", dict.fromkeys(KINDS, EndSetting
 def register(patch):
     """Register the method for as long as the patch lasts."""
     real = registry._entries
-    entry = EntryPoint("endings", f"{__name__}:METHOD", registry.GROUPS["method"])
-    patch.setattr(
-        registry,
-        "_entries",
-        lambda kind: real(kind) | {"endings": entry} if kind == "method" else real(kind),
-    )
+    own = {"endings": EntryPoint("endings", f"{__name__}:METHOD", registry.GROUPS["method"])}
+    patch.setattr(registry, "_entries", lambda kind: real(kind) | (own if kind == "method" else {}))

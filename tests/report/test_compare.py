@@ -3,14 +3,17 @@
 import json
 
 import numpy as np
-import pandas as pd
 import pytest
-from regenerate import regenerate_tables
 
 from vehiclemor.cli import main
-from vehiclemor.report import comparison, screens
-from vehiclemor.report.comparison import claim_criterion, of_published_start, paper_comparison
-from vehiclemor.report.costs import cost_table, timing_of
+from vehiclemor.report import comparison
+from vehiclemor.report.comparison import (
+    claim_criterion,
+    cost_table,
+    of_published_start,
+    paper_comparison,
+    timing_of,
+)
 from vehiclemor.report.findings import LARGEST_SPREAD
 from vehiclemor.report.printed_numbers import TIMING, number_criterion
 from vehiclemor.report.published import load_published
@@ -173,55 +176,3 @@ def test_screens_have_the_numbers_and_claims_and_fit_the_terminal(said, rows):
     for word in ("projection", "replay", "offline"):
         assert word in plain
     assert len(json.loads(said("--json")[1])) == len(rows)
-
-
-def test_tables_are_byte_identical(results_folder, tmp_path, monkeypatch, rows):
-    monkeypatch.setattr("regenerate.paper_comparison", lambda *_: rows)
-    contents = [
-        {
-            path.name: path.read_bytes()
-            for path in regenerate_tables(results_folder, tmp_path / turn)
-        }
-        for turn in ("first", "second")
-    ]
-    assert len(contents[0]) == 3 * (1 + 4 * len(MODELS))
-    assert contents[0] == contents[1]
-    assert all(contents[0].values())
-
-
-def test_perturbed_errors_are_of_their_start_and_failures_are_named(monkeypatch, tmp_path):
-    monkeypatch.setattr(screens, "costs_text", lambda *_: "")
-    angle = "second_euler_angle"
-    table = pd.DataFrame(
-        [
-            ("a", "pod", "equilibrium", angle, 1e-6, 0),
-            ("a", "pod", "dropped", angle, 2e-6, 0),
-            ("a", "path_map", "equilibrium", angle, 3e-6, 0),
-            ("b", "pod", "equilibrium", angle, 5e-6, 0),
-            ("b", "pod", "equilibrium", "spindle_y", 7e-6, 0),
-            ("b", "path_map", "equilibrium", angle, float("nan"), 1),
-        ],
-        columns=["study", "label", "start", "output", "largest", "failed"],
-    ).assign(effective_rank=3, reason="", kind="errors")
-    text = screens.comparison_text("double_wishbone", table, tmp_path)
-    found = {
-        (head.partition(":")[0], line.split()[0]): line.split()[-2:]
-        for head, *lines in (part.splitlines() for part in text.split("\nstart ")[1:])
-        for line in lines
-        if line.split()[1:2] == ["3"]
-    }
-    assert found == {
-        ("equilibrium", "pod"): ["1.0e-06", "5.0e-06"],
-        ("equilibrium", "path_map"): ["3.0e-06", "failed"],
-        ("dropped", "pod"): ["2.0e-06", "-"],
-    }
-
-
-@pytest.mark.parametrize(
-    ("what", "verdicts", "missed"),
-    [("paper", ["met", "not_comparable"], 0), ("predictive", ["met", "missed"], 1)],
-)
-def test_a_missed_bound_is_a_failure_only_where_one_asks(monkeypatch, what, verdicts, missed):
-    monkeypatch.setattr(comparison, "compare", lambda *_: pd.DataFrame({"verdict": verdicts}))
-    assert main(["compare", what, "--json"]) == 0
-    assert main(["compare", what, "--json", "--check"]) == missed

@@ -9,7 +9,6 @@ import vehiclemor as vm
 from tests.study.small import small_study
 from vehiclemor.cli import main
 from vehiclemor.errors import VehiclemorError
-from vehiclemor.report import study_formats
 
 GRID = 'grid = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], rank = [2, 3] }\n'
 
@@ -75,18 +74,3 @@ def test_wrong_conversions_leave_nothing(study, tmp_path, monkeypatch, name, arg
         vm.convert(given, **({"results": folder / "results"} | arguments))
     assert [path.name for path in tmp_path.iterdir()] == ["there.csv"]
     assert (tmp_path / "there.csv").read_text() == "kept"
-
-
-def test_formats_of_one_result_share_their_columns(study, tmp_path, monkeypatch):
-    pytest.importorskip("pyarrow")
-    _, folder = study
-    for to in ("csv", "parquet"):
-        vm.convert(folder / "mine.toml", to, tmp_path / f"a.{to}", results=folder / "results")
-    (tmp_path / "b.columns.csv").write_text("kept")
-    with pytest.raises(VehiclemorError, match=r"b\.columns\.csv: exists already"):
-        vm.convert(folder / "mine.toml", "csv", tmp_path / "b.csv", results=folder / "results")
-    names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"a.csv", "a.parquet", "a.columns.csv", "b.columns.csv"}
-    monkeypatch.setattr(study_formats, "find_spec", lambda _: None)
-    with pytest.raises(VehiclemorError, match=r"pip install 'vehiclemor\[convert\]'"):
-        vm.convert(folder / "mine.toml", "parquet", tmp_path / "a.parquet", folder / "results")

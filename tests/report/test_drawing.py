@@ -1,7 +1,6 @@
 """Any result is drawn: runs that end in every way, over any axes, of one to seven methods."""
 
 import json
-from collections import Counter
 
 import numpy as np
 import pytest
@@ -13,9 +12,7 @@ from vehiclemor.cli import main
 from vehiclemor.errors import InputError
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.report.figures import result_plot, theme
-from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
-from vehiclemor.report.figures.runs import PATH
-from vehiclemor.report.labels import readable_unit
+from vehiclemor.report.figures.result_plot import plot_result
 
 ENDS = ("ok", "untrusted", "diverged", "rejected", "unreachable", "error", "exact")
 CURVE = "frequency_factor = [0.8, 1.0, 1.25]"
@@ -130,12 +127,6 @@ def test_a_run_far_from_full_order_is_cut_where_it_leaves(folder):
     assert high - low < 3.0 * float(full.max() - full.min())
 
 
-def test_what_has_no_values_says_so(folder):
-    legend, notes = said(vm.plot("alone-unreachable", results=folder))
-    assert legend == ["unreachable 0 (unreachable)"]
-    assert notes == ["no finite values"] * 2
-
-
 def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeypatch):
     names = ("numbers", "map-4", "alone-diverged")
     only = ["--only", ",".join(str(folder / f"{name}.toml") for name in names)]
@@ -164,17 +155,6 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeyp
     assert "RMS errors" in rest
 
 
-def test_paths_of_runs_that_have_failed(folder):
-    data = stored(folder, "all").sel(output=["spindle_x", "spindle_y"])
-    data = data.assign_coords(output=list(PATH)).squeeze()
-    figure = checked(vm.plot(data, "paths"))
-    assert "diverged 2* (diverged)" in said(figure)[0]
-    (line,) = (x for x in figure.axes[1].lines if x.get_label() == "ok 0*")
-    error = (data["outputs"] - data["reference_outputs"]).sel(label="ok_0")
-    away = np.hypot(*(error.sel(output=output).values for output in PATH))
-    np.testing.assert_allclose(line.get_ydata(), np.where(away > 0.0, away, np.nan), rtol=1e-12)
-
-
 def test_what_was_not_compared_is_drawn_alone(tmp_path):
     rom = vm.reduce("double_wishbone", "pod", rank=3)
     for result in (rom.dataset(rom.simulate()), vm.simulate("double_wishbone", errors=False)):
@@ -189,20 +169,6 @@ def test_what_was_not_compared_is_drawn_alone(tmp_path):
             vm.plot(result, "errors")
 
 
-def test_a_study_is_drawn_by_the_name_of_its_results(folder, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["plot", "all", "--results", str(folder)]) == 0
-    assert (tmp_path / "all-histories.png").exists()
-    # Another study of that name is stored beside it.
-    other = tmp_path / "all.toml"
-    other.write_text(study("ok", grid=CURVE))
-    vm.run_study(other, results=folder)
-    shown = vm.plot(other, "errors", results=folder).axes[0]
-    assert shown.get_xlabel() == "frequency perturbation (%)"
-    assert main(["plot", "al", "--results", str(folder)]) == 2
-    assert "'al'" in capsys.readouterr().err
-
-
 def test_errors_are_drawn_over_what_is_not_chosen(folder):
     data = stored(folder, "map-4")
     chosen = vm.plot(data, "errors", label="untrusted_1")
@@ -212,45 +178,6 @@ def test_errors_are_drawn_over_what_is_not_chosen(folder):
     lines = {line.get_label(): line for line in curve.lines}
     place = {"label": "ok_0", "amplitude_factor": 1.2, "output": "second_euler_angle"}
     np.testing.assert_array_equal(lines["ok 0"].get_ydata(), data["rms_error"].sel(place).squeeze())
-
-
-def test_counts_agree(folder, capsys):
-    path, name = str(folder / "numbers.toml"), "numbers"
-    assert main(["run", path, "--results", str(folder)]) == 1
-    printed = " ".join(capsys.readouterr().out.split())
-    data = stored(folder, name)
-    found = Counter(data["status"].values.ravel().tolist())
-    doubted = int(data["remark"].str.contains("not to be trusted").sum())
-    assert doubted
-    counts = ", ".join(f"{found[end]} {end}" for end in sorted(found))
-    told = counts.replace(" ok", f" ok ({doubted} not to be trusted)")
-    assert f"{name}: 8 grid points, 8 cells: {told};" in printed
-    assert main(["status", path, "--results", str(folder)]) == 0
-    assert f" {counts};" in " ".join(capsys.readouterr().out.split())
-    page = vm.write_report([path], folder / "page.html", folder)
-    assert f": {told}" in page.read_text(encoding="utf-8")
-
-
-def test_a_picture_shows_both_runs_and_their_difference(results):
-    run = results["figures-6-7"].sel({"label": "pod", "rank": 3}).squeeze(drop=False)
-    figure = checked(plot_result(run))
-    upper, lower = figure.axes[0], figure.axes[2]
-    angle = run.sel(output="second_euler_angle")
-    full, reduced = angle["reference_outputs"], angle["outputs"]
-    for line, outputs in zip(upper.lines, (full, reduced), strict=False):
-        np.testing.assert_array_equal(line.get_ydata(), 1e3 * outputs)
-    assert "mrad" in upper.get_ylabel()
-    factor, unit = readable_unit(float(abs(full - reduced).max()), "rad")
-    np.testing.assert_allclose(lower.lines[0].get_ydata(), factor * (reduced - full), atol=1e-9)
-    assert unit in lower.get_ylabel()
-    (shade,) = (p for p in lower.patches if "best approximation" in p.get_label())
-    best = factor * angle["floor_rms_error"].item()
-    assert shade.get_height() == pytest.approx(2.0 * best)
-    others = [name for name in run["output"].values if name not in shown_outputs(run)]
-    assert plot_result(run.sel(output=others)).axes[0].get_ylabel().startswith("spindle disp")
-    point = results["figures-2-4"].sel(start="dropped")
-    for kind in ("histories", "paths", "errors"):
-        assert checked(plot_result(point, None, kind)).get_suptitle()
 
 
 @pytest.mark.parametrize(
@@ -268,19 +195,6 @@ def test_a_picture_shows_both_runs_and_their_difference(results):
 def test_what_cannot_be_drawn_is_refused(results, study, drawn, word):
     with pytest.raises(InputError, match=word):
         vm.plot(results[study], **drawn)
-
-
-def test_pictures_need_a_point_a_method_and_outputs(results):
-    starts, study = results["figures-2-4"], results["figure-11"].isel(rank=0)
-    alone = study.sel({"label": ["full_order"]})
-    without = study.isel(output=slice(0)), study.drop_vars("signal_range")
-    kinds = {"histories": [starts], "errors": [alone, *without]}
-    for kind, lacking in kinds.items():
-        for dataset in lacking:
-            with pytest.raises(InputError):
-                plot_result(dataset, None, kind)
-    with pytest.raises(InputError, match="jobs"):
-        vm.figures(["5"], jobs=10**39)
 
 
 FACTOR = {"frequency_factor": [0.8, 1.0, 1.2, 1.4]}
@@ -345,12 +259,3 @@ def test_samples_are_drawn_over_what_was_sampled():
     assert len(figure.axes) == 6
     # Of four quantities the errors follow the third.
     assert figure.axes[3].get_xlabel() == "third (kg)"
-
-
-def test_full_and_wide_maps_have_their_published_line(folder):
-    values = ", ".join(f"{value:.3f}" for value in np.linspace(0.8, 1.2, 51))
-    grid = f"frequency_factor = [{values}]\namplitude_factor = [1.0, 1.1]"
-    text = study("ok", grid=grid, keep="metrics").replace("0.01", "1e-4")
-    (folder / "wide.toml").write_text(text)
-    figure = checked(vm.plot(vm.run_study(folder / "wide.toml", results=folder), "errors"))
-    assert len(figure.axes[0].collections) == 2

@@ -1,15 +1,11 @@
-"""Grids: places are complete, experiments are made when asked for, parameters are axes."""
-
-import weakref
+"""Grids: places are complete, experiments are made once, parameters are axes."""
 
 import numpy as np
 import pytest
 
 import vehiclemor as vm
 from tests.study.small import small_study
-from vehiclemor.cli import main
 from vehiclemor.errors import FileError
-from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.plans.grid import expand, sampled
 from vehiclemor.study.plans.loading import load_studies, write_study
 from vehiclemor.study.plans.results import flattened
@@ -31,7 +27,7 @@ def test_a_method_that_a_setting_does_not_concern_is_computed_once():
     labels = grid.dimensions["label"]
     assert grid.keys.size == 2 * len(labels)
     shared = {"full_order", "full_order_strongest", "replay"}
-    assert len(grid.unique) == len(shared) + 2 * (len(labels) - len(shared))
+    assert len(grid.experiments) == len(shared) + 2 * (len(labels) - len(shared))
 
 
 def test_a_grid_over_parameters_is_single_simulations_of_these_cars(tmp_path):
@@ -80,44 +76,6 @@ def test_a_plan_has_one_point_in_every_slice_of_every_range(plan):
         assert sorted(slices) == list(range(64))
     assert sampled(given) == sampled(given)
     assert sampled(given) != sampled(given.model_copy(update={"seed": 2}))
-
-
-def test_trainings_and_maneuvers_are_axes():
-    axes = {
-        "training": ["matched", "nominal", "travel_and_rack"],
-        "maneuver": ["sine_travel", "chirp_travel"],
-        "amplitude_factor": [0.9],
-        "parameters.tie_rod_inner.z": [-0.09],
-    }
-    seen = {
-        (run.maneuver.name, run.maneuver.amplitude_factor, run.parameters)
-        for cell in grid_of(grid=axes).unique.values()
-        for run in cell.training
-    }
-    # The tested ones, the model's own, and the named one.
-    runs = [("sine_travel", 0.9), ("chirp_travel", 0.9), ("sine_travel", 1.0)]
-    runs.append(("travel_and_rack", 1.0))
-    assert seen == {(*run, (("tie_rod_inner.z", -0.09),)) for run in runs}
-
-
-def test_experiments_of_a_grid_are_made_when_they_are_asked_for(monkeypatch):
-    made, alive, make = [], [], Experiment.__init__
-
-    def counted(self, *given, **further):
-        made.append(weakref.ref(self))
-        make(self, *given, **further)
-
-    monkeypatch.setattr(Experiment, "__init__", counted)
-    heights = {"parameters.tie_rod_inner.z": [-0.1, -0.09]}
-    samples = {"plan": "latin_hypercube", "count": 60, "seed": 1, "ranges": heights}
-    grid = grid_of(sampling=samples, methods=[{"method": "pod"}, {"method": "full_order"}])
-    assert len(grid.unique) == 120
-    for number, (key, cell) in enumerate(grid.unique.items()):
-        if number % 40 == 0:
-            assert cell.key == key
-            alive.append(sum(reference() is not None for reference in made))
-    assert len(made) >= 240
-    assert max(alive) < 10
 
 
 def test_rows_of_different_models_keep_their_units_and_counts(tmp_path):
@@ -180,24 +138,3 @@ def test_what_can_not_be_run_is_told_before_the_first_cell(tmp_path, model, text
         vm.run_study(path, results=tmp_path / "results")
     assert "\n" not in str(error.value)
     assert not (tmp_path / "results").exists()
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"count": 6, "plan": "sobol"}, "count"),
-        ({"ranges": {"parameters.a": [2.0, 1.0]}}, "parameters.a"),
-        ({"ranges": {"a": [1.0, 2.0]}}, "a is neither"),
-    ],
-)
-def test_wrong_samplings_are_told(change, words):
-    given = {"plan": "latin_hypercube", "count": 2, "seed": 0, "ranges": {"parameters.a": [0, 1]}}
-    with pytest.raises(ValueError, match=words):
-        Sampling.model_validate(given | change)
-
-
-def test_a_run_says_why_cells_are_rejected(tmp_path, capsys):
-    path = small_study(tmp_path, 'keep = "metrics"\n', "slow_manifold")
-    assert main(["run", str(path), "--results", str(tmp_path)]) == 0
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "1 rejected: slow_manifold reduces kind" in printed

@@ -10,15 +10,14 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.errors import FileError, InputError
-from vehiclemor.simulation import input_polynomials
-from vehiclemor.simulation.build import build
-from vehiclemor.study import evaluate
-from vehiclemor.study import scenario as scenario_module
 from vehiclemor.study.plans.choice import Validation, choose, outcomes, reasons
-from vehiclemor.study.plans.loading import load_studies
-from vehiclemor.study.plans.protocol import drawn, drawn_sets, load_protocol, protocol_names
+from vehiclemor.study.plans.protocol import (
+    load_protocol,
+    protocol_names,
+    sampled_runs,
+    sampled_sets,
+)
 from vehiclemor.study.plans.study_file import Bound, Box, Draw
-from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 SAME_POINT = "f 1.01, a 1.435, equilibrium, 18.548 m/s"
@@ -40,22 +39,6 @@ def protocol(tmp_path_factory, protocol_text):
 # What the files of the package say
 
 
-def test_the_study_names_every_protocol(protocols):
-    assert sorted(load_studies("predictive")) == sorted(protocol_names().values())
-
-
-@pytest.mark.parametrize("name", VEHICLES)
-def test_training_reaches_as_far_as_what_is_drawn(protocols, name):
-    training, definition = protocols[name].sets["training"], protocols[name].definition
-    frequencies = [s.maneuver.frequency_factor for s in training]
-    largest = max(abs(s.maneuver.amplitude_factor) for s in training)
-    for box in definition.drawn.boxes:
-        assert min(frequencies) <= box.frequency[0]
-        assert max(frequencies) >= box.frequency[1]
-        assert largest >= box.amplitude[1]
-    assert largest < max(box.amplitude[1] for box in definition.drawn_outside.boxes)
-
-
 @pytest.mark.parametrize(
     ("name", "first", "digest"),
     [
@@ -68,52 +51,11 @@ def test_the_test_set_of_every_commit_and_machine(protocols, name, first, digest
     """A change here is another test set: it needs another version in the protocol."""
     protocol = protocols[name]
     assert protocol.test_set == f"predictive-{name}-1, seed 20261122"
-    sets = drawn_sets(protocol)
+    sets = sampled_sets(protocol)
     assert len(sets["drawn"]) == 299
     assert sets["drawn"][0].label == first
     labels = [run.label for runs in sets.values() for run in runs]
     assert hashlib.sha256("\n".join(labels).encode()).hexdigest()[:16] == digest
-
-
-def test_rows_and_what_they_learn_from(protocols):
-    entries = {e.label: e for e in protocols[VEHICLES[0]].entries}
-    names, tolerances = zip(*map(str.split, entries["ros34pw2"].row_labels), strict=True)
-    assert set(names) == {"ros34pw2"}
-    used = [settings["tolerance"] for settings in entries["ros34pw2"].candidates]
-    assert [float(tolerance) for tolerance in tolerances] == used
-    assert not any(".0e" in tolerance or "e-0" in tolerance for tolerance in tolerances)
-    assert entries["replay"].row_labels == ["replay"]
-    other = protocols[VEHICLES[1]]
-    (fixed,) = (e for e in other.entries if e.label == "fixed basis")
-    assert {s.maneuver.name for s in fixed.training} == {"rack_lane_change"}
-    assert len(fixed.training) < len(other.sets["training"])
-
-
-def test_another_speed_is_a_state_and_the_own_speed_a_name():
-    model = build(VEHICLES[0])
-    own, faster = (
-        Scenario.of("lane_change", (1.0, 1.0), "dropped", speed) for speed in (20.0, 26.0)
-    )
-    assert start_of(model, own) == "dropped"
-    assert isinstance(start_of(model, faster), np.ndarray)
-    run = training_run(model, replace(faster, start="equilibrium"))
-    speeds = run.at(np.array([0.0, 0.1])).outputs[:, model.outputs.index("longitudinal_speed")]
-    np.testing.assert_allclose(speeds, 26.0, rtol=1e-3)
-
-
-def test_what_all_rows_need_of_a_run_is_kept_until_the_next_row(protocols):
-    kept = (
-        input_polynomials._recorded,
-        input_polynomials._found_signal,
-        evaluate.kept_reference,
-        scenario_module._state_at,
-        scenario_module.input_hash,
-    )
-    for protocol in protocols.values():
-        draws = (protocol.definition.drawn, protocol.definition.drawn_outside)
-        runs = len(protocol.sets["test"]) + sum(draw.runs for draw in draws if draw)
-        # Of a smaller cache nothing would be left when the next row comes.
-        assert all(runs <= function.cache_parameters()["maxsize"] for function in kept)
 
 
 # Drawn runs
@@ -122,47 +64,47 @@ def test_what_all_rows_need_of_a_run_is_kept_until_the_next_row(protocols):
 def test_drawn_runs_follow_from_seed_version_and_purpose(protocol):
     draw = Draw(runs=40, boxes=[BOX])
     one, again, *others = (
-        drawn(protocol.model, draw, seeds)
+        sampled_runs(protocol.model, draw, seeds)
         for seeds in ((1, 1, 0), (1, 1, 0), (2, 1, 0), (1, 2, 0), (1, 1, 1))
     )
     assert one == again
     assert not any(set(one) & set(other) for other in others)
     # What is known is not drawn.
-    assert not set(one) & set(drawn(protocol.model, draw, (1, 1, 0), one))
+    assert not set(one) & set(sampled_runs(protocol.model, draw, (1, 1, 0), one))
     point = Box(maneuver="sine_travel", both_signs=False)
     with pytest.raises(InputError, match="2"):
-        drawn(protocol.model, Draw(runs=2, boxes=[point]), (1, 1, 0))
+        sampled_runs(protocol.model, Draw(runs=2, boxes=[point]), (1, 1, 0))
 
 
 def test_drawn_sets_are_apart_from_what_was_learned_and_from_lists(protocol):
-    sets = drawn_sets(protocol)
+    sets = sampled_sets(protocol)
     assert {name: len(runs) for name, runs in sets.items()} == {"drawn": 5, "drawn_outside": 2}
     learned = [protocol.sets[name] for name in ("training", "validation")]
     keys = [run.run_key for runs in (*learned, *sets.values()) for run in runs]
     assert len(set(keys)) == len(keys)
     # Neither fewer methods nor a list for other ends changes a draw; learning from a run does.
     listed = {"outside": sets["drawn"]}
-    assert drawn_sets(replace(protocol, entries=protocol.entries[:1])) == sets
-    assert drawn_sets(replace(protocol, sets=protocol.sets | listed)) == sets
+    assert sampled_sets(replace(protocol, entries=protocol.entries[:1])) == sets
+    assert sampled_sets(replace(protocol, sets=protocol.sets | listed)) == sets
     learned = replace(protocol, sets=protocol.sets | {"training": sets["drawn"]})
-    assert not set(drawn_sets(learned)["drawn"]) & set(sets["drawn"])
+    assert not set(sampled_sets(learned)["drawn"]) & set(sets["drawn"])
     # Ten runs of one box fill both.
     half = Draw(runs=5, boxes=[Box(maneuver="sine_travel", frequency=[1.5, 1.504])])
     same = protocol.definition.model_copy(update={"drawn": half, "drawn_outside": half})
-    one, other = drawn_sets(replace(protocol, definition=same)).values()
+    one, other = sampled_sets(replace(protocol, definition=same)).values()
     assert len({*one, *other}) == 10
 
 
 def test_an_audit_draws_other_runs_and_stands_apart(protocol, tmp_path):
     audit = load_protocol(str(protocol.path), seed=7)
-    assert not set(drawn_sets(protocol)["drawn"]) & set(drawn_sets(audit)["drawn"])
+    assert not set(sampled_sets(protocol)["drawn"]) & set(sampled_sets(audit)["drawn"])
     assert (protocol.study, audit.study) == ("small", "small-seed-7")
     with pytest.raises(InputError, match="seed"):
         vm.run_study("figure-12", seed=7, results=tmp_path)
 
 
 def test_a_draw_fills_its_box_and_stays_inside(protocol):
-    runs = drawn(protocol.model, Draw(runs=400, boxes=[BOX]), (1, 1, 0))
+    runs = sampled_runs(protocol.model, Draw(runs=400, boxes=[BOX]), (1, 1, 0))
     assert len({run.run_key for run in runs}) == 400
     frequency = np.array([run.maneuver.frequency_factor for run in runs])
     amplitude = np.array([run.maneuver.amplitude_factor for run in runs])
@@ -198,8 +140,8 @@ def test_only_a_miss_without_a_word_is_silent():
     part = results([0.5, 2.0, 2.0, np.nan, 0.5], statuses, [np.inf, np.inf, 3.0, np.inf, 3.0])
     found = outcomes(part, bounds)
     assert found.missed.tolist() == [False, True, True, True, False]
-    assert found.silent.tolist() == [False, True, False, False, False]
-    assert found.flagged.tolist() == [False, False, True, True, True]
+    assert found.undetected.tolist() == [False, True, False, False, False]
+    assert found.warned.tolist() == [False, False, True, True, True]
 
 
 def test_runs_of_a_sensitive_full_order_are_found(protocol):

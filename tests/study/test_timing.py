@@ -97,13 +97,6 @@ def test_the_first_call_warms_the_caches_and_the_median_of_the_others_counts(mon
     assert called(lambda: replace(ended, status="diverged"), 1).status == "diverged"
 
 
-def test_a_case_that_fails_has_no_seconds_and_no_baseline_gives_no_speed_up():
-    data = timed_cases(cases("pod_r3", "stuck"), 2)
-    assert "speed_up" not in data
-    assert data["status"].values.tolist() == ["ok", "diverged"]
-    assert np.isfinite(data["seconds"]).values.tolist() == [True, False]
-
-
 def test_what_was_measured_is_measured_again_only_if_it_has_changed(tmp_path, monkeypatch):
     monkeypatch.setattr(timing, "CASE_ROUNDS", 2)
     path = tmp_path / "studies" / "mine.nc"

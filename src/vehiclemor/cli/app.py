@@ -1,26 +1,31 @@
-"""The application: its commands, and one clear line for what is wrong."""
+"""The application: its commands, and one clear line and an exit status for what goes wrong."""
 
+import io
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from cyclopts import App, Parameter
+from cyclopts import App, CycloptsError, Parameter, UnknownOptionError
 
 from vehiclemor import __version__
-from vehiclemor.cli.ending import MEANING, ended
-from vehiclemor.cli.names import cite, list_components, show
-from vehiclemor.cli.new_plugin import new_plugin
-from vehiclemor.cli.options import strict
+from vehiclemor.cli.names import cite, list_components, new_plugin, show
+from vehiclemor.cli.options import FAILED, strict
 from vehiclemor.cli.runs import export, plot, simulate
 from vehiclemor.cli.studies import compare, convert, figures, report, run, status
+from vehiclemor.errors import MachineError, PlugInError, VehiclemorError, machine_reason
 from vehiclemor.resources import handbook_folder
 
+# Wrong input; and what the number of a signal is added to.
+WRONG_INPUT, STOPPED = 2, 128
 app = App(
     name="vehiclemor",
     version=__version__,
     help="Benchmark suite for model order reduction of multibody vehicle models.\n\n"
     f"Handbook (notation, findings, how to add a model or a method): {handbook_folder()}",
     default_parameter=Parameter(converter=strict, negative=""),
-    help_epilogue=MEANING,
+    help_epilogue="""Exit status: 0 done; 1 a simulation has diverged, runs of a study have the
+status error, a plug-in breaks, the machine has failed (no space, no memory, a killed worker), or a
+bound is missed and --check asks; 2 wrong input; 130 and 143 stopped by Ctrl-C and by SIGTERM.""",
     # It must reach `ended`, which tells how to resume.
     suppress_keyboard_interrupt=False,
 )
@@ -36,3 +41,45 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return ended(
         lambda: app(given, exit_on_error=False, print_error=False, result_action="return_value")
     )
+
+
+class _StopError(KeyboardInterrupt):
+    """A signal, with its number: a class of its own, since Python ends otherwise after Ctrl-C."""
+
+
+def ended(run: Callable[[], int | None]) -> int:
+    """Exit status of a call; why it has ended early is one line on standard error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A terminal that can't show a name must not end a study.
+            stream.reconfigure(errors="backslashreplace")
+
+    def stop(number: int, _: object) -> None:
+        raise _StopError(number)
+
+    # SIGTERM ends a command as Ctrl-C does: workers ended, partial files removed.
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        return int(run() or 0)
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    except (MachineError, PlugInError) as error:
+        text, status = str(error), FAILED
+    except UnknownOptionError as error:
+        names = sorted({argument.name for argument in error.argument_collection})
+        known = f" Known: {', '.join(names)}" * bool(names and "Did you mean" not in str(error))
+        text, status = f"{error}{known}", WRONG_INPUT
+    except (CycloptsError, VehiclemorError) as error:
+        text, status = str(error), WRONG_INPUT
+    except (MemoryError, OSError) as error:
+        reason = machine_reason(error)
+        text, status = reason or str(error), FAILED if reason else WRONG_INPUT
+    except KeyboardInterrupt as error:
+        text = "stopped; finished runs of a study are stored, run again to resume"
+        status = STOPPED + (error.args[0] if error.args else signal.SIGINT)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    print("vehiclemor: " + " ".join(text.split()), file=sys.stderr)
+    return status

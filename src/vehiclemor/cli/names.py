@@ -1,11 +1,19 @@
-"""What is registered, and what a name declares."""
+"""What is registered, what a name declares, and a package of one's own to begin with."""
 
 import json
+import re
+from importlib.util import find_spec
+from keyword import iskeyword
+from pathlib import Path
 from typing import Any, Literal
 
 from vehiclemor import api
 from vehiclemor.cli.options import All, Json, ParameterFile, Parameters, key_values
+from vehiclemor.errors import FileError, InputError
+from vehiclemor.files import write_folder
+from vehiclemor.registry import GROUPS, names
 from vehiclemor.report.printing import table, wrapped
+from vehiclemor.resources import data_folder, data_names, handbook_folder
 
 KINDS = ("models", "methods", "maneuvers", "studies")
 # A longer name has its text right behind it.
@@ -102,3 +110,57 @@ def cite() -> None:
     from vehiclemor.report.published import citations
 
     print(citations())
+
+
+# A package that works as it stands: its name is replaced by the new one wherever it is written.
+TEMPLATE = "quarter_car"
+NAME = re.compile(r"[a-z]([a-z0-9_]{0,38}[a-z0-9])?")
+
+
+def new_plugin(name: str, *, out: Path | None = None) -> None:
+    """Write a package of your own to begin with: a model, a maneuver, a method, studies, tests.
+
+    Parameters
+    ----------
+    name
+        Of the package and its model; its maneuver is NAME_road, its method NAME_modes.
+    out
+        New folder; NAME_plugin here by default.
+    """
+    if not NAME.fullmatch(name) or iskeyword(name):
+        raise InputError(
+            f"{name!r} can't name a Python package: at most 40 small letters, digits and "
+            "underscores, a letter first, no word of Python"
+        )
+    # Without an origin it is any folder that happens to be here.
+    package = getattr(find_spec(name), "origin", None) is not None
+    known = {kind: set(names(kind)) for kind in GROUPS}
+    known |= {"study": set(data_names("studies")), "Python package": {name} if package else set()}
+    for kind, taken in known.items():
+        for double in {name, f"{name}_road", f"{name}_modes"} & taken:
+            raise InputError(f"{name}: there is a {kind} {double} already")
+    folder = Path(f"{name}_plugin") if out is None else out
+    try:
+        if folder.exists() or folder.is_symlink():
+            raise FileError(f"{folder} exists: it is not replaced")
+        if not folder.absolute().parent.is_dir():
+            raise FileError(f"{folder}: the folder {folder.parent} does not exist")
+    except OSError as error:
+        raise FileError(f"{folder}: can't be written ({error.strerror})") from None
+    write_folder(folder, lambda temporary: _write(temporary, name))
+    print(f"written: {folder}, a package that works as it stands; to install and try it:\n")
+    print(f"  pip install -e {folder} pytest")
+    print(f"  pytest {folder}")
+    print(f"  vehiclemor simulate {name} --method {name}_modes --frequency 1.2\n")
+    print(f"Step by step: {handbook_folder() / 'my-plug-in.md'}")
+
+
+def _write(folder: Path, name: str) -> None:
+    template = data_folder() / "plugin_template"
+    for path in template.rglob("*"):
+        if path.suffix in (".py", ".toml"):
+            text = path.read_text(encoding="utf-8")
+            text = text.replace(TEMPLATE.replace("_", "-"), name.replace("_", "-"))
+            place = folder / path.relative_to(template).as_posix().replace(TEMPLATE, name)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_text(text.replace(TEMPLATE, name), encoding="utf-8")

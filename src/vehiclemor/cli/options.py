@@ -8,13 +8,16 @@ from cyclopts import Parameter, Token, convert
 
 from vehiclemor.errors import InputError
 
+# A bound is missed, where that is asked for; a simulation, a study, a plug-in or the machine has
+# failed.
+MISSED, FAILED = 1, 1
 All = Annotated[bool, Parameter(name="--all")]
 Json = Annotated[bool, Parameter(name="--json", help="Print JSON.")]
 Results = Annotated[Path, Parameter(help="Results folder.")]
 Jobs = Annotated[int, Parameter(help="Number of processes, for what is missing.")]
 Seed = Annotated[
     int | None,
-    Parameter(help="Draws fresh test runs of protocols, for an audit; their results stand apart."),
+    Parameter(help="Samples fresh test runs of protocols, for an audit with results of its own."),
 ]
 Settings = Annotated[
     list[str] | None,
@@ -35,13 +38,7 @@ ParameterFile = Annotated[
 
 
 def strict(wanted: Any, tokens: Sequence[Token]) -> Any:
-    """Value of an option; 1.5 is no integer, and an empty text no path.
-
-    Raises
-    ------
-    InputError
-        If the text is another kind of value.
-    """
+    """Value of an option; 1.5 is no integer, and an empty text no path."""
     for token in tokens:
         name, text = token.keyword or "argument", token.value
         if int in (wanted, *get_args(wanted)) and not text.strip().removeprefix("-").isdecimal():
@@ -52,13 +49,7 @@ def strict(wanted: Any, tokens: Sequence[Token]) -> Any:
 
 
 def key_values(option: str, given: Iterable[str] | None) -> dict[str, Any]:
-    """Key -> an integer, a number, numbers that commas separate as a list, or text.
-
-    Raises
-    ------
-    InputError
-        If something is not key=value, or a key is given twice.
-    """
+    """Key -> an integer, a number, numbers that commas separate as a list, or text."""
     found: dict[str, Any] = {}
     for text in given or ():
         key, separator, value = text.partition("=")

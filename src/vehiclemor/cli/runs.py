@@ -8,8 +8,8 @@ from cyclopts import Parameter
 
 import vehiclemor as vm
 from vehiclemor.api import RESULTS
-from vehiclemor.cli.ending import FAILED
 from vehiclemor.cli.options import (
+    FAILED,
     ParameterFile,
     Parameters,
     Results,
@@ -88,8 +88,8 @@ def simulate(
     how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
     dataset = vm.simulate(ready, method, **how, **chosen)
     from vehiclemor.netcdf_file import write_dataset
+    from vehiclemor.report.labels import tabled_outputs
     from vehiclemor.report.printing import simulation_text
-    from vehiclemor.report.shown import tabled_outputs
 
     shown = ready.outputs if all_outputs else tabled_outputs(ready.definition)
     print(simulation_text(dataset, shown, ready.counts))

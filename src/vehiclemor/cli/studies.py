@@ -3,6 +3,8 @@
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -10,9 +12,7 @@ from cyclopts import Parameter
 
 import vehiclemor as vm
 from vehiclemor.api import RESULTS
-from vehiclemor.cli.ending import FAILED, MISSED
-from vehiclemor.cli.options import All, Jobs, Json, Results, Seed, new_file
-from vehiclemor.cli.progress import shown_progress
+from vehiclemor.cli.options import FAILED, MISSED, All, Jobs, Json, Results, Seed, new_file
 from vehiclemor.errors import InputError
 from vehiclemor.report.printing import ends_text, wrapped
 from vehiclemor.report.study_formats import Format
@@ -32,21 +32,19 @@ def run(
 ) -> int:
     """Run a study; what an earlier run has finished is not computed again.
 
-    A cell that stands at several points of the grid is computed once.
-
     Parameters
     ----------
     scheduler
-        Address of a dask scheduler whose workers compute the cells.
+        Address of a dask scheduler whose workers compute.
     """
     from vehiclemor.report.frames import counted_ends
     from vehiclemor.study.run import run_studies
 
     began, errors = time.perf_counter(), 0
-    with shown_progress() as cells:
+    with shown_progress() as runs:
         found = run_studies(study, results, jobs, scheduler, seed)
     for name, dataset in found.items():
-        places = f"{dataset['status'].size} grid points, {cells[name]} cells"
+        places = f"{dataset['status'].size} grid points, {runs[name]} runs"
         counts = counted_ends(dataset)
         print(wrapped(f"{name}: {places}: {counts}; {dataset.encoding['source']}", 0, 2))
         ends = zip(dataset["status"].values.flat, dataset["message"].values.flat, strict=True)
@@ -59,17 +57,14 @@ def run(
 def status(study: Study, *, results: Results = RESULTS, seed: Seed = None) -> None:
     """Show how far a study is, without computing anything."""
     for name, found in vm.status(study, results, seed).items():
-        text = f"{name}: {found.done} of {found.cells} cells done"
-        if found.to_do:
-            known = found.seconds_left == found.seconds_left
-            left = f"about {found.seconds_left:.3g} s in one process" if known else "time unknown"
-            text += f", {found.to_do} to do ({left})"
-        text += f", {found.later}" if found.later and not found.result else ""
+        parts = [f"{name}: {found.done} of {found.runs} runs done"]
+        parts += [f"{found.to_do} to do"] if found.to_do else []
+        parts += [found.later] if found.later and not found.result else []
+        text = ", ".join(parts)
         if found.ends:
             text += f"; {ends_text(kind for kind, _ in found.ends.elements())}"
-        combined = found.result or "not combined yet"
         older = " is older" if found.result and found.to_do else ""
-        print(wrapped(f"{text}; {combined}{older}", 0, 2))
+        print(wrapped(f"{text}; {found.result or 'not combined yet'}{older}", 0, 2))
         _print_reasons(found.failed)
 
 
@@ -134,8 +129,7 @@ def figures(
     only
         Names of figures, separated by commas: those of the paper, such as 6, or histories-,
         errors-, map- or pareto- and the name of a model; or a study, collection or protocol by name
-        or TOML file, of which is drawn what its dimensions ask for.  The paper's by default, but
-        Pareto figures only where their study is stored.
+        or TOML file, of which is drawn what its dimensions ask for.  The paper's by default.
     out
         Folder of the figures; by default `figures` in the results folder.
     style
@@ -146,21 +140,13 @@ def figures(
     chosen = [name.strip() for name in (only or "").split(",") if name.strip()]
     if only is not None and not chosen:
         raise InputError(f"--only {only!r} names no figure")
-    from vehiclemor.report import regenerate
-
     failed: dict[str, str] = {}
     with shown_progress():
-        written = regenerate.figures(
-            chosen, out, results, jobs, style=style, dpi=dpi, failed=failed
-        )
+        written = vm.figures(chosen, out, results, jobs, style=style, dpi=dpi, failed=failed)
     for path in written:
         print(path)
     for name, why in failed.items():
         print(f"figure {name} can't be drawn: {why}", file=sys.stderr)
-    missing = {} if chosen else regenerate.left_out(results)
-    if missing:
-        made = "vehiclemor run predictive makes their studies"
-        print(f"left out: {', '.join(missing)} ({made})")
     return FAILED if failed else 0
 
 
@@ -200,3 +186,40 @@ def convert(study: str, *, to: Format, out: Path | None = None, results: Results
         New file or folder; under the study's name here by default.
     """
     print(f"written: {vm.convert(study, to, out, results)}")
+
+
+# Without a terminal there is a line every so many seconds.
+INTERVAL = 5.0
+
+
+@contextmanager
+def shown_progress() -> Iterator[dict[str, int]]:
+    """Show how far all that is run inside is, on standard error; gives work -> all its parts."""
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    from vehiclemor.progress import listening
+
+    console = Console(stderr=True)
+    bar = Progress(console=console, disable=not console.is_terminal)
+    tasks: dict[str, TaskID] = {}
+    totals: dict[str, int] = {}
+    began = printed = time.monotonic()
+
+    def update(work: str, done: int, total: int) -> None:
+        nonlocal printed
+        now = time.monotonic()
+        # The test of a protocol adds to what its validation was.
+        grown, totals[work] = totals.get(work) != total, total
+        if console.is_terminal:
+            if work not in tasks:
+                tasks[work] = bar.add_task(work)
+            bar.update(tasks[work], completed=done, total=total)
+        elif grown and done < total:
+            print(f"{work}: {total - done} of {total} to compute", file=sys.stderr)
+        elif done < total and now - printed >= INTERVAL:
+            print(f"{work}: {done} of {total}, {now - began:.0f} s", file=sys.stderr)
+            printed = now
+
+    with bar, listening(update):
+        yield totals

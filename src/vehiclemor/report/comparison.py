@@ -1,4 +1,4 @@
-"""Comparisons: with the paper, on unseen inputs, of every model, of any study."""
+"""Comparisons: with the paper, on unseen inputs, of every model, of any study; and costs."""
 
 import math
 from collections.abc import Iterator
@@ -11,19 +11,22 @@ import xarray as xr
 from vehiclemor.arguments import count, file_path
 from vehiclemor.errors import InputError
 from vehiclemor.reduction.methods import pod
-from vehiclemor.registry import names, unknown
-from vehiclemor.report.costs import cost_table, timing_of
+from vehiclemor.registry import component, names, unknown
 from vehiclemor.report.criteria import CRITERIA
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.findings import Criterion, Finding, Results, judged
 from vehiclemor.report.frames import grid_rows
+from vehiclemor.report.labels import of_kind, timing_cases
 from vehiclemor.report.printed_numbers import CLAIMS, TIMING, compared, number_criterion
 from vehiclemor.report.published import Claim, Number, load_published
 from vehiclemor.report.spectrum import spectrum_table
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
+from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.run import run_studies
+from vehiclemor.study.scenario import Scenario
+from vehiclemor.study.timing import timed_starts
 
 PAPER = "paper"
 ALL_MODELS = "all three models"
@@ -50,7 +53,7 @@ def compare(
     jobs
         Number of processes.
     seed
-        Draws fresh test runs for an audit: of `predictive`, or of a protocol.
+        Samples fresh test runs for an audit: of `predictive`, or of a protocol.
 
     Returns
     -------
@@ -58,17 +61,12 @@ def compare(
         Of `paper` a row for each published number or claim and variant of the method (`default`,
         `literal`: the paper's words, or what differs from them): its id, model, item, the published
         number, a `verdict` (`met`, `missed`, `not_comparable`), the columns of `findings.Finding`,
-        and `replay`, the same number of replay.  The others are described at `model_comparison` and
-        `study_comparison` in `vehiclemor.report.comparison`.
-
-    Raises
-    ------
-    InputError
-        If there is no such comparison.
+        and `replay`, the same number of the training-trajectory baseline.  The others are described
+        at `model_comparison` and `study_comparison` in `vehiclemor.report.comparison`.
     """
     folder, jobs = file_path("results", results), count("jobs", jobs)
     if seed is not None and (what == PAPER or what in names("model")):
-        raise InputError(f"seed: comparison {what!r} draws no test runs of its own")
+        raise InputError(f"seed: comparison {what!r} samples no test runs of its own")
     if what == PAPER:
         return paper_comparison(folder, jobs)
     if what in names("model"):
@@ -115,12 +113,12 @@ def rows_of(entry: Number | Claim, criterion: Criterion | None, results: Results
     else:
         head["item"] = f"figure {entry.figure}: " * bool(entry.figure) + entry.statement
     head["published"] = entry.value if isinstance(entry, Number) else math.nan
-    nothing = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-")
-    replay = (
-        criterion(results, "replay").reproduced if criterion and criterion.of_replay else math.nan
-    )
-    for label, variant in criterion.variants.items() if criterion else [("", "")]:
-        finding = criterion(results, label) if criterion else nothing
+    if criterion is None:
+        nothing = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-")
+        criterion = Criterion(lambda *_: nothing, variants={"": ""}, of_replay=False)
+    replay = criterion(results, "replay").reproduced if criterion.of_replay else math.nan
+    for label, variant in criterion.variants.items():
+        finding = criterion(results, label)
         own = {"variant": variant, "verdict": judged(finding.within), "replay": replay}
         yield head | own | finding._asdict()
 
@@ -128,12 +126,8 @@ def rows_of(entry: Number | Claim, criterion: Criterion | None, results: Results
 def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     """Every registered method that fits, on one model; what is missing is run first.
 
-    Returns
-    -------
-    pandas.DataFrame
-        `kind` tells what a row is: `cost`, `spectrum` as in `cost_table`, `spectrum_table`; the
-        others as in `study_comparison`, of the model's studies `<model>-nominal` and
-        `<model>-perturbed` and of its protocol.
+    `kind` tells what a row is: `cost`, `spectrum` as in `cost_table`, `spectrum_table`; the others
+    as in `study_comparison`, of the model's nominal and perturbed runs and of its protocol.
     """
     studies = nominal(name, folder), perturbed(name, folder)
     parts = [study_comparison(study, folder, jobs) for study in studies]
@@ -149,15 +143,71 @@ def study_comparison(
 ) -> pd.DataFrame:
     """A study, all members of a collection, or a protocol; what is missing is run first.
 
-    Returns
-    -------
-    pandas.DataFrame
-        `study` and `kind` tell what a row is.  `errors`: an output of one method from one start
-        over a study's grid, see `frames.grid_rows`.  `method`, `target`, `bound`: a method of a
-        protocol, and what the one that validation has chosen must and does reach, see `unseen`.
-        Errors are in SI units.
+    `kind` tells what a row is.  `errors`: an output of one method from one start over a study's
+    grid, see `frames.grid_rows`.  `method`, `target`, `bound`: a method of a protocol, and what the
+    one that validation has chosen must and does reach, see `unseen`.  Errors are in SI units.
     """
     rows: list[Row] = []
     for dataset in run_studies(study, folder, jobs, seed=seed).values():
         rows += protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
     return pd.DataFrame(rows)
+
+
+def timing_of(model: str, folder: Path) -> xr.Dataset:
+    """Stored timing of the cases of a model, measured first if it is missing."""
+    built, cases = build(model), timing_cases(component("model", model))
+    settings = {c.id: complete_settings(built, c.method, c.settings, c.preset) for c in cases}
+    experiments: dict[str, dict[str, Any]] = {}
+    for start in built.starts:
+        # Trained on the run that is timed.
+        run = (Scenario.of(built.definition.maneuver, (1.0, 1.0), start),)
+        experiments[start] = {
+            case.id: make_experiment(built, case.method, settings[case.id], run, run, "metrics")
+            for case in cases
+        }
+    data = timed_starts(experiments, folder / "studies" / f"timing-{model}.nc")
+    return data.assign_coords(label=("case", [case.label for case in cases]))
+
+
+def cost_table(model: str, folder: Path) -> pd.DataFrame:
+    """Cost of every timing case of a model on its nominal maneuver, from every start.
+
+    Speed-ups are against the paper's kind of baseline, and against the strongest full-order solver;
+    `break_even` is the number of runs after which a reduced model has paid for its training
+    (missing where it never does).
+    """
+    data, kind = timing_of(model, folder), component("model", model).kind
+    rows = [
+        _cost_row(data.sel(start=start, case=case), list(of_kind(kind).counts))
+        for start in data["start"].values
+        for case in data["case"].values
+    ]
+    return pd.DataFrame(rows)
+
+
+def _cost_row(data: xr.Dataset, counts: list[str]) -> Row:
+    """One case from one start."""
+    own, offline = float(data["seconds"]), float(data["offline_seconds"])
+    spread = float(data["seconds_upper"] - data["seconds_lower"])
+    status = str(data["status"].item())
+    speed_ups = {name: float(data[name]) for name in ("speed_up", "speed_up_strongest")}
+    # Time saved in a run; a run that has failed saves nothing.
+    saved = [own * (ratio - 1.0) if status == "ok" else 0.0 for ratio in speed_ups.values()]
+    even = [offline / s if s > 0.0 and offline > 0.0 else math.nan for s in saved]
+    return {
+        **{name: str(data[name].item()) for name in ("start", "case", "label")},
+        "status": status,
+        "rank": int(data["effective_rank"]),
+        "us_per_run": own * 1e6,
+        "ns_per_sample": float(data["seconds_per_sample"]) * 1e9,
+        **{name: int(data[name]) for name in counts},
+        "tolerance": float(data["tolerance"]),
+        "quartile_spread": spread / own if own > 0.0 else 0.0,
+        **speed_ups,
+        "loop_us": float(data["loop_seconds"]) * 1e6,
+        **{f"loop_{name}": float(data[f"loop_{name}"]) for name in speed_ups},
+        **{f"rms_{o}": float(data["rms_error"].sel(output=o)) for o in data["output"].values},
+        "offline_us": offline * 1e6,
+        "break_even": even[0],
+        "break_even_strongest": even[1],
+    }

@@ -199,11 +199,7 @@ def leaves_full_model(text: str, results: Results, label: str) -> Finding:
 
 
 def dropped_modes_excited(results: Results, label: str) -> Finding:
-    """Figure 14: at frequency +100 % three modes no longer hold most of the energy.
-
-    Energy as of equations 5 to 8: the sum of squares of the coordinates about the mean of their
-    control period.
-    """
+    """Figure 14: at frequency +100 % three modes no longer hold most of the energy (eq. 5-8)."""
     del results, label
     fitted = trained(1.0, 1.0)
     maneuver = component("maneuver", component("model", fitted.model.name).maneuver)

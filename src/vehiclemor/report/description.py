@@ -25,13 +25,14 @@ SCHEMAS: dict[str, type[BaseModel]] = {
     "study-schema": StudyFile,
     "parameter-schema": ParameterFile,
 }
-WORDS = {"string": "text", "boolean": "true or false", "array": "list", "object": "table"}
+TYPES = {"string": "text", "boolean": "true or false", "array": "list", "object": "table"}
 KINDS = {
     "ae": "algebraic equations Phi(q; u) = 0",
     "ode": "ordinary differential equations x' = f(x, u)",
     "dae": "differential equations with constraints, stabilised",
 }
 UNKNOWN = "known once the model has been simulated"
+QUANTITIES = ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints")
 # Values of an axis that are printed.
 SHOWN = 40
 
@@ -41,13 +42,7 @@ def description(
     parameters: Mapping[str, object] | None = None,
     parameter_file: Path | None = None,
 ) -> Description:
-    """What a name stands for; lists of dictionaries are the rows of tables.
-
-    Raises
-    ------
-    InputError
-        If nothing has that name, or a parameter is wrong.
-    """
+    """What a name stands for; lists of dictionaries are the rows of tables."""
     if not isinstance(name, str):
         raise InputError(f"name is {quoted(name)}, not a text")
     if name in names("model"):
@@ -79,7 +74,7 @@ def _model(
         starts = [DESIGN_START]
     else:
         starts = [UNKNOWN] if definition.solved else list(definition.starts(parameters.values()))
-    quantities = ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints")
+    declared = zip(definition.parameters.items(), parameters.entries.values(), strict=True)
     return {
         "model": name,
         "summary": definition.summary,
@@ -88,15 +83,13 @@ def _model(
         "starts": starts,
         "methods": [method for method, answer in accepted.items() if answer == "yes"],
         f"methods that may fit ({UNKNOWN})": [m for m, a in accepted.items() if a == "?"],
-        **{kind: _quantities(getattr(definition, kind)) for kind in quantities},
+        **{kind: _quantities(getattr(definition, kind)) for kind in QUANTITIES},
         "parameter file": str(path),
         "parameters": [
             {"name": parameter, "value": entry.value, "unit": entry.unit}
-            | {"bounds": _bounds(declared.above, declared.at_least, declared.at_most)}
+            | {"bounds": _bounds(limits.above, limits.at_least, limits.at_most)}
             | {"meaning": entry.description, "status": entry.status, "source": entry.source}
-            for (parameter, declared), entry in zip(
-                definition.parameters.items(), parameters.entries.values(), strict=True
-            )
+            for (parameter, limits), entry in declared
         ],
         "sources": [
             {"source": key, "licence": source.licence, "text": source.text}
@@ -152,7 +145,7 @@ def _maneuver(name: str) -> Description:
     models = {model: component("model", model).inputs for model in names("model")}
     driven = {m: i for m, i in models.items() if tuple(q.name for q in i) == maneuver.inputs}
     units = [q.unit for q in next(iter(driven.values()), ())] or [""] * len(maneuver.inputs)
-    signals = maneuver.at(maneuver.times).T
+    signals = zip(maneuver.inputs, units, maneuver.at(maneuver.times).T, strict=True)
     return {
         "maneuver": name,
         "summary": maneuver.summary,
@@ -161,7 +154,7 @@ def _maneuver(name: str) -> Description:
         "models": list(driven),
         "inputs": [
             {"name": i, "unit": unit, "smallest": float(s.min()), "largest": float(s.max())}
-            for i, unit, s in zip(maneuver.inputs, units, signals, strict=True)
+            for i, unit, s in signals
         ],
         "parameters": [
             {"name": f"{factor} factor", "default": 1.0, "bounds": _bounds(None, *limits)}
@@ -193,26 +186,19 @@ def _study(name: str) -> Description:
 
 def _grid(study: StudyFile) -> Description:
     """What a study varies; of a long axis both ends."""
-    axes = {key: [str(value) for value in values(entry)] for key, entry in study.grid.items()}
-    grid = [
-        {
-            "dimension": key,
-            "values": ", ".join(axis)
-            if len(axis) <= SHOWN
-            else f"{axis[0]}, {axis[1]}, ..., {axis[-1]} ({len(axis)} values)",
-        }
-        for key, axis in axes.items()
-    ]
+    grid = []
+    for key, entry in study.grid.items():
+        axis = [str(value) for value in values(entry)]
+        ends = f"{axis[0]}, {axis[1]}, ..., {axis[-1]} ({len(axis)} values)" if axis[1:] else ""
+        grid.append({"dimension": key, "values": ends if len(axis) > SHOWN else ", ".join(axis)})
     if plan := study.sampling:
         how = f"{plan.plan}, {plan.count} points, seed {plan.seed}"
-        sampled = plan.ranges.items()
-        grid += [
-            {"dimension": n, "values": f"{low} to {high} ({how})"} for n, (low, high) in sampled
-        ]
+        for key, (low, high) in plan.ranges.items():
+            grid.append({"dimension": key, "values": f"{low} to {high} ({how})"})
     return {
         "maneuver": study.maneuver or component("model", study.model).maneuver,
         "starts": study.start or ["the model's first"],
-        "training": study.training_words,
+        "training": study.trained_on,
         "parameters": _listed(study.parameters),
         "grid points": study.points,
         "keeps": study.keep,
@@ -249,18 +235,15 @@ def _keys(schema: Mapping[str, Any]) -> list[dict[str, object]]:
     """A row for each key of an object's JSON schema."""
     required = schema.get("required", ())
     return [
-        {
-            "name": key,
-            "type": _type(part),
-            "default": "required" if key in required else part.get("default"),
-            "meaning": part.get("description", ""),
-        }
+        {"name": key, "type": _type(part)}
+        | {"default": "required" if key in required else part.get("default")}
+        | {"meaning": part.get("description", "")}
         for key, part in schema["properties"].items()
     ]
 
 
 def _type(part: Mapping[str, Any]) -> str:
-    """Type and bounds of a value in words."""
+    """Type and bounds of a value as text."""
     if "$ref" in part:
         return part["$ref"].rpartition("/")[2]
     if "enum" in part:
@@ -270,17 +253,18 @@ def _type(part: Mapping[str, Any]) -> str:
         # Every integer is a number.
         return " or ".join(c for c in choices if c != "integer" or "number" not in choices)
     kind = part.get("type", "value")
-    for container, key in (("array", "items"), ("object", "additionalProperties")):
-        if kind == container:
-            inside = part.get(key)
-            return f"{WORDS[kind]} of {_type(inside)}" if isinstance(inside, dict) else WORDS[kind]
+    inside = part.get({"array": "items", "object": "additionalProperties"}.get(kind, ""))
+    if isinstance(inside, dict):
+        return f"{TYPES[kind]} of {_type(inside)}"
+    if kind in ("array", "object"):
+        return TYPES[kind]
     largest = part.get("maximum", part.get("exclusiveMaximum"))
     limits = _bounds(part.get("exclusiveMinimum"), part.get("minimum"), largest)
-    return f"{WORDS.get(kind, kind)} {limits}".rstrip()
+    return f"{TYPES.get(kind, kind)} {limits}".rstrip()
 
 
 def _bounds(above: float | None, at_least: float | None, at_most: float | None) -> str:
-    """Bounds of a number in words; empty if there are none."""
+    """Bounds of a number as text; empty if there are none."""
     if at_least is not None and at_most is not None:
         return f"{at_least:g} to {at_most:g}"
     limits = ((">", above), (">=", at_least), ("<=", at_most))

@@ -34,26 +34,12 @@ Results = Mapping[str, xr.Dataset]
 
 
 class Finding(NamedTuple):
-    """Outcome of one criterion.
+    """Outcome of one criterion: the number that decides, its bound, and whether it is met.
 
-    Attributes
-    ----------
-    reproduced, unit
-        The number that decides.
-    bound
-        What it is compared with, and in `threshold_source` whose it is.
-    within
-        Whether the number or claim holds; None if that can't be told.
-    measure
-        What the number is.
-    reason
-        Why not, and what else was seen.
-    floor
-        Of an error: the same of the best approximation in the subspaces.
-    signal_rms
-        Of an error: the RMS of the signal itself.  A bound above it is empty: zero would meet it.
-    strongest
-        Of a time: the time over that of the strongest full-order solver.
+    That is None if it can't be judged.  `measure` says what the number is, `reason` what else was
+    seen, `threshold_source` whose the bound is.  An error has beside it that of the best
+    approximation in the subspaces (`floor`) and the RMS of the signal (a bound above that is empty:
+    zero would meet it); a time the time over that of the `strongest` full-order solver.
     """
 
     reproduced: float
@@ -72,16 +58,9 @@ class Finding(NamedTuple):
 class Criterion:
     """A number or claim of the paper as a number that can miss its bound.
 
-    Attributes
-    ----------
-    judge
-        (results, label of a method) -> finding.
-    studies
-        Names of the studies and timings whose results it needs; it gets no others.
-    variants
-        Label of a method in them -> what its row is called.
-    of_replay
-        Whether replay can be judged too: it has no subspaces, and integrates nothing.
+    `judge` gets the results of the `studies` (and timings) that it needs, and the label of a
+    method; `variants` are what the rows of labels are called.  Replay has no subspaces, and
+    integrates nothing: it is not judged by all of them.
     """
 
     judge: Callable[[Results, str], Finding]
@@ -137,13 +116,7 @@ def judged(within: bool | None) -> str:
 
 
 def scatter(spreads: Mapping[str, float]) -> str:
-    """Why times can't be compared, empty if they can.
-
-    Parameters
-    ----------
-    spreads
-        What was timed -> interquartile range of its rounds over their median.
-    """
+    """Why times can't be compared, by the spreads of their rounds; empty if they can."""
     wide = [f"{name} {100 * s:.0f} %" for name, s in spreads.items() if not s <= LARGEST_SPREAD]
     if not wide:
         return ""
@@ -154,6 +127,6 @@ def scatter(spreads: Mapping[str, float]) -> str:
 
 
 def counted(verdicts: Iterable[str]) -> str:
-    """How many rows there are of each verdict, in words."""
+    """How many rows there are of each verdict, as text."""
     found = list(verdicts)
-    return ", ".join(f"{found.count(v)} {words}" for v, words in VERDICTS.items() if v in found)
+    return ", ".join(f"{found.count(v)} {text}" for v, text in VERDICTS.items() if v in found)

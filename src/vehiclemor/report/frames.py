@@ -26,14 +26,9 @@ MEDIANS = ("seconds", "offline_seconds", "evaluations")
 def frame(dataset: xr.Dataset, variables: Iterable[str] = ()) -> pd.DataFrame:
     """A row for each run, in the order of the grid; histories are left out.
 
-    Columns are what varies (factors, parameters, start, label and its method, scenario), then
-    variables, such as `status`; one with further dimensions has a column for each of their values:
-    `rms_error.toe`.
-
-    Parameters
-    ----------
-    variables
-        Those that are wanted; all by default.
+    Columns are what varies (factors, parameters, start, label and its method, scenario), then the
+    wanted variables, all by default; one with further dimensions has a column for each of their
+    values: `rms_error.toe`.
     """
     import xarray as xr
 
@@ -83,20 +78,19 @@ def column_meanings(dataset: xr.Dataset) -> pd.DataFrame:
 def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """A row for each start, method and output of a combined dataset.
 
-    `runs` are different ones, `failures` says how those that have `failed` ended, `reason` why,
-    `warned` counts those that aren't trusted (`warned_runs`), `trained` those that the method was
-    trained on; of those that have ended `median` and `largest` are RMS errors over the grid,
-    `largest_at` is the place of the largest, `floor` that of the best approximation there.
-    `seconds` (of the compiled loop), `offline_seconds` and `evaluations` are medians.
+    `runs` are different ones; `failures` says how those that have `failed` ended, `reason` why.  Of
+    those that have ended there are `median` and `largest` RMS errors over the grid, and at the
+    place of the largest that of the best approximation (`floor`).  Seconds (of the compiled loop)
+    and evaluations are medians.
     """
     attributes = {key: str(dataset.attrs[key]) for key in ("study", "title", "model", "training")}
-    head = {"kind": ERRORS, **attributes, "grid": _grid_words(dataset)}
+    head = {"kind": ERRORS, **attributes, "grid": _grid_text(dataset)}
     count = EVALUATIONS[component("model", head["model"]).kind]
-    told = dataset.assign(
+    extended = dataset.assign(
         warned=warned_runs(dataset), trained=trained_runs(dataset), evaluations=dataset[count]
     )
     kept = ["rms_error", "floor_rms_error", "cell_key", "status", "message"]
-    runs: Any = frame(told, [*kept, *MEDIANS, "effective_rank", "warned", "trained"])
+    runs: Any = frame(extended, [*kept, *MEDIANS, "effective_rank", "warned", "trained"])
     rows: list[dict[str, Any]] = []
     for start, label in itertools.product(dataset["start"].values, dataset["label"].values):
         own = runs[(runs["start"] == start) & (runs["label"] == label)]
@@ -114,6 +108,7 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
 def _counts(runs: Any) -> dict[str, Any]:
     """How runs have ended, and what they took."""
     failed = runs[~runs["status"].isin(FINISHED)]
+    ended = runs.drop(failed.index).astype(dict.fromkeys(MEDIANS, float))
     ends = Counter(map(str, failed["status"])).most_common()
     return {
         "effective_rank": int(runs["effective_rank"].max()),
@@ -122,7 +117,7 @@ def _counts(runs: Any) -> dict[str, Any]:
         "failures": ", ".join(f"{n} {status}" for status, n in ends),
         "reason": next(iter(failed["message"]), ""),
         **{name: int(runs[name].sum()) for name in ("warned", "trained")},
-        **{name: _median(runs.drop(failed.index)[name]) for name in MEDIANS},
+        **{name: float(ended[name][np.isfinite(ended[name])].median()) for name in MEDIANS},
     }
 
 
@@ -146,23 +141,19 @@ def _value(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _median(values: Any) -> float:
-    return float(values[np.isfinite(values.astype(float))].median())
-
-
-def _grid_words(dataset: xr.Dataset) -> str:
+def _grid_text(dataset: xr.Dataset) -> str:
     """The grid's dimensions with their values, and the ranges of a sample."""
-    words = []
+    parts = []
     for name in (d for d in map(str, dataset["status"].dims) if d not in ("label", "start")):
         values = [f"{v:g}" if isinstance(v, float) else str(v) for v in dataset[name].values]
         if len(values) > 8:
-            words.append(f"{name} {values[0]} to {values[-1]} ({len(values)})")
+            parts.append(f"{name} {values[0]} to {values[-1]} ({len(values)})")
         elif values != ["1"]:
-            words.append(f"{name} {', '.join(values)}")
+            parts.append(f"{name} {', '.join(values)}")
     for name, values in dataset.coords.items():
         if values.dims == ("sample",) and name != "sample":
-            words.append(f"{name} {float(values.min()):.4g} to {float(values.max()):.4g}")
-    return "; ".join(words)
+            parts.append(f"{name} {float(values.min()):.4g} to {float(values.max()):.4g}")
+    return "; ".join(parts)
 
 
 def warned_runs(dataset: xr.Dataset) -> xr.DataArray:
@@ -174,12 +165,12 @@ def warned_runs(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def counted_ends(dataset: xr.Dataset) -> str:
-    """How the runs of a study have ended; a cell that stands at several places counts once."""
-    # A protocol's runs have no cells of their own.
-    told = dataset.assign(
+    """How the runs of a study have ended; a run that stands at several points counts once."""
+    # A protocol's runs have no files of their own.
+    extended = dataset.assign(
         warned=(dataset["status"] == "ok") & warned_runs(dataset), trained=trained_runs(dataset)
     )
-    runs: Any = frame(told, ["status", "cell_key", "warned", "trained"])
+    runs: Any = frame(extended, ["status", "cell_key", "warned", "trained"])
     runs = runs.drop_duplicates("cell_key") if "cell_key" in runs else runs
     trained = int(runs["trained"].sum())
     note = f"; {trained} trained on the tested run" if trained else ""

@@ -1,67 +1,52 @@
-"""Words, symbols and units of outputs; headings, number formats and meanings of columns."""
+"""What tables and figures show and how they call it: outputs, columns, cases of the cost table.
+
+The three models of the paper have rows of their own in `data/figures/tables.toml`; every other one
+gets rows by its kind of equations.
+"""
 
 from __future__ import annotations
 
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from pydantic import Field
+
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.resources import data_folder
-from vehiclemor.toml_files import FileSchema, read_toml
+from vehiclemor.study.plans.study_file import MethodEntry, Settings
+from vehiclemor.toml_files import FileSchema, Line, read_toml
 
 if TYPE_CHECKING:
     import xarray as xr
 
+# What is said of a run that was in its own training, and the mark of it in a legend.
+TRAINED, MARK = "trained on this run", "*"
+# Letters of an axis' label that leave no room for more beside them; of one beside a low panel.
+LONG, LONGEST = 16, 26
+PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
+# Format of errors: an exact zero is a dash, since orders of magnitude are compared.
+ERROR = ".1e"
+MOST_PRINTED = 3
+LARGEST_DEFAULT_RANK = 3
+# Method and preset of the reduced models that are timed where none are listed.
+REDUCED = (("pod", "recommended"), ("pod", "literal"), ("fixed_basis", "recommended"))
+
 
 class Label(NamedTuple):
-    """How one output is called.
+    """How one output is called: in full, as a formula for figures, as a narrow heading."""
 
-    Attributes
-    ----------
-    words
-        In full.
-    symbol
-        As a formula for figures.
-    short
-        Heading of a narrow column.
-    """
-
-    words: str
+    name: str
     symbol: str
     short: str
 
 
-# What is said of a run that was in its own training, and the mark of it in a legend.
-TRAINED, MARK = "trained on this run", "*"
-# Words of an axis that leave no room for more beside them.
-LONG = 16
-# Of a label beside a low panel in one line.
-LONGEST = 26
-PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
-
-
 class Column(NamedTuple):
-    """How a column is printed.
-
-    Attributes
-    ----------
-    heading
-        Above it.
-    form
-        Format of its numbers.
-    meaning
-        What stands below the table.
-    scale
-        Factor from the SI unit to the one that is shown.
-    """
+    """How a column is printed: heading, format, meaning below the table, factor on the SI unit."""
 
     heading: str
     form: str = ".6g"
     meaning: str = ""
     scale: float = 1.0
-
-
-# Format of errors: an exact zero is a dash, since orders of magnitude are compared.
-ERROR = ".1e"
 
 
 class LabelFile(FileSchema):
@@ -72,7 +57,7 @@ class LabelFile(FileSchema):
 
 
 @cache
-def declared() -> tuple[dict[str, Label], dict[str, Column]]:
+def _declared() -> tuple[dict[str, Label], dict[str, Column]]:
     """Labels of outputs, and how columns are printed."""
     file = read_toml(data_folder() / "figures" / "labels.toml", LabelFile)
     columns: Any = file.columns
@@ -84,7 +69,7 @@ def declared() -> tuple[dict[str, Label], dict[str, Column]]:
 
 def column(name: str) -> Column:
     """How a column is printed; one without an entry has its name as heading."""
-    if found := declared()[1].get(name):
+    if found := _declared()[1].get(name):
         return found
     if name.startswith("rms_"):
         return Column(f"{label_of(name.removeprefix('rms_')).short} error", ERROR)
@@ -92,15 +77,15 @@ def column(name: str) -> Column:
 
 
 def label_of(output: str) -> Label:
-    """The label of an output; of one that has no symbol its name in words."""
-    words = output.replace("_", " ")
-    return declared()[0].get(output, Label(words, words, words))
+    """The label of an output; one that has no symbol has its name."""
+    name = output.replace("_", " ")
+    return _declared()[0].get(output, Label(name, name, name))
 
 
 def full_label(output: str, between: str = " ") -> str:
-    """Words and symbol of an output; words alone may be those of two."""
+    """Name and symbol of an output; the name alone may be that of two."""
     label = label_of(output)
-    return label.words if label.symbol == label.words else f"{label.words}{between}{label.symbol}"
+    return label.name if label.symbol == label.name else f"{label.name}{between}{label.symbol}"
 
 
 def unit_of(dataset: xr.Dataset, output: str) -> str:
@@ -109,12 +94,12 @@ def unit_of(dataset: xr.Dataset, output: str) -> str:
 
 
 def method_text(label: str) -> str:
-    """A method's label in a study, as a legend says it."""
+    """A method's label in a study, as a legend has it."""
     return label.replace("pod", "POD").replace("_", " ")
 
 
 def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
-    """Which runs were in their own training; of a result that does not tell, none."""
+    """Which runs were in their own training; none of a result that does not tell."""
     return dataset.get("in_training", dataset["status"].isnull() & False)
 
 
@@ -132,8 +117,8 @@ def readable_unit(largest: float, unit: str) -> tuple[float, str]:
 
 
 def axis_label(dataset: xr.Dataset, output: str, unit: str = "") -> str:
-    """Words, symbol and unit (the output's own by default) of an output."""
-    text = full_label(output, "\n" if len(label_of(output).words) > LONG else " ")
+    """Name, symbol and unit (the output's own by default) of an output."""
+    text = full_label(output, "\n" if len(label_of(output).name) > LONG else " ")
     return f"{text} ({unit or unit_of(dataset, output)})"
 
 
@@ -141,3 +126,77 @@ def error_label(dataset: xr.Dataset, kind: str, output: str, unit: str = "") -> 
     """An error of an output, its symbol and unit, such as `RMS error`; long ones in two lines."""
     label = f"{kind} of {label_of(output).symbol} ({unit or unit_of(dataset, output)})"
     return label if len(label.replace("$", "")) <= LONGEST else label.replace(" of ", " of\n", 1)
+
+
+# What is shown of a model.
+
+
+class Case(MethodEntry):
+    """A row of a cost table; identifier and label of a reduced model follow from its settings."""
+
+    id: str = ""
+
+    def named(self) -> Case:
+        """With identifier and label: what differs from the recommended settings."""
+        label = self.label
+        if not label:
+            parts = [self.method.replace("_", " ")]
+            parts += [self.preset] if self.preset != "recommended" else []
+            rest = dict(self.settings)
+            rank, tolerance = rest.pop("rank"), rest.pop("tolerance", None)
+            label = " ".join([*parts, *map(str, rest.values()), f"r={rank}"])
+            label += "" if tolerance is None else f", {tolerance:.0e}".replace("e-0", "e-")
+        name = self.id or label.replace(",", "").replace("=", "").replace(" ", "_")
+        return self.model_copy(update={"id": name, "label": label})
+
+
+class OfKind(FileSchema):
+    """What tables show of all models of a kind, see `data/figures/tables.toml`."""
+
+    against: list[Line] = Field(min_length=2, max_length=2)
+    cases: list[Case]
+    counts: dict[str, Line]
+
+
+class TablesFile(FileSchema):
+    """Schema of `data/figures/tables.toml`."""
+
+    algebraic: OfKind
+    dynamic: OfKind
+    reduced: dict[str, list[Case]]
+
+
+@cache
+def tables_file() -> TablesFile:
+    """The package's own file, read once."""
+    return read_toml(data_folder() / "figures" / "tables.toml", TablesFile)
+
+
+def of_kind(kind: str) -> OfKind:
+    """What tables show of all models of a kind: `ae`, `ode` or `dae`."""
+    return tables_file().algebraic if kind == "ae" else tables_file().dynamic
+
+
+def default_rank(coordinates: int) -> int:
+    """Rank of the reduced models in the default rows: 3, but less than the coordinates."""
+    return max(1, min(LARGEST_DEFAULT_RANK, coordinates - 1))
+
+
+def timing_cases(definition: ModelDefinition) -> list[Case]:
+    """Rows of a model's cost table: full-order solvers, replay, reduced models."""
+    settings: Settings = {"rank": default_rank(len(definition.coordinates))}
+    reduced = tables_file().reduced.get(definition.name) or [
+        Case.model_validate({"method": method, "preset": preset, "settings": settings})
+        for method, preset in REDUCED
+    ]
+    return [case.named() for case in (*of_kind(definition.kind).cases, *reduced)]
+
+
+def tabled_outputs(definition: ModelDefinition) -> tuple[str, ...]:
+    """Outputs whose errors are tabled: those that the model declares, or all."""
+    return definition.tabled_outputs or tuple(output.name for output in definition.outputs)
+
+
+def main_outputs(definition: ModelDefinition) -> tuple[str, ...]:
+    """Outputs that are printed and drawn: those that the model declares, or the first three."""
+    return definition.main_outputs or tabled_outputs(definition)[:MOST_PRINTED]

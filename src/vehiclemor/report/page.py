@@ -20,7 +20,7 @@ from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
 from vehiclemor.report.comparison import paper_comparison
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.figures.pareto import figure_pareto
+from vehiclemor.report.figures.paper import figure_pareto
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.runs import PATH
 from vehiclemor.report.figures.theme import METADATA, styled
@@ -89,7 +89,10 @@ def write_report(
     left_out: dict[str, str] = {}
     sections: list[Section] = []
     if studies:
-        chosen = [name for study in studies for name in _studies_of(study, folder)]
+        chosen: list[str] = []
+        for name in studies:
+            of_model = (kind(name, folder) for kind in (nominal, perturbed, unseen))
+            chosen += of_model if name in names("model") else [name]
         jobs = count("jobs", jobs, most=MOST_JOBS)
         every = [d for n in chosen for d in run_studies(n, folder, jobs).values()]
         # Two studies may have one name, but not one file.
@@ -109,14 +112,8 @@ def write_report(
     return write_text(path, _page(sections, left_out))
 
 
-def _studies_of(name: str, folder: Path) -> list[str]:
-    if name not in names("model"):
-        return [name]
-    return [kind(name, folder) for kind in (nominal, perturbed, unseen)]
-
-
 def _stored(folder: Path, left_out: dict[str, str]) -> dict[str, xr.Dataset]:
-    """All combined datasets of studies that are stored; `left_out` is told what can't be read."""
+    """All combined datasets of studies that are stored; in `left_out` what can't be read."""
     found: dict[str, xr.Dataset] = {}
     for path in sorted((folder / "studies").glob("*.nc")):
         try:
@@ -178,11 +175,11 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
 
 
 def error_table(dataset: xr.Dataset) -> pd.DataFrame:
-    """Errors of every run of a study, with its status and cell."""
+    """Errors of every run of a study, with its status and file."""
     units = {output: unit_of(dataset, output) for output in shown_outputs(dataset)}
     heads = {f"rms_error.{o}": f"RMS error of {o} ({unit})" for o, unit in units.items()}
-    told = dataset.assign(warned=warned_runs(dataset), trained=trained_runs(dataset))
-    runs: Any = frame(told).rename(columns=heads)
+    extended = dataset.assign(warned=warned_runs(dataset), trained=trained_runs(dataset))
+    runs: Any = frame(extended).rename(columns=heads)
     said = runs["message"] + runs["remark"].where(runs["warned"] & (runs["status"] == "ok"), "")
     marks = runs["trained"].map({True: f" ({TRAINED})", False: ""})
     status = runs["status"] + marks + said.map(lambda text: f": {text}" if text else "")

@@ -19,8 +19,8 @@ from vehiclemor.report.findings import (
     at_point,
     scatter,
 )
+from vehiclemor.report.labels import timing_cases
 from vehiclemor.report.published import Model, Number, load_published, rms_numbers
-from vehiclemor.report.shown import timing_cases
 
 NOMINAL_ERROR = "nominal-only: trained on the run that it is tested on, where replay is exact"
 SAVED = "share of the time of {} that is saved; the paper names neither its {} nor its machine"
@@ -84,10 +84,10 @@ def time_saved(number: Number, results: Results, label: str) -> Finding:
     saved = 1.0 - 1.0 / float(run["speed_up"])
     strongest = 1.0 / float(run["speed_up_strongest"])
     algebraic = "iterations" in timing
-    count, words = ("iterations",) * 2 if algebraic else ("rhs_calls", "evaluations")
+    count, name = ("iterations",) * 2 if algebraic else ("rhs_calls", "evaluations")
     beside = (
         f"{1.0 - saved:.2f} times the time of {'Newton' if algebraic else 'the same integrator'}, "
-        f"{int(run[count])} {words} against {int(full[count])}; "
+        f"{int(run[count])} {name} against {int(full[count])}; "
         f"{strongest:.2f} times that of the best full-order solver"
     )
     wrong = _missed_errors(number.model, run)

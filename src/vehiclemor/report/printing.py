@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import shutil
-import string
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -81,18 +80,14 @@ def table(
 
     Parameters
     ----------
-    rows
-        A frame, or dictionaries.
     columns
         Names of those that are shown, or how each of them is printed; all by default.
     to
         `terminal`, `html`: headings and formats of `labels.column`, meanings below; within the
         width of the terminal, or with all digits in the attribute `value`.  `csv`: names and all
         digits.  `markdown`, `latex` (needs booktabs): names and four digits.
-    group
-        Column whose values stand in lines of their own above their rows.
-    note
-        Column whose texts stand below their rows, over the whole width.
+    group, note
+        Columns whose values stand in lines of their own: above their rows, and below each.
     explain
         Whether meanings stand below.
     """
@@ -103,7 +98,9 @@ def table(
         if group:
             places = list(dict.fromkeys(row[group] for row in records))
             records = sorted(records, key=lambda row: places.index(row[group]))
-        return (_terminal if to == "terminal" else _html)(records, kinds, group, note, explain)
+        meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds.values() if kind.meaning]
+        below = f"({'; '.join(meanings)}.)" if meanings and explain else ""
+        return (_terminal if to == "terminal" else _html)(records, kinds, group, note, below)
     import pandas as pd
 
     frame: Any = pd.DataFrame(rows)
@@ -125,15 +122,10 @@ def _four_digits(value: object) -> str:
     return "" if value is None else str(value)
 
 
-def _meanings(kinds: Mapping[str, Column], explain: bool) -> str:
-    meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds.values() if kind.meaning]
-    return f"({'; '.join(meanings)}.)" if meanings and explain else ""
-
-
-def _html(records: Rows, kinds: Mapping[str, Column], group: str, note: str, explain: bool) -> str:
+def _html(records: Rows, kinds: Mapping[str, Column], group: str, note: str, below: str) -> str:
     wide, last = f'<tr><td colspan="{len(kinds)}"><div>%s</div></td></tr>', None
-    lines = ["".join(f"<th>{escape(kind.heading)}</th>" for kind in kinds.values())]
-    lines = [f"<tr>{lines[0]}</tr>"]
+    heads = "".join(f"<th>{escape(kind.heading)}</th>" for kind in kinds.values())
+    lines = [f"<tr>{heads}</tr>"]
     for row in records:
         if group and row[group] != last:
             last = row[group]
@@ -142,22 +134,18 @@ def _html(records: Rows, kinds: Mapping[str, Column], group: str, note: str, exp
         lines.append(f"<tr>{''.join(cells)}</tr>")
         if note and row[note]:
             lines.append(wide % escape(str(row[note])))
-    below = escape(_meanings(kinds, explain))
-    return f"<table>{''.join(lines)}</table>" + (f"<p>{below}</p>" if below else "")
+    return f"<table>{''.join(lines)}</table>" + (f"<p>{escape(below)}</p>" if below else "")
 
 
 def _cell(value: object, kind: Column) -> str:
     text = escape(shown(value, kind.form, kind.scale))
     if isinstance(value, float) and value == value:
         return f'<data value="{value}">{text}</data>'
-    return (
-        f'<div class="{text}">{text}</div>' if text in ("met", "missed") else f"<div>{text}</div>"
-    )
+    verdict = f' class="{text}"' if text in ("met", "missed") else ""
+    return f"<div{verdict}>{text}</div>"
 
 
-def _terminal(
-    records: Rows, kinds: Mapping[str, Column], group: str, note: str, explain: bool
-) -> str:
+def _terminal(records: Rows, kinds: Mapping[str, Column], group: str, note: str, below: str) -> str:
     cells = [
         [shown(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
         for row in records
@@ -165,7 +153,8 @@ def _terminal(
     numbers = [all(isinstance(row.get(name), int | float) for row in records) for name in kinds]
     heads = [kind.heading for kind in kinds.values()]
     widths, last = _widths(heads, cells, numbers), None
-    lines = _in_columns(heads, widths, numbers, heading=True)
+    # Headings stand at the bottom of their lines.
+    lines = _in_columns(heads, widths, numbers, -1)
     for row, line in zip(records, cells, strict=True):
         if group and row[group] != last:
             last = row[group]
@@ -173,18 +162,18 @@ def _terminal(
         lines += _in_columns(line, widths, numbers)
         if note and row[note]:
             lines.append(wrapped(str(row[note]), NOTE, NOTE))
-    return "\n".join(filter(None, [*lines, wrapped(_meanings(kinds, explain), 0, 1)]))
+    return "\n".join(filter(None, [*lines, wrapped(below, 0, 1)]))
 
 
 def _in_columns(
-    cells: Sequence[str], widths: list[int], numbers: list[bool], *, heading: bool = False
+    cells: Sequence[str], widths: list[int], numbers: list[bool], order: int = 1
 ) -> list[str]:
-    """Lines of a row whose texts are wrapped within their columns; headings stand at the bottom."""
+    """Lines of a row whose texts are wrapped within their columns."""
     texts = [
         # The rest of a point in a list stands below its text.
         textwrap.wrap(
             text, width, break_on_hyphens=False, subsequent_indent="  " * text.startswith("- ")
-        )[:: -1 if heading else 1]
+        )[::order]
         for text, width in zip(cells, widths, strict=True)
     ]
     lines = [
@@ -194,7 +183,7 @@ def _in_columns(
         ).rstrip()
         for line in zip_longest(*texts, fillvalue="")
     ]
-    return lines[:: -1 if heading else 1]
+    return lines[::order]
 
 
 def _widths(heads: list[str], cells: list[list[str]], numbers: list[bool]) -> list[int]:
@@ -216,22 +205,24 @@ def _widths(heads: list[str], cells: list[list[str]], numbers: list[bool]) -> li
 
 def simulation_text(dataset: xr.Dataset, shown: Sequence[str], counts: Iterable[str]) -> str:
     """Status, a table of the errors of some outputs, solver counts and seconds of a simulation."""
-    told = f" ({TRAINED})" if trained_runs(dataset) else ""
+    note = f" ({TRAINED})" if trained_runs(dataset) else ""
     ended = f"{dataset['status'].item()} {dataset['message'].item()}"
-    parts = [wrapped(f"{dataset.attrs['title']}{told}: {ended}")]
-    parts.append(wrapped(str(dataset["remark"].item())))
     rows = []
     for output in shown:
         own = dataset.sel(output=output)
         errors = {name.replace("floor_rms_error", "floor"): own[name].item() for name in ERRORS}
         rows.append({"output": str(output), **errors, "unit": str(own["output_unit"].item())})
-    parts.append(table(rows))
-    if further := dataset.sizes["output"] - len(shown):
-        parts.append(f"{further} more outputs: --all-outputs")
-    parts.append(wrapped(", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in counts)))
+    further = dataset.sizes["output"] - len(shown)
     seconds, clock = float(dataset["seconds"]), dataset["seconds"].attrs["clock"]
-    parts.append(f"seconds in the compiled loop {seconds:.3e} ({clock})")
-    return "\n".join(part for part in parts if part)
+    parts = [
+        wrapped(f"{dataset.attrs['title']}{note}: {ended}"),
+        wrapped(str(dataset["remark"].item())),
+        table(rows),
+        f"{further} more outputs: --all-outputs" if further else "",
+        wrapped(", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in counts)),
+        f"seconds in the compiled loop {seconds:.3e} ({clock})",
+    ]
+    return "\n".join(filter(None, parts))
 
 
 def json_text(rows: pd.DataFrame) -> str:
@@ -253,26 +244,12 @@ def ends_text(statuses: Iterable[str], warned: int = 0) -> str:
     return text.replace(" ok", f" ok ({warned} not to be trusted)") if warned else text
 
 
-def alphabetic(index: int) -> str:
-    """A letter for each index: a, b ... z, aa, ab ..."""
-    alphabet = string.ascii_lowercase
-    head = alphabetic(index // len(alphabet) - 1) if index >= len(alphabet) else ""
-    return head + alphabet[index % len(alphabet)]
-
-
 def width() -> int:
     """Columns of a printed line: the terminal's, but neither below 80 nor too wide to read."""
     return min(max(shutil.get_terminal_size((WIDTH, 24)).columns, WIDTH), WIDEST)
 
 
 def wrapped(text: str, first: int = 0, rest: int = 0) -> str:
-    """A paragraph in lines of the width of a table, indented."""
-    return textwrap.fill(
-        text,
-        width(),
-        initial_indent=" " * first,
-        subsequent_indent=" " * rest,
-        # A path stays whole.
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
+    """A paragraph in lines of the width of a table, indented; a path stays whole."""
+    indents: dict[str, Any] = {"initial_indent": " " * first, "subsequent_indent": " " * rest}
+    return textwrap.fill(text, width(), **indents, break_long_words=False, break_on_hyphens=False)

@@ -1,12 +1,11 @@
 """What the paper prints: its numbers and claims, each with its place; and how to cite."""
 
-from collections import Counter
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from vehiclemor.registry import component, names
 from vehiclemor.resources import data_folder
@@ -19,13 +18,7 @@ Count = Annotated[int, Field(ge=1)]
 
 
 class Printed(FileSchema):
-    """One thing that the paper prints, and where.
-
-    Attributes
-    ----------
-    page, section, figure
-        As printed: "031007-4", "3.1", and the number of the figure, if there is one.
-    """
+    """One thing that the paper prints, and where."""
 
     id: str = Field(pattern=r"^[a-z0-9]+(_[a-z0-9]+)*$")
     page: str = Field(pattern=r"^031007-[1-8]$")
@@ -34,19 +27,10 @@ class Printed(FileSchema):
 
 
 class Number(Printed):
-    """A printed number.
+    """A printed number, and the settings behind it, as far as the paper prints them.
 
-    Attributes
-    ----------
-    kind
-        What the number says. A time reduction is 1 - reduced time / full time, a perturbation the
-        relative increase of the input's frequency or amplitude.
-    quantity
-        Name of the model's output that the number is about, if it is about one.
-    states, control_period, snapshots
-        Settings of the reduction behind the number, as far as the paper prints them.
-    note
-        How the printed words were read, where they leave a choice.
+    A time reduction is 1 - reduced time / full time, a perturbation the relative increase of the
+    input's frequency or amplitude; `note` says how the printed words were read.
     """
 
     model: Model
@@ -60,15 +44,6 @@ class Number(Printed):
     snapshots: Count | None = None
     note: Line | None = None
 
-    @model_validator(mode="after")
-    def _in_range(self) -> "Number":
-        if self.kind == "rms_error" and not (self.value > 0.0 and self.quantity):
-            raise ValueError(f"{self.id}: an rms_error is positive and names its quantity")
-        # A percentage left as it is printed (65 instead of 0.65) ends here.
-        if self.kind == "time_reduction" and not (0.0 < self.value < 1.0 and self.unit == "1"):
-            raise ValueError(f"{self.id}: a time_reduction is between 0 and 1, in unit '1'")
-        return self
-
 
 class Measured(FileSchema):
     """A number on a claim by a study that the package no longer has: met up to its bound."""
@@ -81,17 +56,10 @@ class Measured(FileSchema):
 
 
 class Claim(Printed):
-    """A printed statement in our words.
+    """A printed statement in our words; without a model it is about all three.
 
-    Attributes
-    ----------
-    model
-        None if the statement is about all three models.
-    kind
-        `setup`: how something was made; `result`: what the paper says it saw; `expectation`: what
-        it expects or explains without showing it.
-    measured
-        Of a claim that no criterion is for.
+    A `setup` says how something was made, a `result` what the paper says it saw, an `expectation`
+    what it explains without showing it; `measured` is of a claim that no criterion is for.
     """
 
     model: Model | None = None
@@ -116,23 +84,10 @@ class Published(FileSchema):
         """Id -> claim, in the order of the file."""
         return {claim.id: claim for claim in self.claim}
 
-    @model_validator(mode="after")
-    def _ids_once(self) -> "Published":
-        ids = Counter(entry.id for entry in (*self.number, *self.claim))
-        if twice := [key for key, times in ids.items() if times > 1]:
-            raise ValueError(f"id {twice[0]!r} occurs twice")
-        return self
-
 
 @cache
 def load_published(path: Path | None = None) -> Published:
-    """Load and validate what the paper prints, by default from the package's own file.
-
-    Raises
-    ------
-    FileError
-        If the file is unreadable, does not fit the schema, or has an id twice.
-    """
+    """Load and validate what the paper prints, by default from the package's own file."""
     return read_toml(path or data_folder() / "published" / "masoudi2015.toml", Published)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from vehiclemor.arguments import quoted
 from vehiclemor.errors import InputError
@@ -18,7 +19,7 @@ from vehiclemor.study.plans.study_file import FACTORS
 from vehiclemor.study.store import combined_path, result_path
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from matplotlib.figure import Figure
 
 KINDS = ("histories", "paths", "errors")
 # Values of a dimension that an error lists.
@@ -26,13 +27,7 @@ MOST_NAMED = 12
 
 
 def stored_result(name: str, results: Path) -> xr.Dataset:
-    """A netCDF file, or the stored result of a study, by its name or by that of the result.
-
-    Raises
-    ------
-    InputError, FileError
-        If there is no such study, it has not been run, or the file isn't a result.
-    """
+    """A netCDF file, or the stored result of a study, by its name or by that of the result."""
     path = Path(name)
     if path.suffix != ".nc":
         path = results / "studies" / f"{name}.nc"
@@ -50,14 +45,9 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
 
 
 def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple[xr.Dataset, str]:
-    """What of a result is drawn: one point of a study's grid with all methods, told in words.
+    """What of a result is drawn: one point of a study's grid with all methods, and its name.
 
     A dimension that is not chosen is at its nominal or first value, but errors are drawn over it.
-
-    Raises
-    ------
-    InputError
-        If the result has no such dimension or value.
     """
     if not isinstance(kind, str) or kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)
@@ -69,7 +59,7 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
             raise InputError(f"a single run has no dimension to choose, such as {quoted(key)}")
         if key not in grid:
             raise unknown("dimension of the result", key, grid)
-    words = []
+    parts = []
     # A grid has methods; what has none, such as a timing, is refused where it is drawn.
     for dimension in grid if "label" in grid else ():
         values = dataset[dimension].values.tolist()
@@ -84,5 +74,22 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
             raise InputError(f"{dimension} is {quoted(value)}, not one of {known}")
         dataset = dataset.isel({dimension: places[0]})
         if len(values) > 1:
-            words.append(f"{dimension} {value}")
-    return dataset, ", ".join(words)
+            parts.append(f"{dimension} {value}")
+    return dataset, ", ".join(parts)
+
+
+@xr.register_dataset_accessor("vehiclemor")
+class ResultAccessor:
+    """What a result of this package can do beyond xarray."""
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def plot(self, kind: str = "histories", out: str | Path | None = None, **at: object) -> Figure:
+        """Draw the result; see `vehiclemor.plot`."""
+        from vehiclemor.arguments import file_path
+        from vehiclemor.report.figures.result_plot import plot_result
+        from vehiclemor.report.result_selection import drawn
+
+        dataset, _ = drawn(self._dataset, kind, at)
+        return plot_result(dataset, None if out is None else file_path("out", out), kind)

@@ -8,24 +8,20 @@ from typing import Any
 import pandas as pd
 
 from vehiclemor.registry import component, names
-from vehiclemor.report.comparison import ALL_MODELS, PAPER
-from vehiclemor.report.costs import costs_text
+from vehiclemor.report.comparison import ALL_MODELS, PAPER, cost_table, timing_of
 from vehiclemor.report.findings import (
     IN_WORDS,
     INDISTINGUISHABLE,
     LARGEST_SPREAD,
-    MET,
     MISSED,
-    NOT_COMPARABLE,
     OWN,
     VERDICTS,
     VISIBLE,
     counted,
 )
 from vehiclemor.report.frames import ERRORS
-from vehiclemor.report.labels import ERROR, Column, column
+from vehiclemor.report.labels import ERROR, Column, column, main_outputs, of_kind
 from vehiclemor.report.printing import Table, shown, wrapped
-from vehiclemor.report.shown import main_outputs
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 Row = dict[str, Any]
@@ -33,19 +29,14 @@ Part = str | Table
 
 
 def comparison_text(what: str, rows: pd.DataFrame, folder: Path, every: bool = False) -> str:
-    """A comparison as text.
-
-    Parameters
-    ----------
-    every
-        Of the comparison with the paper: all claims with their reasons, and costs.
-    """
+    """A comparison as text; of that with the paper `every` claim with its reason, and costs."""
     if what == PAPER:
         parts = paper_parts(rows)
-        models = [model for model in rows["model"].unique() if model != ALL_MODELS]
         if every:
             parts += claim_parts(rows)
-            parts += [costs_text(model, folder, brief=model != models[-1]) for model in models]
+            *models, last = [model for model in rows["model"].unique() if model != ALL_MODELS]
+            parts += [cost_text(model, folder, brief=True) for model in models]
+            parts.append(cost_text(last, folder))
         else:
             parts.append("vehiclemor compare --all: every claim with its reason, and the costs")
     elif what in names("model"):
@@ -76,7 +67,7 @@ def paper_parts(rows: pd.DataFrame) -> list[Part]:
     counts = []
     for model, own in _by(claims, "model").items():
         verdicts = [row["verdict"] for row in own]
-        found = {kind: verdicts.count(kind) for kind in (MET, MISSED, NOT_COMPARABLE)}
+        found = {kind: verdicts.count(kind) for kind in VERDICTS}
         counts.append({"claims": model.replace("_", " ")} | found)
     return [
         wrapped(f"{title}: {counted(rows['verdict'])}."),
@@ -99,8 +90,8 @@ def _printed(rows: list[Row], text: Callable[[Row], str]) -> list[Row]:
 def _errors(rows: list[Row]) -> Table:
     lines = _printed(rows, lambda row: shown(row["reproduced"], ERROR))
     for line in lines:
-        words = line["item"].removeprefix("RMS error of the ").partition(" (figure")[0]
-        line["paper_error"] = words
+        item = line["item"].removeprefix("RMS error of the ").partition(" (figure")[0]
+        line["paper_error"] = item
     empty = [f"{r['paper_error']} ({r['of']})" for r in lines if r["signal_rms"] <= r["published"]]
     note = f"signal: {column('signal_rms').meaning}; literal: settings by the paper's words"
     note += f".  Empty bounds, which zero would meet: {', '.join(empty)}" if empty else ""
@@ -122,14 +113,14 @@ def _times(rows: list[Row]) -> Table:
 def _missed(rows: list[Row]) -> Table:
     """What is missed and by how much, for each claim."""
     lines = []
-    missed = [row for row in rows if row["verdict"] == MISSED]
-    for own in _by(missed, "id").values():
+    for own in _by([row for row in rows if row["verdict"] == MISSED], "id").values():
+        first = own[0]
         values = ", ".join(f"{shown(r['reproduced'], '.3g')} ({r['variant']})" for r in own)
-        measure, bound = own[0]["measure"].split("; ")[0], shown(own[0]["bound"], ".3g")
-        found = f"{measure}: {values}; bound {bound}"
+        measure, bound = first["measure"].split("; ")[0], shown(first["bound"], ".3g")
         # Without a threshold of ours what was seen says why.
-        found = own[0]["reason"] if own[0]["threshold_source"] == IN_WORDS else found
-        lines.append({"missed_claims": f"- {own[0]['item']}: {found}"})
+        by_claim = first["threshold_source"] == IN_WORDS
+        found = first["reason"] if by_claim else f"{measure}: {values}; bound {bound}"
+        lines.append({"missed_claims": f"- {first['item']}: {found}"})
     return Table(lines)
 
 
@@ -151,8 +142,8 @@ def claim_parts(rows: pd.DataFrame) -> list[Part]:
         for row in own:
             unit = "" if row["unit"] in ("1", "-") else f", {row['unit']}"
             measure = f" ({row['measure']})" if row["measure"] else ""
-            words = {"of": f"{row['item']}{unit}{measure}", "best": row["floor"]}
-            lines.append(row | _judged(row) | words)
+            about = {"of": f"{row['item']}{unit}{measure}", "best": row["floor"]}
+            lines.append(row | _judged(row) | about)
         parts.append(Table(lines, columns, model.replace("_", " "), group="of", note="reason"))
     return parts
 
@@ -164,6 +155,34 @@ def _judged(row: Row) -> Row:
 
 
 # A model.
+
+
+def cost_text(model: str, folder: Path, brief: bool = False) -> str:
+    """Cost table of a model as text: times; then settings, counts and errors if not `brief`.
+
+    A brief one is of the published start alone, and leaves the meanings of columns to another.
+    """
+    data = timing_of(model, folder)
+    rows: Any = cost_table(model, folder)
+    definition = component("model", model)
+    kind = of_kind(definition.kind)
+    rows["spread"] = 50.0 * rows["quartile_spread"]
+    rows["from"] = "start " + rows["start"]
+    ended = rows["status"].where(rows["status"] != "ok", "")
+    rows["label"] += ended.map(lambda status: f" ({status})" if status else "")
+    rows = rows[rows["start"] == rows["start"].iloc[0]] if brief else rows
+    times = ["label", "us_per_run", "spread", "speed_up", "speed_up_strongest", "offline_us"]
+    times += ["break_even", "break_even_strongest"]
+    title = f"Cost on {data.attrs['title'].removeprefix('timing of ')} ({data.attrs['machine']})"
+    against = f"same: against {kind.against[0]}; best: against {kind.against[1]}; -: never, or none"
+    below = wrapped(against)
+    parts = [str(Table(rows, times, title, group="from", explain=not brief)), below]
+    if not brief:
+        columns = {name: column(name) for name in ("label", "rank", "tolerance")}
+        columns |= {name: Column(heading, ".0f") for name, heading in kind.counts.items()}
+        columns |= {f"rms_{o}": column(f"rms_{o}") for o in main_outputs(definition)}
+        parts += ["", str(Table(rows, columns, group="from"))]
+    return "\n".join(parts)
 
 
 def _model_parts(name: str, rows: pd.DataFrame, folder: Path) -> list[Part]:
@@ -182,7 +201,7 @@ def _model_parts(name: str, rows: pd.DataFrame, folder: Path) -> list[Part]:
     columns = ("label", "effective_rank", "nominal", "perturbed")
     title = f"{name}: RMS errors, SI units"
     parts: list[Part] = [Table(lines, columns, title, group="of", below="; ".join(reasons))]
-    parts.append(costs_text(name, folder))
+    parts.append(cost_text(name, folder))
     if "spectrum" in kinds:
         title = "Singular values of POD over all control periods of the nominal run"
         shares = ["mode", "median_singular_value", "largest_singular_value", "largest_left_out"]
@@ -217,8 +236,8 @@ def _grid_parts(rows: list[Row]) -> list[Part]:
     for start, own in _by(rows, "start").items():
         for output in outputs:
             for row in (row for row in own if row["output"] == output):
-                words = f"start {start}: {output.replace('_', ' ')}, {row['unit']}"
-                lines.append(row | {"of": words})
+                of = f"start {start}: {output.replace('_', ' ')}, {row['unit']}"
+                lines.append(row | {"of": of})
                 if output == outputs[0]:
                     ends = {"failures": row["failures"] or "0", "seconds_in_loop": row["seconds"]}
                     runs.append(row | ends | {"of": f"start {start}"})
@@ -274,10 +293,7 @@ def _winner_parts(
     head: str, winner: Row, targets: list[Row], bounds: list[Row], explain: bool
 ) -> list[Part]:
     """What validation has chosen: its targets, and its errors beside their bounds."""
-    reached = [
-        row | _judged(row) | {"target": row["item"].replace("silent", "undetected")}
-        for row in targets
-    ]
+    reached = [row | _judged(row) | {"target": row["item"]} for row in targets]
     for row in bounds:
         kind = "largest" if row["measure"] == "max" else "RMS"
         row["output"] = f"{row['item'].replace('_', ' ')}, {kind}"

@@ -33,26 +33,20 @@ PRESETS = ("literal", "recommended")
 def spectrum(models: Sequence[str]) -> xr.Dataset:
     """Singular values and energies of every control period of POD, in the nominal run.
 
-    Returns
-    -------
-    xarray.Dataset
-        `singular_value` (over the largest of its control period), `energy` (cumulative share) and
-        `left_out` (1 - energy, without cancellation) on the dimensions `model`, `preset` (`literal`
-        is the paper's: Euclidean, all states; `recommended` has the inner product of the default
-        settings), `window` (control periods from 0 on) and `mode` (from 1 on), NaN where a model
-        has less of them.  Coordinates `rank`, `control_period` (s) and `snapshots` on `model`.
+    `singular_value` (over the largest of its control period), `energy` (cumulative share) and
+    `left_out` (1 - energy, without cancellation) are on the dimensions `model`, `preset` (`literal`
+    is the paper's: Euclidean, all states; `recommended` has the inner product of the default
+    settings), `window` (control periods from 0 on) and `mode` (from 1 on), NaN where a model has
+    less of them.  Coordinates `rank`, `control_period` (s) and `snapshots` are on `model`.
     """
     return _side_by_side([_of_model(name) for name in models], "model")
 
 
 def spectrum_table(model: str) -> pd.DataFrame:
-    """One row for each preset and mode.
+    """One row for each preset and mode, of all control periods.
 
-    Returns
-    -------
-    pandas.DataFrame
-        Of all control periods the median and the largest singular value (over the first of its
-        period), the least energy, and the largest share that is left out.
+    These are the median and the largest singular value (over the first of its period), the least
+    energy, and the largest share that is left out.
     """
     data = spectrum([model]).squeeze("model", drop=True)
     values = data["singular_value"]

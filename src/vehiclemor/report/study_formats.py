@@ -11,7 +11,6 @@ from vehiclemor.arguments import file_path
 from vehiclemor.errors import FileError, InputError
 from vehiclemor.files import write_folder, write_text, write_whole
 from vehiclemor.registry import choice
-from vehiclemor.report.result_selection import stored_result
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,6 +48,7 @@ def convert(
         If there is no such result, a package is missing, or something is there already.
     """
     from vehiclemor.report.frames import column_meanings, frame
+    from vehiclemor.report.result_selection import stored_result
 
     choice("format", to, FORMATS)
     engine = ENGINES.get(to)

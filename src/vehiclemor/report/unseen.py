@@ -52,14 +52,14 @@ def method_rows(dataset: xr.Dataset, protocol: StudyFile) -> list[Row]:
     """One row for each method, full-order integrators as measures.
 
     `runs` of the `test_set` are judged, `apart` ones more are not: the full order is sensitive
-    there.  Of the runs `misses` miss a bound, `silent` ones with the status ok; `flagged` are those
-    of which the model says that it has left what it knows.  `score` is the largest error of a
-    bounded output as a multiple of its bound (infinite if a run has failed), `worst_MEASURE_OUTPUT`
-    and `most_...` the largest error and the 99 % quantile.  `seconds` is the mean of whole calls,
-    `loop_seconds` of their compiled loops, with the `spread` of the rounds (interquartile range
-    over median).  `ratio_equal` and `ratio_equal_loop` are against the full order interpolated at
-    the row's own score on the rows `equal_rows`, `ratio_within` against `within`, the fastest
-    full-order row within the bounds.
+    there.  Of the runs `misses` miss a bound, `silent` ones with the status ok; of `flagged` ones
+    the model says that it has left what it knows.  `score` is the largest error of a bounded output
+    as a multiple of its bound (infinite if a run has failed), `worst_MEASURE_OUTPUT` and `most_...`
+    the largest error and the 99 % quantile.  `seconds` is the mean of whole calls, `loop_seconds`
+    of their compiled loops, with the `spread` of the rounds (interquartile range over median).
+    `ratio_equal` and `ratio_equal_loop` are against the full order interpolated at the row's own
+    score on the rows `equal_rows`, `ratio_within` against `within`, the fastest full-order row
+    within the bounds.
     """
     part = judged_part(dataset)
     rows = [_method_row(dataset, part, str(label), protocol) for label in part["label"].values]
@@ -83,16 +83,16 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: S
         "runs": part.sizes["scenario"],
         "apart": int((sets == judged_set(set(sets))).sum()) - part.sizes["scenario"],
         "misses": int(found.missed.sum()),
-        "silent": int(found.silent.sum()),
-        "flagged": int(found.flagged.sum()),
+        "silent": int(found.undetected.sum()),
+        "flagged": int(found.warned.sum()),
         "score": float(found.scores.max()),
         # What has come to its end, trusted or not.
         "stable_share": float(np.isfinite(found.scores).mean()),
         "failure": _failure(part),
         "outside_runs": len(outside.scores),
         "outside_misses": int(outside.missed.sum()),
-        "outside_silent": int(outside.silent.sum()),
-        "outside_flagged": int(outside.flagged.sum()),
+        "outside_silent": int(outside.undetected.sum()),
+        "outside_flagged": int(outside.warned.sum()),
         "validation_score": float(part["validation_score"]),
         "offline_seconds": float(part["offline_seconds"]),
     }
@@ -102,8 +102,7 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: S
         errors = errors[np.isfinite(errors)]
         row |= {f"worst_{name}": float(errors.max()), f"most_{name}": float(errors.quantile(0.99))}
     # Means over the runs that were timed; the spread of all of them together.
-    clocks = [name for name in (*CLOCKS, "seconds_lower", "seconds_upper") if name in part]
-    times = {name: float(part[name].mean()) for name in clocks}
+    times = {n: float(part[n].mean()) for n in (*CLOCKS, "seconds_lower", "seconds_upper")}
     spread = times.pop("seconds_upper") - times.pop("seconds_lower")
     return row | times | {"spread": spread / times["seconds"] if times["seconds"] > 0.0 else 0.0}
 
@@ -127,7 +126,7 @@ def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
     """Ratios of a row to the full order."""
     within = (other for other in full if other["misses"] == 0)
     best = min(within, key=lambda other: other["seconds"], default=None)
-    equal = {clock: at_error(ladders, row["score"], clock) for clock in CLOCKS if clock in row}
+    equal = {clock: at_error(ladders, row["score"], clock) for clock in CLOCKS}
     # A recording that is played again is no solution of anything.
     solves = row["method"] != "replay"
     ratios = {
@@ -138,7 +137,6 @@ def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
         "equal_rows": ", ".join(equal["seconds"].rows),
         "within": best["label"] if best else "",
         "ratio_within": ratio(best, row),
-        **dict.fromkeys(CLOCKS.values(), math.nan),
         **ratios,
     }
 
@@ -149,14 +147,9 @@ def ratio(other: Row | None, row: Row) -> float:
 
 
 class Equal(NamedTuple):
-    """The fastest full order at an error.
+    """The fastest full order at an error: seconds of a run, and the rows between which it lies.
 
-    Attributes
-    ----------
-    seconds
-        Of a run; NaN if no ladder reaches the error.
-    rows
-        The rows between which it lies or which are continued, or the one that is used.
+    The seconds are NaN if no ladder reaches the error.
     """
 
     seconds: float
@@ -222,10 +215,12 @@ def target_rows(dataset: xr.Dataset, protocol: StudyFile, methods: list[Row]) ->
     if winner is None:
         return []
     runs, misses = f"of {winner['runs']} runs", winner["misses"]
-    flagged = f"{winner['flagged']} flagged {runs}"
+    warned = f"{winner['flagged']} warned {runs}"
     rows = [
-        _target("silent misses", 0, winner["silent"], runs),
-        _target("flagged misses", protocol.flagged_misses, misses - winner["silent"], flagged),
+        _target("undetected failures", 0, winner["silent"], runs),
+        _target(
+            "failures with a warning", protocol.flagged_misses, misses - winner["silent"], warned
+        ),
     ]
     if protocol.failure_rate is not None:
         rate, reason = upper_bound(misses, winner["runs"]), "Clopper-Pearson, 95 %"
@@ -233,10 +228,10 @@ def target_rows(dataset: xr.Dataset, protocol: StudyFile, methods: list[Row]) ->
         rows.append(_target("failure rate below", protocol.failure_rate, rate, reason))
     if winner["outside_runs"]:
         reason = (
-            f"of {winner['outside_runs']} runs, {winner['outside_flagged']} flagged, "
+            f"of {winner['outside_runs']} runs, {winner['outside_flagged']} warned, "
             f"{winner['outside_misses']} outside of the bounds"
         )
-        rows.append(_target("silent misses outside", 0, winner["outside_silent"], reason))
+        rows.append(_target("undetected failures outside", 0, winner["outside_silent"], reason))
     if straight := protocol.straight:
         here = [str(s).startswith(f"{straight.maneuver},") for s in dataset["scenario"].values]
         part = dataset["largest_output"].isel(scenario=here)

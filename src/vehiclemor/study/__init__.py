@@ -1,1 +1,1 @@
-"""Studies: grids of cells declared as data, executed, stored and combined."""
+"""Studies: grids of runs declared as data, executed, stored and combined."""

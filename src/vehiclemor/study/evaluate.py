@@ -28,8 +28,7 @@ from vehiclemor.study.result import Outcome, result_dataset
 from vehiclemor.study.scenario import (
     Overrides,
     Scenario,
-    car_of,
-    in_training,
+    model_of_run,
     speed_of,
     start_of,
     training_run,
@@ -47,22 +46,13 @@ MOST_FITS = 128
 
 
 class Fit(NamedTuple):
-    """All that determines a fit.
+    """All that determines a fit: the parameters differ from the model's, settings are JSON text.
 
-    Attributes
-    ----------
-    model
-        The experiment's.
-    car
-        What differs from it in the model that is reduced.
-    settings
-        As text.
-    code, function
-        Hash of the source, and the method's own, which may be written anew under the same name.
+    `function` is the method's own, which may be written anew under the same name.
     """
 
     model: Model
-    car: Overrides
+    parameters: Overrides
     method: str
     settings: str
     training: tuple[Scenario, ...]
@@ -83,20 +73,15 @@ def evaluate(
 ) -> xr.Dataset:
     """Labelled result of an experiment, whatever becomes of it.
 
+    Where nothing could be computed the values are missing, and `status` and `message` say why.
+
     Parameters
     ----------
     model
         The model that the experiment was made with; what was lately fitted to it and solved with it
-        is used again.  By default it is built from the registry, and that of all other experiments
-        is.
+        is used again.  By default it is built from the registry, as that of all others is.
     errors
         Whether to compare with the full-order solution; without it, it is not solved.
-
-    Returns
-    -------
-    xarray.Dataset
-        As the experiment keeps it, see `study/result.py`.  Where nothing could be computed the
-        values are missing, and `status` and `message` tell why.
     """
     solve = kept_reference if model is None else recent_reference
     with first_use(f"{experiment.model} with {experiment.method}"), one_thread():
@@ -109,21 +94,20 @@ def evaluate(
 
 
 def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> xr.Dataset:
-    car, test = car_of(model, experiment.test[0]), experiment.test
+    own, test = model_of_run(model, experiment.test[0]), experiment.test
     if refused := refusal(model, experiment):
-        return result_dataset(car, experiment, [refused] * len(test), refused)
+        return result_dataset(own, experiment, [refused] * len(test), refused)
     fit = _shared(_wanted(model, experiment))
     outcomes = [_outcome(experiment, model, fit, scenario, solve) for scenario in test]
-    seen = experiment.keep != "errors" and not isinstance(outcomes[0], Failure)
-    seen = seen and _seen(model, experiment)
-    return result_dataset(car, experiment, outcomes, fit.reduced, seen)
-
-
-def _seen(model: Model, experiment: Experiment) -> bool:
-    """Whether the method has learnt from the very run that it is tested on."""
     method: Method = component("method", experiment.method)
-    learns = method.learns_from != "inputs"
-    return learns and in_training(model, experiment.training, experiment.test[0])
+    # Whether it has learnt from the very run that it is tested on.
+    seen = (
+        experiment.keep != "errors"
+        and method.learns_from != "inputs"
+        and not isinstance(outcomes[0], Failure)
+        and test[0].run_key in {run.run_key for run in experiment.training}
+    )
+    return result_dataset(own, experiment, outcomes, fit.reduced, seen)
 
 
 def model_of(experiment: Experiment) -> Model:
@@ -152,7 +136,9 @@ def refusal(model: Model, experiment: Experiment) -> Failure | None:
 
 def reference_run(model: Model, scenario: Scenario) -> Trajectory:
     """Full-order solution at the model's default tolerance."""
-    trajectory = car_of(model, scenario).simulate(scenario.maneuver, start_of(model, scenario))
+    trajectory = model_of_run(model, scenario).simulate(
+        scenario.maneuver, start_of(model, scenario)
+    )
     if trajectory.status != "ok":
         raise ConvergenceError(trajectory.message)
     return trajectory
@@ -166,10 +152,9 @@ kept_reference = lru_cache(maxsize=1024)(reference_run)
 
 
 def _wanted(model: Model, experiment: Experiment) -> Fit:
-    settings = _text(experiment.settings)
-    car, method = experiment.test[0].parameters, experiment.method
-    function = component("method", method).fit
-    return Fit(model, car, method, settings, experiment.training, experiment.code, function)
+    settings, method = _text(experiment.settings), experiment.method
+    own, function = experiment.test[0].parameters, component("method", method).fit
+    return Fit(model, own, method, settings, experiment.training, experiment.code, function)
 
 
 def fresh_fit(model: Model, experiment: Experiment) -> FittedModel | Failure:
@@ -233,7 +218,9 @@ def _fit(fit: Fit, others: FitOther | None = None) -> FittedModel | Failure:
 
 def _given(fit: Fit) -> tuple[Model, list[TrainingRun]]:
     """The model that a method is fitted to, and what it learns from."""
-    return with_parameters(fit.model, fit.car), [training_run(fit.model, s) for s in fit.training]
+    return with_parameters(fit.model, fit.parameters), [
+        training_run(fit.model, s) for s in fit.training
+    ]
 
 
 def _text(content: Mapping[str, object]) -> str:
@@ -260,47 +247,43 @@ def _tested(
     scenario: Scenario,
     reference: Trajectory | None,
 ) -> Outcome:
-    """A test scenario, simulated with the reduced model of its car."""
-    car, start = car_of(model, scenario), start_of(model, scenario)
+    """A test scenario, simulated with the reduced model."""
+    own, start = model_of_run(model, scenario), start_of(model, scenario)
     reduced: Any = fit.reduced
     many = experiment.keep == "errors"
     # The first run loads machine code and warms caches, another is timed where it is compared.
     if not (many or fit.warm or reference is None):
-        checked_run(car, scenario.maneuver, start, reduced)
+        checked_run(own, scenario.maneuver, start, reduced)
         fit.warm = True
-    run = checked_run(car, scenario.maneuver, start, reduced)
+    run = checked_run(own, scenario.maneuver, start, reduced)
     if run.finished and not np.isfinite(run.outputs).all():
         run = replace(run, status="diverged", message="an output is not finite")
-    judged = _judged(model, experiment, scenario, run)
+    judged = run
+    method: Method = component("method", experiment.method)
+    # What has learned from nothing is the full order of a protocol's second runs; a model that is
+    # silent is not trusted beyond the training's inputs.
+    if experiment.training and not (run.trust or method.own_limits):
+        known = known_inputs(model, experiment.training, method.follows_time)
+        judged = run.judged(known.trust(model, scenario.maneuver, speed_of(model, scenario)))
     if many:
         return Outcome(judged, reference)
     if judged.status != run.status:
         # A study shows what a protocol would not trust; the status is the method's own.
-        told = f"not to be trusted {judged.message}"
-        remark = "; ".join(part for part in (run.remark, told) if part)
+        remark = "; ".join(filter(None, (run.remark, f"not to be trusted {judged.message}")))
         judged = replace(judged, status=run.status, message=run.message, remark=remark)
     if reference is None:
         return Outcome(judged, None)
+    states = reference.states
     with blamed(f"method {experiment.method!r}: best_approximation", reduced):
-        nearest = reduced.best_approximation(reference.states)
+        nearest = reduced.best_approximation(states)
     if nearest is None:
         return Outcome(judged, reference)
-    if np.shape(nearest) != reference.states.shape:
+    if nearest is states:
+        return Outcome(judged, reference, np.zeros(len(own.outputs)))
+    if np.shape(nearest) != states.shape:
         raise PlugInError(f"best_approximation gives shape {np.shape(nearest)}, not its argument's")
-    floor = rms(car.outputs_at(nearest, reference.inputs) - reference.outputs)
-    return Outcome(judged, reference, floor)
-
-
-def _judged(model: Model, experiment: Experiment, test: Scenario, run: Trajectory) -> Trajectory:
-    """A run; it is not trusted beyond the training's inputs if its model is silent."""
-    # What has learned from nothing is the full order of a protocol's second runs.
-    if not experiment.training:
-        return run
-    method: Method = component("method", experiment.method)
-    if run.trust or method.own_limits:
-        return run
-    known = known_inputs(model, experiment.training, method.follows_time)
-    return run.judged(known.trust(model, test.maneuver, speed_of(model, test)))
+    projected = own.outputs_at(nearest, reference.inputs)
+    return Outcome(judged, reference, rms(projected - reference.outputs))
 
 
 @lru_cache(maxsize=64)

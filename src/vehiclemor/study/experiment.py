@@ -24,18 +24,10 @@ Keep = Literal["trajectories", "metrics", "errors"]
 class Experiment(ShortRepr):
     """What one result file holds, and all that determines it.
 
-    Attributes
-    ----------
-    kernel, code
-        Hash of the source of the kernels, and of that of everything that computes results; the
-        processor and the versions of libraries stand beside a result, and are no part of its key.
-    parameters
-        Name -> value of the model's parameters, SI units.
-    settings
-        All settings of the method; empty if it does not accept the model.
-    keep
-        `trajectories`: histories and all metrics of the one test scenario; `metrics`: the metrics
-        alone; `errors`: those that any run has, of every test scenario.
+    `kernel` and `code` are hashes of the source of the kernels, and of that of everything that
+    computes results; `settings` are all of the method's, empty if it does not accept the model.
+    Kept are `trajectories`: histories and all metrics of the one test scenario; `metrics`: the
+    metrics alone; `errors`: those that any run has, of every test scenario.
     """
 
     model: str
@@ -48,7 +40,7 @@ class Experiment(ShortRepr):
     test: tuple[Scenario, ...]
     keep: Keep = "trajectories"
 
-    @cached_property
+    @property
     def configuration(self) -> str:
         """Canonical JSON text of the experiment."""
         texts = {name: _text(getattr(self, name)) for name in sorted(self.__dataclass_fields__)}
@@ -100,15 +92,9 @@ def complete_settings(
     given: Mapping[str, object] | None = None,
     preset: str = "recommended",
 ) -> Settings:
-    """All settings of a method for a model, validated.
+    """All settings of a method for a model, validated; none if it refuses the model.
 
-    That a method refuses a model is a result: what was set for a model of another kind can't be
-    judged here, and nothing is set.
-
-    Raises
-    ------
-    InputError
-        If the preset, a name or a value is wrong.
+    (That is a result: what was set for a model of another kind can't be judged here.)
     """
     method: Method = component("method", method_name)
     if not method.accepts(model)[0]:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # Length (s) from the start within which the largest value of every output is stored.
 FIRST_SECONDS = 10.0
-# Time (s) after which the smallest value of every output is stored: a dropped car has landed.
+# Time (s) after which the smallest value of every output is stored: a dropped vehicle has landed.
 LANDED = 1.0
 
 
@@ -66,19 +66,14 @@ def meaning_of(dimension: str) -> str:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A reduced and a full-order run of the same scenario.
+    """A reduced run and, where it is compared, the full-order run of the same scenario.
 
-    Attributes
-    ----------
-    reference
-        None where nothing is compared.
-    floor
-        RMS errors (outputs,) of the best approximation in the same subspaces, if there is one.
+    `projection` are the RMS errors (outputs,) of the best approximation in the same subspaces.
     """
 
     trajectory: Trajectory
     reference: Trajectory | None
-    floor: np.ndarray | None = None
+    projection: np.ndarray | None = None
 
 
 def result_dataset(
@@ -88,20 +83,11 @@ def result_dataset(
     reduced: FittedModel | Failure,
     in_training: bool = False,
 ) -> xr.Dataset:
-    """Result of an experiment.
+    """Result of an experiment: errors, counts, seconds, trust and status of every run.
 
-    Parameters
-    ----------
-    model
-        With the parameters of the tested scenarios.
-    in_training
-        Whether the method has learnt from the very run that is tested.
-
-    Returns
-    -------
-    xarray.Dataset
-        Errors, counts, seconds, trust and status of every run, on the dimension `scenario` if the
-        experiment keeps `errors`; rank and cost of the fit; histories if it keeps them.
+    They are on the dimension `scenario` if the experiment keeps `errors`; with rank and cost of the
+    fit, and histories if it keeps them.  `model` has the parameters of the tested scenarios;
+    `in_training` says whether the method has learnt from the very run that is tested.
     """
     import xarray as xr
 
@@ -140,10 +126,7 @@ def _compared(
 ) -> Outcome:
     """What is measured: histories without numbers of a run that there is not.
 
-    Parameters
-    ----------
-    finished
-        Whether nothing counts of a run that has not come to its end.
+    If only a `finished` run counts, neither is there one that has not come to its end.
     """
     if not isinstance(outcome, Failure):
         run = outcome.trajectory
@@ -197,7 +180,7 @@ def _of_one_run(model: Model, outcome: Outcome) -> dict[str, object]:
     run, found = outcome.trajectory, dict[str, object]()
     if outcome.reference is not None:
         none = np.full(len(model.outputs), np.nan)
-        found["floor_rms_error"] = none if outcome.floor is None else outcome.floor
+        found["floor_rms_error"] = none if outcome.projection is None else outcome.projection
     if model.kind == "ae":
         residuals = model.along("residual", run.coordinates, run.inputs)
         found["largest_residual"] = float(np.abs(residuals).max())

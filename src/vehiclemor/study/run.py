@@ -1,34 +1,37 @@
-"""Running studies: what is missing is computed, stored at once, and combined at the end."""
+"""Running studies, and how far they are: what is missing is computed, stored at once, combined."""
 
 from __future__ import annotations
 
-import logging
+import re
+from collections import Counter
+from collections.abc import Iterable
 from contextlib import nullcontext
+from dataclasses import dataclass, field
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.arguments import MOST_JOBS, count
-from vehiclemor.errors import InputError
+from vehiclemor.errors import FileError, InputError
 from vehiclemor.progress import tell, telling
-from vehiclemor.study.cluster import reached
+from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
-from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.plans.protocol import Protocol, load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
-from vehiclemor.study.plans.results import cells_digest, combined
-from vehiclemor.study.plans.study_file import MOST_SEED, StudyFile
-from vehiclemor.study.store import cell_path, combined_path, stored
-from vehiclemor.study.workers import Workers
+from vehiclemor.study.plans.results import combined, grid_digest
+from vehiclemor.study.plans.study_file import MOST_SEED
+from vehiclemor.study.store import combined_path, read_run, result_path, run_path, stored
+from vehiclemor.study.workers import Workers, cluster
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_LOG = logging.getLogger("vehiclemor")
-# A grid of so many points is told of before it is expanded; and so many experiments are made and
-# given to workers at a time.
-LARGE, AT_ONCE = 10_000, 5_000
+# Grids of so many points are announced before they are expanded.
+LARGE = 10_000
+LATER = "then the chosen ones are tested"
+# What differs from run to run of one reason.
+NUMBER = re.compile(r"-?\d[\d.e+-]*")
 
 
 def run_studies(
@@ -41,13 +44,13 @@ def run_studies(
     study
         Name of a study or collection, or path of a TOML file.
     folder
-        Results folder; cells that it holds already are not computed again.
+        Results folder; runs that it holds already are not computed again.
     jobs
         Number of processes.
     scheduler
         Address of a dask scheduler whose workers compute.
     seed
-        Of the drawn test runs of protocols, for an audit; by default that of their files.
+        Of the sampled test runs of protocols, for an audit; by default that of their files.
 
     Returns
     -------
@@ -55,47 +58,110 @@ def run_studies(
         Study name -> combined dataset, stored too, see `combined_path`.
     """
     count("jobs", jobs, most=MOST_JOBS)
-    if seed is not None:
-        count("seed", seed, least=0, most=MOST_SEED)
     if jobs > 1 and scheduler:
         raise InputError("jobs: a scheduler has its own workers")
-    files = studies_and_files(study)
-    protocols = [
-        load_protocol(str(path), seed if found.drawn else None, name)
-        for name, (path, found) in files.items()
-        if found.bounds
-    ]
-    if seed is not None and not any(protocol.definition.drawn for protocol in protocols):
-        raise InputError(f"seed: {study} draws no test runs")
-    grids = [_expanded(name, found) for name, (_, found) in files.items() if not found.bounds]
-    with reached(scheduler) if scheduler else nullcontext() as elsewhere:
-        results = {p.study: run_protocol(p, folder, jobs, elsewhere) for p in protocols}
-        for grid in grids:
-            workers = Workers(grid.name, folder, jobs, elsewhere, set(grid.unique))
-            results[grid.name] = stored(
-                combined_path(folder, grid.name),
+    plans = _plans(study, seed)
+    results: dict[str, xr.Dataset] = {}
+    with cluster(scheduler) if scheduler else nullcontext() as elsewhere:
+        for plan in plans:
+            if isinstance(plan, Protocol):
+                results[plan.study] = run_protocol(plan, folder, jobs, elsewhere)
+                continue
+            keys = list(plan.experiments)
+            workers = Workers(plan.name, folder, jobs, elsewhere)
+            results[plan.name] = stored(
+                combined_path(folder, plan.name),
                 "cells",
-                cells_digest(grid),
-                partial(_combined, grid, workers),
-                lambda grid=grid: (cell_path(folder, key) for key in grid.unique),
-                content_hash(grid.definition),
+                grid_digest(plan),
+                partial(_combined, plan, workers),
+                partial(map, partial(run_path, folder), keys),
+                content_hash(plan.definition),
             )
-            tell(grid.name, len(grid.unique), len(grid.unique))
+            tell(plan.name, len(keys), len(keys))
     return results
 
 
+def _plans(study: str, seed: int | None) -> list[Grid | Protocol]:
+    """Grids and protocols of a study or collection, all names resolved."""
+    if seed is not None:
+        count("seed", seed, least=0, most=MOST_SEED)
+    files = studies_and_files(study)
+    if seed is not None and not any(definition.drawn for _, definition in files.values()):
+        raise InputError(f"seed: {study} samples no test runs")
+    plans: list[Grid | Protocol] = []
+    for name, (path, definition) in files.items():
+        if definition.bounds:
+            plans.append(load_protocol(str(path), seed if definition.drawn else None, name))
+        else:
+            large = definition.points >= LARGE
+            text = f"{name}: checking {definition.points} grid points"
+            with telling(text) if large else nullcontext():
+                plans.append(expand(name, definition))
+    return plans
+
+
 def _combined(grid: Grid, workers: Workers) -> xr.Dataset:
-    experiments = iter(grid.unique.values())
-    while part := [[cell] for cell in islice(experiments, AT_ONCE)]:
-        workers(part)
+    workers([[experiment] for experiment in grid.experiments.values()])
     return combined(grid, workers.folder)
 
 
-def _expanded(name: str, definition: StudyFile) -> Grid:
-    if definition.points < LARGE:
-        return expand(name, definition)
-    _LOG.info("%s: %d grid points", name, definition.points)
-    with telling(f"{name}: checking all of them"):
-        grid = expand(name, definition)
-    _LOG.info("%s: %d cells; an interrupted run is resumed", name, len(grid.unique))
-    return grid
+@dataclass
+class StudyStatus:
+    """How far a study is.
+
+    Of its `runs` so many are `done`; a failure of the equations is one of them.  `ends` counts
+    (status, message) of the finished ones and of bugs, which are tried again; messages that differ
+    in numbers are one.  `result` is the file of the combined dataset, if there is one, and `later`
+    what a protocol does after these runs, which depends on how they end.
+    """
+
+    runs: int
+    done: int = 0
+    ends: Counter[tuple[str, str]] = field(default_factory=Counter)
+    result: Path | None = None
+    later: str = ""
+
+    @property
+    def to_do(self) -> int:
+        """Runs that the next call computes."""
+        return self.runs - self.done
+
+    @property
+    def failed(self) -> Counter[tuple[str, str]]:
+        """(status, message) -> runs that have failed."""
+        return Counter({end: n for end, n in self.ends.items() if end[0] not in FINISHED})
+
+
+def status_of(study: str, folder: Path, seed: int | None = None) -> dict[str, StudyStatus]:
+    """How far a study, or every one of a collection, is, by name; nothing is computed.
+
+    Of a protocol, whose later runs follow from the first, it is that of its validation.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise FileError(f"{folder}: not a folder")
+    found: dict[str, StudyStatus] = {}
+    for plan in _plans(study, seed):
+        if isinstance(plan, Protocol):
+            validation, name, later = plan.sets["validation"], plan.study, LATER
+            groups = [entry.experiments(plan.model, validation) for entry in plan.entries]
+            keys = {experiment.key for group in groups for experiment in group}
+        else:
+            name, later, keys = plan.name, "", plan.experiments.keys()
+        result = result_path(folder, name, content_hash(plan.definition))
+        found[name] = _status(keys, folder, StudyStatus(len(keys), result=result, later=later))
+    return found
+
+
+def _status(keys: Iterable[str], folder: Path, status: StudyStatus) -> StudyStatus:
+    examples: dict[tuple[str, str], tuple[str, str]] = {}
+    for key in keys:
+        try:
+            run = read_run(folder, key)
+        except FileError:
+            # Missing, or quarantined by the next call.
+            continue
+        for (name, message), runs in run.ends.items():
+            alike = name, NUMBER.sub("#", message)
+            status.ends[examples.setdefault(alike, (name, message))] += runs
+        status.done += not run.broken
+    return status

@@ -22,14 +22,10 @@ from vehiclemor.simulation.trajectory import Start
 
 # Parameter name (of a component of a point such as `tie_rod_inner.z`) and value in SI units.
 Overrides = tuple[tuple[str, float | tuple[float, ...]], ...]
-# Difference of inputs, as part of the largest, that rounding explains: of a table with its samples.
-ROUNDING = 1e-9
-# Times at which inputs are first looked at.
-FEW = 16
 
 
 def overrides(table: Mapping[str, float | Sequence[float]]) -> Overrides:
-    """Parameters of a car from a table of them; of which the order does not matter."""
+    """Parameters of a model from a table of them, whose order does not matter."""
     return tuple((name, _plain(value)) for name, value in sorted(table.items()))
 
 
@@ -42,18 +38,10 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Scenario:
-    """One run of a model: an input, a start, a speed, a car.
+    """One run of a model: an input with its factors, an initial condition, a speed, parameters.
 
-    Attributes
-    ----------
-    maneuver
-        The input, with its factors.
-    start
-        Name of an initial condition, or a state as numbers.
-    speed
-        Initial speed in m/s; None is that of the model's parameters, if it has any.
-    parameters
-        What differs from the model's parameters in this run.
+    The initial condition is a name or a state as numbers; without a speed (m/s) it is that of the
+    model's parameters, if it has any; `parameters` are what differs from the model's.
     """
 
     maneuver: Maneuver
@@ -66,17 +54,19 @@ class Scenario:
         """One readable line, unique within a protocol."""
         run = self.maneuver
         factors = [f"f {run.frequency_factor:g}", f"a {run.amplitude_factor:g}"]
-        words = [run.name, *factors, self.start if isinstance(self.start, str) else "own state"]
+        parts = [run.name, *factors, self.start if isinstance(self.start, str) else "own state"]
         if self.speed is not None:
-            words.append(f"{self.speed:g} m/s")
-        words += [f"{name} {_short(value)}" for name, value in self.parameters]
-        return ", ".join(words)
+            parts.append(f"{self.speed:g} m/s")
+        for name, value in self.parameters:
+            numbers = value if isinstance(value, tuple) else (value,)
+            parts.append(" ".join([name, *(f"{number:g}" for number in numbers)]))
+        return ", ".join(parts)
 
     @property
     def content(self) -> dict[str, Any]:
         """Everything that determines the run of a given model, for a hash."""
-        car = {} if self.parameters == () else {"parameters": self.parameters}
-        return car | {
+        own = {} if self.parameters == () else {"parameters": self.parameters}
+        return own | {
             "maneuver": self.maneuver.name,
             "frequency": self.maneuver.frequency_factor,
             "amplitude": self.maneuver.amplitude_factor,
@@ -168,32 +158,26 @@ def parameters_of(model: Model) -> Values:
     return Values((name, entry.value) for name, entry in model.parameters.entries.items())
 
 
-def car_of(model: Model, scenario: Scenario) -> Model:
-    """The model with the parameters of a scenario.
-
-    Raises
-    ------
-    VehiclemorError
-        If a parameter is wrong, or the car can't be assembled or can't stand.
-    """
+def model_of_run(model: Model, scenario: Scenario) -> Model:
+    """The model with the parameters of a scenario."""
     return with_parameters(model, scenario.parameters)
 
 
 def with_parameters(model: Model, parameters: Overrides) -> Model:
-    """The model with some of its parameters changed; kept, since many runs are of one car."""
-    return _car(model, parameters) if parameters else model
+    """The model with some of its parameters changed; kept, since many runs are of one sample."""
+    return _reparametrised(model, parameters) if parameters else model
 
 
 def start_of(model: Model, scenario: Scenario) -> Start:
-    """What its car starts from: a name, or at another speed than its own the state (n,)."""
-    if scenario.speed is None or scenario.speed == own_speed(car_of(model, scenario)):
+    """What a run starts from: a name, or at another speed than the model's own the state (n,)."""
+    if scenario.speed is None or scenario.speed == own_speed(model_of_run(model, scenario)):
         return scenario.start
     return _state_at(model, (*scenario.parameters, (SPEED, scenario.speed)), scenario.start)
 
 
 # More than the runs of a protocol, over which all rows go.
 @lru_cache(maxsize=1024)
-def _car(model: Model, parameters: Overrides) -> Model:
+def _reparametrised(model: Model, parameters: Overrides) -> Model:
     return reparametrised(model, dict(parameters))
 
 
@@ -204,33 +188,12 @@ def _state_at(model: Model, parameters: Overrides, start: Start) -> np.ndarray:
 
 def speed_of(model: Model, scenario: Scenario) -> float:
     """Initial speed in m/s; zero of a model that has none."""
-    return scenario.speed or own_speed(car_of(model, scenario)) or 0.0
+    return scenario.speed or own_speed(model_of_run(model, scenario)) or 0.0
 
 
 def training_run(model: Model, scenario: Scenario) -> TrainingRun:
     """The scenario as a run that a method may learn from."""
-    return TrainingRun(car_of(model, scenario), scenario.maneuver, start_of(model, scenario))
-
-
-def in_training(model: Model, training: Sequence[Scenario], test: Scenario) -> bool:
-    """Whether a run is among those of a training, or the beginning of one, whatever its name."""
-    return any(run == test or _alike(model, run, test) for run in training)
-
-
-def _alike(model: Model, run: Scenario, test: Scenario) -> bool:
-    """Whether a run has the same car, start and inputs as another as long as that lasts."""
-    last = test.maneuver.duration
-    if run.maneuver.duration < last:
-        return False
-    known, tested = run.maneuver.times, test.maneuver.times
-    # Most differ at a few times already.
-    for times in (tested[:: max(len(tested) // FEW, 1)], tested, known[known <= last]):
-        learnt, used = (s.maneuver.for_inputs(model.inputs).at(times) for s in (run, test))
-        if np.abs(learnt - used).max() > ROUNDING * np.abs(used).max():
-            return False
-    one, other = car_of(model, run), car_of(model, test)
-    begun, wanted = one.start(start_of(model, run)), other.start(start_of(model, test))
-    return np.array_equal(one.constants, other.constants) and np.array_equal(begun, wanted)
+    return TrainingRun(model_of_run(model, scenario), scenario.maneuver, start_of(model, scenario))
 
 
 def check(model: Model, scenario: Scenario) -> None:
@@ -239,8 +202,4 @@ def check(model: Model, scenario: Scenario) -> None:
     check_resolved(scenario.maneuver)
     if scenario.speed is not None and own_speed(model) is None:
         raise InputError(f"{model.name} has no {SPEED}: a scenario of it has no speed")
-    car_of(model, scenario).start(start_of(model, scenario))
-
-
-def _short(value: float | tuple[float, ...]) -> str:
-    return " ".join(f"{v:g}" for v in (value if isinstance(value, tuple) else (value,)))
+    model_of_run(model, scenario).start(start_of(model, scenario))

@@ -1,21 +1,27 @@
-"""The results folder: a file for each cell, and one for each study, with its combined dataset.
+"""The results folder: a file for each run, and one for each study, with its combined dataset.
 
-Files are written whole and moved into place.  What is not as it was written is set aside, named,
+Files are written whole and moved into place.  What is not as it was written is quarantined, named,
 and made again.  A combined dataset belongs to a content, not to a name.
+
+The file of a run has its arrays as safetensors, all else as JSON in the header, and there a hash of
+the file, so that a part, or a flipped bit, is never read as a result.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import logging
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.errors import FileError, MachineError, SpoiledError, machine_reason
+from vehiclemor.errors import CorruptError, FileError, MachineError, machine_reason
 from vehiclemor.files import (
     make_folder,
     not_written,
@@ -24,23 +30,105 @@ from vehiclemor.files import (
     write_whole,
 )
 from vehiclemor.netcdf_file import global_attributes, read_dataset, write_dataset
-from vehiclemor.study import cell_file
+from vehiclemor.short_repr import shortened
 
 if TYPE_CHECKING:
     import xarray as xr
 
-ASIDE = "set-aside"
+QUARANTINE = "quarantine"
+ENDING, SCHEMA = ".safetensors", "vehiclemor run 4"
+# Bytes that say how long the header is; and where the hash stands, for which there are zeros while
+# it is computed.
+PREFIX, HASH, ZEROS = 8, '"sha256":"{}"', "0" * 64
+# What comes of a text that is none of ours.
+WRONG = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
 _LOG = logging.getLogger("vehiclemor")
 
 
-def prepare_folder(folder: Path) -> None:
-    """Make a results folder, prove that it can be written, and remove old parts of files.
+class StoredRun(NamedTuple):
+    """What the file of a run holds: variables as xarray takes them, text as objects."""
 
-    Raises
-    ------
-    VehiclemorError
-        If it is a file, or can't be made or written.
-    """
+    variables: dict[str, tuple[list[str], np.ndarray, dict[str, Any]]]
+    coordinates: list[str]
+    attributes: dict[str, Any]
+
+    @property
+    def ends(self) -> Counter[tuple[str, str]]:
+        """(status, message) -> number of its scenarios."""
+        texts = (self.variables[name][1].ravel().tolist() for name in ("status", "message"))
+        return Counter(zip(*texts, strict=True))
+
+    @property
+    def broken(self) -> bool:
+        """Whether a bug has ended it: the next run tries it again."""
+        return "error" in self.variables["status"][1].ravel().tolist()
+
+    def dataset(self) -> xr.Dataset:
+        """As it was stored."""
+        import xarray as xr
+
+        return xr.Dataset(self.variables, attrs=self.attributes).set_coords(self.coordinates)
+
+
+def encoded(dataset: xr.Dataset, key: str) -> bytes:
+    """Content of the file of a run: variables of numbers, truths or text; attributes for JSON."""
+    from safetensors.numpy import save
+
+    arrays: dict[str, np.ndarray] = {}
+    described: dict[str, dict[str, Any]] = {}
+    for name, variable in dataset.variables.items():
+        values = variable.values
+        entry = described[str(name)] = {"dimensions": variable.dims, "attributes": variable.attrs}
+        if values.dtype.kind in "OU":
+            entry |= {"shape": values.shape, "text": values.ravel().tolist()}
+            "".join(entry["text"])
+        else:
+            arrays[str(name)] = np.ascontiguousarray(values).reshape(values.shape)
+    coordinates = [str(name) for name in dataset.coords]
+    content = {"variables": described, "coordinates": coordinates, "attributes": dataset.attrs}
+    header = {"schema": SCHEMA, "key": key, "sha256": ZEROS}
+    whole = save(arrays, header | {"dataset": json.dumps(content, default=_plain)})
+    return _with_hash(whole, ZEROS, hashlib.sha256(whole).hexdigest())
+
+
+def decoded(content: bytes, key: str) -> StoredRun:
+    """What the content of a file holds; `CorruptError` if it is not what was written for a key."""
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
+    size = int.from_bytes(content[:PREFIX], "little")
+    try:
+        header = json.loads(content[PREFIX : PREFIX + size])["__metadata__"]
+        if (schema := header["schema"]) != SCHEMA:
+            raise CorruptError(f"{shortened(schema)!r}, where this version writes {SCHEMA!r}")
+        if (found := header["key"]) != key:
+            raise CorruptError(f"not the result that belongs here, but of {shortened(found)}")
+        digest = header["sha256"]
+        if hashlib.sha256(_with_hash(content, digest, ZEROS)).hexdigest() != digest:
+            raise CorruptError("what it holds is not what was written")
+        found, arrays, variables = json.loads(header["dataset"]), load(content), {}
+        for name, entry in found["variables"].items():
+            if "text" in entry:
+                arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
+            variables[name] = entry["dimensions"], arrays[name], dict(entry["attributes"])
+        return StoredRun(variables, found["coordinates"], dict(found["attributes"]))
+    except (*WRONG, SafetensorError):
+        raise CorruptError("damaged, or no result of this package") from None
+
+
+def _with_hash(content: bytes, old: str, new: str) -> bytes:
+    return content.replace(HASH.format(old).encode(), HASH.format(new).encode(), 1)
+
+
+def _plain(value: Any) -> Any:
+    """What NumPy has of JSON's types."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} can't be stored")
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make a results folder, prove that it can be written, and remove old parts of files."""
     for part in (folder / "cells", folder / "studies"):
         make_folder(part)
         probe_folder(part)
@@ -48,93 +136,62 @@ def prepare_folder(folder: Path) -> None:
             remove_leftovers(part)
 
 
-def cell_path(folder: Path, key: str) -> Path:
+def run_path(folder: Path, key: str) -> Path:
     """File of the experiment with this key."""
-    return folder / "cells" / key[:2] / f"{key}{cell_file.ENDING}"
+    return folder / "cells" / key[:2] / f"{key}{ENDING}"
 
 
-def write_cell(dataset: xr.Dataset, folder: Path, key: str, seconds: float = np.nan) -> None:
-    """Store the result of an experiment, and the seconds that it took."""
-    write_encoded(cell_file.encoded(dataset, key, seconds), folder, key)
-
-
-def write_encoded(content: bytes, folder: Path, key: str) -> None:
-    """Store the content of a cell's file."""
-    path = cell_path(folder, key)
-
-    def write(temporary: Path) -> None:
-        if not path.parent.is_dir():
-            path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(content)
-
+def write_run(content: bytes, folder: Path, key: str) -> None:
+    """Store the content of a run's file."""
+    path = run_path(folder, key)
+    path.parent.mkdir(parents=True, exist_ok=True)
     # Where parts of files are looked for there are no other files.
-    write_whole(path, write, folder / "cells")
+    write_whole(path, lambda temporary: temporary.write_bytes(content), folder / "cells")
 
 
-def read_cell(folder: Path, key: str) -> cell_file.Cell:
-    """Stored result of an experiment.
-
-    Raises
-    ------
-    FileError
-        If it is missing; `SpoiledError` if it is not what was written.
-    """
-    path = cell_path(folder, key)
+def read_run(folder: Path, key: str) -> StoredRun:
+    """Stored result; `FileError` if it is missing, `CorruptError` if not what was written."""
+    path = run_path(folder, key)
     try:
-        return cell_file.decoded(path.read_bytes(), key)
+        return decoded(path.read_bytes(), key)
+    except CorruptError as error:
+        raise CorruptError(error.reason, path, "; run again") from None
+    except IsADirectoryError:
+        raise CorruptError("is a folder, not a result file", path, "; run again") from None
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such result file; run again") from None
     except OSError as error:
-        raise _unreadable(path, error) from None
-    except SpoiledError as error:
-        raise SpoiledError(error.reason, path, "; run again") from None
+        machine = machine_reason(error)
+        kind = MachineError if machine else FileError
+        raise kind(f"{path}: can't be read ({machine or error.strerror})") from None
 
 
 def is_stored(folder: Path, key: str) -> bool:
     """Whether a finished result is stored."""
     with suppress(FileError, MachineError):
-        return cell_path(folder, key).exists() and not read_cell(folder, key).broken
+        return not read_run(folder, key).broken
     return False
 
 
-def _unreadable(path: Path, error: OSError) -> FileError | MachineError:
-    if isinstance(error, IsADirectoryError):
-        return SpoiledError("is a folder, not a result file", path, "; run again")
-    if isinstance(error, FileNotFoundError):
-        return FileError(f"{path}: no such result file; run again")
-    machine = machine_reason(error)
-    kind = MachineError if machine else FileError
-    return kind(f"{path}: can't be read ({machine or error.strerror})")
-
-
-def finished_cells(folder: Path, keys: Iterable[str]) -> set[str]:
-    """Those of some experiments that are stored; what is not as it was written is set aside."""
+def finished_runs(folder: Path, keys: Iterable[str]) -> set[str]:
+    """Those of some experiments that are stored; what is not as it was written is quarantined."""
     finished = set()
     for key in keys:
-        path = cell_path(folder, key)
+        path = run_path(folder, key)
         if path.exists():
             try:
-                if not read_cell(folder, key).broken:
+                if not read_run(folder, key).broken:
                     finished.add(key)
-            except SpoiledError as error:
-                set_aside(path, folder / "cells", error.reason)
+            except CorruptError as error:
+                quarantine(path, folder / "cells", error.reason)
     return finished
 
 
-def set_aside(path: Path, part: Path, reason: str) -> None:
-    """Move what is not as it was written out of the way, and name it.
-
-    Parameters
-    ----------
-    part
-        The folder `cells` or `studies`.
-
-    Raises
-    ------
-    VehiclemorError
-        If it can't be moved.
-    """
-    target, number = part / ASIDE / path.name, 1
+def quarantine(path: Path, part: Path, reason: str) -> None:
+    """Move what is not as it was written out of the way, and name it."""
+    target, number = part / QUARANTINE / path.name, 1
     while target.exists():
-        target = part / ASIDE / f"{path.stem}-{(number := number + 1)}{path.suffix}"
+        target = target.with_name(f"{path.stem}-{(number := number + 1)}{path.suffix}")
     make_folder(target.parent)
     try:
         os.replace(path, target)
@@ -165,48 +222,34 @@ def stored(
     sources: Callable[[], Iterable[Path]] = list,
     content: str = "",
 ) -> xr.Dataset:
-    """What is stored for this key, here or under another name, else what `make` gives.
+    """What is stored for this key, else what `make` gives, which is then stored.
 
-    The results of a study are then stored at `path`, in the place of those of another study of that
-    name, which can be combined again.  Where the file is tells the encoding `source` of what is
-    returned.
+    That takes the place of the results of another study of that name, which can be combined again.
 
     Parameters
     ----------
     attribute
         Global attribute that holds the key.
     sources
-        Gives the files that it was made from; if one of them is missing it is made again, and if a
-        bug has ended one of its cells.
+        Files that it is made from; it is made again if one is missing, or a bug has ended a run.
     content
-        Hash of what a study file says: a file that was renamed is still the same study.
+        Hash of what a study file says.
     """
-    dataset = next(_current(path, attribute, key, sources), None)
-    if dataset is not None and (not content or dataset.encoding["source"] == str(path)):
-        return dataset
-    make_folder(path.parent)
     held = global_attributes(path)
+    if held.get(attribute) == key and all(source.exists() for source in sources()):
+        dataset = read_dataset(path, "source", "vehiclemor")
+        # What a bug has ended is tried again.
+        if "status" not in dataset or "error" not in dataset["status"].values:
+            dataset.encoding["source"] = str(path)
+            return dataset
+    make_folder(path.parent)
     if path.exists() and held.get("source") != "vehiclemor":
-        set_aside(path, path.parent, "not as it was written, or no result of this package")
-    dataset = make() if dataset is None else dataset
-    dataset = dataset.assign_attrs({attribute: key})
+        quarantine(path, path.parent, "not as it was written, or no result of this package")
+    dataset = make().assign_attrs({attribute: key})
     if content:
-        dataset = dataset.assign_attrs(study=path.stem, content=content)
+        dataset = dataset.assign_attrs(content=content)
         if held.get("content", content) != content:
             _LOG.info("%s: in the place of the results of another %s.toml", path, path.stem)
     write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset
-
-
-def _current(
-    path: Path, attribute: str, key: str, sources: Callable[[], Iterable[Path]]
-) -> Iterator[xr.Dataset]:
-    """What is stored for a key, at this path or beside it: its study may have been renamed."""
-    for place in (path, *sorted(path.parent.glob("[!.]*.nc"))):
-        if global_attributes(place).get(attribute) == key and all(p.exists() for p in sources()):
-            dataset = read_dataset(place, "source", "vehiclemor")
-            dataset.encoding["source"] = str(place)
-            # What a bug has ended is tried again.
-            if "status" not in dataset or "error" not in dataset["status"].values:
-                yield dataset

@@ -37,12 +37,11 @@ from vehiclemor.study.store import stored
 if TYPE_CHECKING:
     import xarray as xr
 
-# Rounds of a cost table, and of the test set of a protocol, which has many runs.
-CASE_ROUNDS, PROTOCOL_ROUNDS = 41, 7
+# Rounds of a cost table, and of the test set of a protocol, which has many runs; and those of them
+# in which long runs stand, which scatter less.
+CASE_ROUNDS, PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG = 41, 7, 3
 # Calls of a short and of a long run in a row, the first a warm-up; length (s) of a long one.
 REPEATS, REPEATS_OF_LONG, LONG_RUN = 4, 2, 2e-3
-# Rounds of a protocol in which long runs stand, which scatter less.
-PROTOCOL_ROUNDS_OF_LONG = 3
 # Fits whose median counts, as long as they take no more than these seconds together; and the length
 # (s) of a fit beside which loading machine code is nothing.
 FITS, FIT_SECONDS, LONG_FIT = 9, 2.0, 1.0
@@ -58,18 +57,7 @@ QUANTILES = {"seconds_median": 0.5, "seconds_lower": 0.25, "seconds_upper": 0.75
 
 
 def timed_starts(experiments: Mapping[str, Mapping[str, Experiment]], path: Path) -> xr.Dataset:
-    """Stored timing of cases, measured first if it is missing or out of date.
-
-    Parameters
-    ----------
-    experiments
-        Initial condition -> name of a case -> experiment from there.
-
-    Returns
-    -------
-    xarray.Dataset
-        As of `timed_cases`, on the dimension `start` too.
-    """
+    """Stored timing of initial condition -> name of a case -> experiment, as of `timed_cases`."""
 
     def every_start() -> xr.Dataset:
         import xarray as xr
@@ -95,14 +83,8 @@ def timed_cases(experiments: Mapping[str, Experiment], rounds: int | None = None
     """Time experiments on the one run that all are tested on.
 
     The case `baseline` is the paper's kind of full-order run and `strongest` the best full-order
-    solver, for every model.
-
-    Returns
-    -------
-    xarray.Dataset
-        On the dimension `case`: median and quartiles of the seconds of a run, seconds for a time
-        point and in the compiled loop alone, speed-ups against the two full orders, offline
-        seconds, counts, rank, status; errors on `output` too.
+    solver, for every model.  Beside what `timed_tests` has there are seconds for a time point,
+    speed-ups against these two, counts, rank and status; errors on `output` too.
     """
     import xarray as xr
 
@@ -117,10 +99,9 @@ def timed_cases(experiments: Mapping[str, Experiment], rounds: int | None = None
     seconds, offline = _rounds(list(experiments.values()), (every, every), what)
     times = _dataset(experiments, seconds, offline, f"{samples} time points")
     dataset = dataset.merge(times.isel(scenario=0, drop=True))
-    tolerances = [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()]
     columns: dict[str, object] = {
         "seconds_per_sample": dataset["seconds"].values / samples,
-        "tolerance": tolerances,
+        "tolerance": [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()],
     }
     # Round by round, so that a burst of other load on the machine hits both alike.
     own = np.where(seconds[:, :, 0] > 0.0, seconds[:, :, 0], np.nan)
@@ -133,7 +114,7 @@ def timed_cases(experiments: Mapping[str, Experiment], rounds: int | None = None
 
 def timed_tests(
     experiments: Mapping[str, Experiment],
-    finished: np.ndarray,
+    finished: np.ndarray | None = None,
     rounds: int | None = None,
     what: str = "test set",
 ) -> xr.Dataset:
@@ -184,12 +165,10 @@ def _rounds(
     what: str,
     finished: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[float]]:
-    """Seconds of runs (rounds, experiments, scenarios, 2), NaN where one fails, and of fits.
+    """Seconds of runs (rounds, experiments, scenarios, whole call and loop), and of fits.
 
-    They are those of the whole call, and of the compiled loop by its own account.  `rounds` are all
-    of them, and those of long runs, which have no seconds in the others.
-
-    All runs of a round follow one another, so that load on the machine hits all alike.
+    `rounds` are all of them, and those of long runs, which have no seconds (NaN) in the others, as
+    runs that fail have in all.  All runs of a round follow one another: load hits all alike.
     """
     model = model_of(experiments[0])
     tests = [(scenario.maneuver, start_of(model, scenario)) for scenario in experiments[0].test]
@@ -222,21 +201,21 @@ def called(run: Callable[[], Trajectory], repeats: int) -> tuple[float, float] |
 
     They are medians of all calls but the first, which warms the caches.
     """
+
+    def delivered() -> Trajectory:
+        # Histories are made when they are first read.
+        trajectory = run()
+        assert trajectory.outputs is not None
+        return trajectory
+
     found: list[tuple[float, float]] = []
     for _ in range(repeats):
-        trajectory, seconds = timed(partial(_delivered, run))
+        trajectory, seconds = timed(delivered)
         if not trajectory.finished:
             return Failure(trajectory.status, trajectory.message)
         found.append((seconds, trajectory.seconds))
     whole, loop = np.median(found[1:], axis=0)
     return float(whole), float(loop)
-
-
-def _delivered(run: Callable[[], Trajectory]) -> Trajectory:
-    """A run with all histories, which are made when they are first read."""
-    trajectory = run()
-    assert trajectory.outputs is not None
-    return trajectory
 
 
 def _warm_fit(

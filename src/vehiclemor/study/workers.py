@@ -1,4 +1,8 @@
-"""Evaluating what is missing of some experiments, in one process or several, and storing it."""
+"""Evaluating what is missing of some experiments, here, in processes or on a cluster.
+
+Processes are those of joblib; a cluster is the workers of dask.distributed at a scheduler's
+address, which send their results to the driver.  They compile what their cache lacks.
+"""
 
 from __future__ import annotations
 
@@ -8,27 +12,30 @@ import signal
 import threading
 import time
 import warnings
-from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain, islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vehiclemor.codegen.cache import cache_folder
-from vehiclemor.errors import MachineError, machine_reason
+from vehiclemor.codegen.cache import cache_folder, once
+from vehiclemor.errors import InputError, MachineError, machine_reason, one_line
 from vehiclemor.progress import tell
-from vehiclemor.study.evaluate import evaluate
+from vehiclemor.provenance import code_digest
+from vehiclemor.study.evaluate import evaluate, model_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.store import (
-    finished_cells,
+    encoded,
+    finished_runs,
     is_stored,
     prepare_folder,
-    read_cell,
-    write_cell,
-    write_encoded,
+    read_run,
+    run_path,
+    write_run,
 )
 
 if TYPE_CHECKING:
@@ -37,39 +44,29 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Groups = Sequence[Sequence[Experiment]]
-# How often what the machine has spoiled is tried; and seconds between two looks at the driver.
+# How often what the machine has broken is tried; and seconds between two looks at the driver.
 TRIES, LOOK = 3, 0.5
-# Batches sent for each worker, so that none is idle; more would not fit into its queue.
-WAITING = 2
-# Seconds that a batch should take, beside which it is nothing to send it; and its most experiments.
-BATCH, LARGEST = 0.5, 100
+# Batches for each worker, so that all end together; and most experiments of a batch.
+EACH, LARGEST = 32, 100
+# Seconds to reach a scheduler.
+REACH = 10.0
 KILLED = "a worker process was killed, perhaps for lack of memory"
 _LOG = logging.getLogger("vehiclemor")
 
 
 class Done(NamedTuple):
-    """What has become of some experiments.
+    """Keys of what is finished, how the machine has failed in the others, if there are any.
 
-    Attributes
-    ----------
-    finished
-        Keys.
-    fault
-        How the machine has failed in the others, if there are any.
-    seconds
-        That all have taken.
-    sent
-        Key -> content of a cell's file that the driver is to write.
+    `sent` are contents of files by key, which the driver is to write.
     """
 
     finished: list[str]
     fault: str = ""
-    seconds: float = 0.0
     sent: Mapping[str, bytes] = MappingProxyType({})
 
 
-# What evaluates groups elsewhere, if so each by itself.
-Engine = Callable[[Groups, Path, bool], Generator[Done, None, None]]
+# What evaluates groups, if so each as a batch of its own.
+Engine = Callable[[Groups, bool], Generator[Done, None, None]]
 
 
 @dataclass
@@ -86,37 +83,32 @@ class Workers:
     def __call__(self, groups: Groups) -> None:
         """Evaluate what is missing; a group stays in one process, where its fit is made once.
 
-        Raises
-        ------
-        MachineError
-            If the machine has failed again and again; what was finished is stored.
+        `MachineError` if the machine has failed again and again; what was finished is stored.
         """
         wanted = {e.key: e for group in groups for e in group}
         self.asked |= wanted.keys()
-        self.finished |= finished_cells(self.folder, wanted.keys() - self.finished)
+        self.finished |= finished_runs(self.folder, wanted.keys() - self.finished)
         if self._missing(groups):
-            # A folder that can't be is told before anything is announced.
+            # A folder that can't be is named before anything is announced.
             prepare_folder(self.folder)
-        self._report()
+        tell(self.name, len(self.finished), len(self.asked))
         faults: list[str] = []
         for left in reversed(range(TRIES)):
             work = self._missing(groups)
             if not work:
                 return
-            again = left < TRIES - 1
-            faults = [fault for fault in self._evaluated(work, again) if fault]
+            faults = [fault for fault in self._evaluated(work, left < TRIES - 1) if fault]
             if faults and left:
-                _LOG.warning("%s: %s; what it has spoiled is tried again", self.name, faults[0])
-        spoiled = sum(len(group) for group in self._missing(groups))
-        if spoiled:
+                _LOG.warning("%s: %s; what is lost is tried again", self.name, faults[0])
+        if missing := sum(map(len, self._missing(groups))):
             raise MachineError(
-                f"{self.name}: {spoiled} of {len(self.asked)} cells can't be computed "
+                f"{self.name}: {missing} of {len(self.asked)} runs can't be computed "
                 f"({faults[0]}); what is finished is stored: run again to resume"
             )
 
     def result(self, experiment: Experiment) -> xr.Dataset:
         """Stored result of an experiment."""
-        return read_cell(self.folder, experiment.key).dataset()
+        return read_run(self.folder, experiment.key).dataset()
 
     def _missing(self, groups: Groups) -> list[list[Experiment]]:
         """What is not finished, each once."""
@@ -124,9 +116,6 @@ class Workers:
         # Two candidates may be the same experiment: `pop` leaves it to the first.
         parts = [[f for e in group if (f := missing.pop(e.key, None))] for group in groups]
         return [part for part in parts if part]
-
-    def _report(self) -> None:
-        tell(self.name, len(self.finished), len(self.asked))
 
     def _evaluated(self, work: list[list[Experiment]], again: bool) -> Iterator[str]:
         """Evaluate groups; gives how the machine has failed in each, if it has."""
@@ -137,33 +126,26 @@ class Workers:
         # killed a worker would kill this process too.
         few = len(work) < 2 * self.jobs and not again
         if self.elsewhere:
-            engine = self.elsewhere(work, self.folder, again)
+            engine = self.elsewhere(work, again)
         elif self.jobs == 1 or few:
             engine = (evaluate_and_store(group, self.folder) for group in work)
         else:
-            engine = evaluated_by_workers(work, self.folder, self.jobs)
+            engine = in_processes(work, self.folder, self.jobs)
         with closing(engine):
             for done in engine:
                 for key, content in done.sent.items():
-                    write_encoded(content, self.folder, key)
+                    write_run(content, self.folder, key)
                 self.finished.update(done.finished)
-                self._report()
+                tell(self.name, len(self.finished), len(self.asked))
                 yield done.fault
 
 
 def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
-    """Evaluate some experiments, and move each complete file into place.
-
-    Raises
-    ------
-    MachineError
-        If a result can't be stored: no other could.
-    """
-    finished, fault, first = [], "", time.perf_counter()
+    """Evaluate some experiments, and move each complete file into place."""
+    finished, fault = [], ""
     for experiment in experiments:
         # Another driver may have stored it, or a worker that was killed before it could say so.
         if not is_stored(folder, experiment.key):
-            began = time.perf_counter()
             try:
                 dataset = evaluate(experiment)
             except Exception as error:
@@ -171,54 +153,46 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
                 if not fault:
                     raise
                 continue
-            write_cell(dataset, folder, experiment.key, time.perf_counter() - began)
+            write_run(encoded(dataset, experiment.key), folder, experiment.key)
         finished.append(experiment.key)
-    return Done(finished, fault, time.perf_counter() - first)
+    return Done(finished, fault)
 
 
 def in_batches(
     pool: Executor,
     work: Callable[[list[Experiment]], Done],
     groups: Groups,
-    places: Callable[[], int],
-    most: int = LARGEST,
+    size: int,
+    at_once: int | None = None,
     killed: type[Exception] | tuple[()] = (),
 ) -> Generator[Done, None, None]:
-    """What some work gives for each batch of groups; where they are quick, a batch has several.
+    """What some work gives for each batch of so many groups, of which some are `at_once` in a pool.
 
-    Parameters
-    ----------
-    places
-        Tells how many batches can be worked at a time.
-    most
-        Experiments of a batch, unless one group has more.
-    killed
-        Raised of a batch whose worker was killed, while the pool lives on.
+    `killed` is raised of a batch whose worker was killed, while the pool lives on.
     """
     from concurrent.futures import FIRST_COMPLETED, wait
 
-    waiting: dict[Future[Done], int] = {}
-    left, size = deque(groups), 1
-    while left or waiting:
-        at_once = WAITING * max(places(), 1)
-        while left and len(waiting) < at_once:
-            batch = list(left.popleft())
-            # The last batches are small, so that workers end together.
-            while left and len(batch) + len(left[0]) <= min(size, len(left) // at_once):
-                batch += left.popleft()
-            waiting[pool.submit(work, batch)] = len(batch)
-        for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-            number = waiting.pop(future)
+    batches = iter([[*chain(*groups[at : at + size])] for at in range(0, len(groups), size)])
+    waiting: set[Future[Done]] = set()
+    while True:
+        further = islice(batches, None if at_once is None else at_once - len(waiting))
+        waiting |= {pool.submit(work, batch) for batch in further}
+        if not waiting:
+            return
+        done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+        for future in done:
             try:
-                done = future.result()
+                yield future.result()
             except killed:
-                done = Done([], KILLED)
-            if done.seconds > 0.0:
-                size = int(min(max(BATCH * number / done.seconds, 1), most))
-            yield done
+                yield Done([], KILLED)
 
 
-def evaluated_by_workers(groups: Groups, folder: Path, jobs: int) -> Generator[Done, None, None]:
+def batch_size(groups: Groups, places: int) -> int:
+    """Groups of a batch, where so many batches are worked at a time."""
+    return min(max(len(groups) // (EACH * max(places, 1)), 1), LARGEST)
+
+
+def in_processes(groups: Groups, folder: Path, jobs: int) -> Generator[Done, None, None]:
     """What `evaluate_and_store` gives for each batch, in processes that end with this one."""
     from concurrent.futures.process import BrokenProcessPool
 
@@ -235,7 +209,7 @@ def evaluated_by_workers(groups: Groups, folder: Path, jobs: int) -> Generator[D
     )
     try:
         work = partial(evaluate_and_store, folder=folder)
-        yield from in_batches(pool, work, groups, lambda: jobs)
+        yield from in_batches(pool, work, groups, batch_size(groups, jobs), 2 * jobs)
     except BrokenProcessPool:
         yield Done([], KILLED)
     except BaseException:
@@ -254,3 +228,77 @@ def begin(driver: int, cache: str) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def cluster(scheduler: str) -> Iterator[Engine]:
+    """The workers of a scheduler; `InputError` if it can't be reached."""
+    try:
+        from distributed import Client
+        from distributed.utils import silence_logging_cmgr
+    except ImportError:
+        raise InputError("scheduler: needs dask: pip install 'vehiclemor[cluster]'") from None
+    # What matters is said in one line; dask would add a traceback for each lost connection.
+    with silence_logging_cmgr(logging.CRITICAL):
+        try:
+            # Its types are those of awaited calls too.
+            client: Any = Client(scheduler, timeout=REACH, set_as_default=False)
+        except (OSError, TypeError, ValueError) as error:
+            reason = " ".join(str(error).split())
+            raise InputError(f"scheduler {scheduler}: can't be reached ({reason})") from None
+        with client:
+            number = sum(client.nthreads().values())
+            work = f"{number} places for runs" if number else "no worker yet, runs wait"
+            _LOG.info("scheduler %s: %s; dashboard %s", scheduler, work, client.dashboard_link)
+            yield partial(on_cluster, client=client)
+
+
+def on_cluster(groups: Groups, alone: bool = False, *, client: Any) -> Generator[Done, None, None]:
+    """What `on_worker` gives for each batch.
+
+    If `alone`, each group is a batch of its own, so that one that kills workers harms no other.
+    """
+    from concurrent.futures import CancelledError
+
+    from distributed import KilledWorker
+
+    pool = client.get_executor(pure=False)
+    size = 1 if alone else batch_size(groups, sum(client.nthreads().values()))
+    try:
+        yield from in_batches(pool, on_worker, groups, size, killed=KilledWorker)
+    except CancelledError:
+        raise MachineError(
+            "the scheduler is lost; what is finished is stored: run again to resume"
+        ) from None
+    except (ImportError, AttributeError) as error:
+        raise InputError(
+            f"scheduler: a worker lacks what this process has ({one_line(error)}); "
+            f"install the same versions"
+        ) from error
+    finally:
+        pool.shutdown(wait=False)
+
+
+def on_worker(experiments: Sequence[Experiment]) -> Done:
+    """As `evaluate_and_store`, on a worker: files are sent."""
+    with _turn(), TemporaryDirectory() as name:
+        for e in {e.code + e.kernel: e for e in experiments}.values():
+            code = code_digest(e.model, e.method, e.settings)
+            if code != e.code or model_of(e).kernel_hash != e.kernel:
+                from distributed import get_worker
+
+                raise InputError(
+                    f"scheduler: worker {get_worker().address} has other source of {e.model} with "
+                    f"{e.method}; install the same versions of vehiclemor, sympy and plug-ins"
+                )
+        done = evaluate_and_store(experiments, folder := Path(name))
+        return done._replace(sent={k: run_path(folder, k).read_bytes() for k in done.finished})
+
+
+@once
+def _turn() -> threading.Lock:
+    """Runs of one process take turns: the limit of linear algebra is one for all its threads."""
+    from threadpoolctl import threadpool_limits
+
+    threadpool_limits(1)
+    return threading.Lock()

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 import vehiclemor as vm
 from vehiclemor.errors import InputError
 from vehiclemor.simulation.input_polynomials import extent_of
-from vehiclemor.study.plans.protocol import drawn, load_protocol
+from vehiclemor.study.plans.protocol import load_protocol, sampled_runs
 
 CAR = "independent_suspension_vehicle"
 # Steering (rad) that the 14-DOF vehicle allows, and about the largest that its model has learnt.
@@ -83,7 +83,7 @@ def test_steering_of_the_protocol_is_within_what_is_known(name):
     reach = getattr(rom.reduced, "fast", rom.reduced).reach
     known = [*protocol.sets["training"], *protocol.sets["validation"]]
     plan = protocol.definition.drawn
-    drawn_runs = drawn(protocol.model, plan, (7, 1, 0), known)
+    drawn_runs = sampled_runs(protocol.model, plan, (7, 1, 0), known)
     for scenario in (*protocol.sets["validation"], *drawn_runs):
         assert reach.driven(scenario.maneuver)[0] <= 1.0
 

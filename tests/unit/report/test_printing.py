@@ -1,7 +1,8 @@
-"""Tables: what is handed in stands there in every format, and fits the terminal."""
+"""Tables: what is handed in stands there in every format; and what tables show of a model."""
 
 import io
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -9,8 +10,23 @@ import pandas as pd
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.report.labels import Column, column
+from tests.unit import standard_problems
+from vehiclemor.registry import component, names
+from vehiclemor.report.default_studies import of_paper, smaller_rank
+from vehiclemor.report.labels import (
+    Column,
+    column,
+    default_rank,
+    main_outputs,
+    of_kind,
+    tabled_outputs,
+    tables_file,
+    timing_cases,
+)
 from vehiclemor.report.printing import simulation_text, table, width
+from vehiclemor.report.published import load_published
+from vehiclemor.simulation.build import build
+from vehiclemor.study.experiment import complete_settings
 
 ROWS = pd.DataFrame(
     {
@@ -77,11 +93,6 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
     assert table([{"t": 2.5e-6}], micro).split() == ["time,", "us", "2.5"]
 
 
-def test_errors_of_outputs_have_headings_without_an_entry():
-    assert "pitch" in column("rms_pitch").heading
-    assert column("never_heard_of").heading == "never heard of"
-
-
 def test_a_simulation_prints_the_errors_of_each_output_and_a_dash_for_zero():
     run = vm.simulate("double_wishbone", "pod", rank=3)
     run["floor_rms_error"].loc["toe"] = 0.0
@@ -91,3 +102,42 @@ def test_a_simulation_prints_the_errors_of_each_output_and_a_dash_for_zero():
         names = ("rms_error", "floor_rms_error", "max_error", "signal_range")
         numbers = [float(run[name].sel(output=output)) for name in names]
         assert rows[output][1:] == [f"{n:.1e}" if n else "-" for n in numbers] + [unit]
+
+
+PLAIN = standard_problems.DEFINITION
+BUILT_IN = ("double_wishbone", "independent_suspension_vehicle", "high_fidelity_vehicle")
+NOMINAL = ("figures-6-7", "figures-2-4", "figures-9-10")
+
+
+@pytest.mark.parametrize(("name", "nominal"), [*zip(BUILT_IN, NOMINAL, strict=True)])
+def test_rows_of_the_papers_models_exist_and_are_named_once(name, nominal):
+    cases, model = timing_cases(component("model", name)), build(name)
+    assert [case.id for case in cases[:2]] == ["baseline", "strongest"]
+    for kind in ("id", "label"):
+        assert len({getattr(case, kind) for case in cases}) == len(cases)
+    assert {case.method for case in cases} <= set(names("method"))
+    assert set(of_kind(model.kind).counts) <= set(model.counts)
+    assert of_paper(name) == nominal
+    assert set(tables_file().reduced) == set(BUILT_IN)
+    # Settings of the paper are the defaults of POD.
+    printed = [n for n in load_published().numbers.values() if n.model == name]
+    assert smaller_rank(model, "pod") == {}
+    settings = complete_settings(model, "pod")
+    for number in printed:
+        if number.kind == "rms_error":
+            assert settings["rank"] == number.states
+            assert settings["control_period"] == number.control_period
+
+
+def test_defaults_follow_the_kind():
+    speeds = {"ae": (), "ode": PLAIN.speeds, "dae": PLAIN.speeds}
+    for kind, counted in (("ae", "iterations"), ("ode", "rhs_calls"), ("dae", "rhs_calls")):
+        made = replace(PLAIN, kind=kind, speeds=speeds[kind], design_coordinates=PLAIN.starts)
+        cases = [case.id for case in timing_cases(made)]
+        assert cases[:2] == ["baseline", "strongest"]
+        assert cases[-4:] == ["replay", "pod_r1", "pod_literal_r1", "fixed_basis_r1"]
+        assert counted in of_kind(kind).counts
+    for coordinates, rank in ((1, 1), (2, 1), (3, 2), (4, 3), (26, 3)):
+        assert default_rank(coordinates) == rank
+    assert tabled_outputs(PLAIN) == tuple(output.name for output in PLAIN.outputs)
+    assert main_outputs(PLAIN) == ("angle", "tracked", "angular_speed")

@@ -1,18 +1,24 @@
-"""Which figures there are: those of `figures.toml`, of every registered model, of any study."""
+"""Which figures there are: of `figures.toml`, of every model, of any study; and their files."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
+import xarray as xr
 from matplotlib.figure import Figure
 from pydantic import Field
 
+from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
+from vehiclemor.errors import InputError
+from vehiclemor.failure import attempt_apart
+from vehiclemor.files import make_folder, write_text
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
-from vehiclemor.report.figures import errors, paper, pareto, result_plot, runs, schematics
-from vehiclemor.report.figures.theme import Results
+from vehiclemor.report.figures import errors, paper, result_plot, runs, schematics, theme
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import studies_and_files
 from vehiclemor.study.plans.study_file import StudyFile
+from vehiclemor.study.run import run_studies
 from vehiclemor.toml_files import FileSchema, read_toml
 
 # What `draw` of an entry names.
@@ -25,7 +31,7 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "spectrum": paper.figure_spectrum,
     "unseen inputs": paper.figure_unseen,
     "equation order": paper.figure_equation_order,
-    "pareto": pareto.figure_pareto,
+    "pareto": paper.figure_pareto,
     "result": result_plot.figure_result,
 }
 # Figures that every model has, of all registered methods: study, what is drawn of it.
@@ -38,22 +44,11 @@ OF_A_MODEL: Mapping[str, tuple[Callable[[str, Path], str], str]] = {
 
 
 class Entry(FileSchema):
-    """One figure.
+    """One figure, by its name for `vehiclemor figures --only`.
 
-    Attributes
-    ----------
-    name
-        As given to `vehiclemor figures --only`.
-    drawing
-        Key of `DRAWINGS`; `options` are its arguments.
-    studies
-        Studies whose combined datasets it shows: names, or paths of study files.
-    caption
-        What it shows.
-    datasets
-        Names of the studies' datasets where those are not the studies' own.
-    default
-        Whether it is drawn where no figure is asked for: the paper's are, and what belongs to them.
+    `draw` is a key of `DRAWINGS`, with its `options`; `studies` are names or paths of study files,
+    and `datasets` names of what they give where those are not the studies' own.  By `default` the
+    paper's are drawn, and what belongs to them.
     """
 
     name: str
@@ -69,7 +64,7 @@ class Entry(FileSchema):
         """Names of the studies' datasets."""
         return self.datasets or [Path(study).stem for study in self.studies]
 
-    def draw(self, results: Results) -> Figure:
+    def draw(self, results: theme.Results) -> Figure:
         """Draw it from the combined datasets by study; what it does not show is left out."""
         shown = {name: results[name] for name in self.names}
         return DRAWINGS[self.drawing](*([shown] if shown else []), **self.options)
@@ -91,11 +86,6 @@ def find(name: str, results: Path) -> list[Entry]:
     """The figure of a name such as `6`, or `histories-<model>`, or all figures of a study.
 
     Studies of a model that declares none are written to the results folder.
-
-    Raises
-    ------
-    InputError
-        If there is no such figure.
     """
     if name in FIGURES:
         return [FIGURES[name]]
@@ -126,8 +116,93 @@ def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
             draw="pareto" if study.bounds else "result",
             studies=[path.stem if data_folder() in path.parents else str(path)],
             datasets=[name],
-            caption=f"{study.title}: {words}.",
+            caption=f"{study.title}: {content}.",
             options={} if study.bounds else {"kind": kind},
         )
-        for kind, words in kinds.items()
+        for kind, content in kinds.items()
     ]
+
+
+def figures(
+    only: Sequence[str] = (),
+    out: str | Path | None = None,
+    results: str | Path = "results",
+    jobs: int = 1,
+    *,
+    style: str = "",
+    dpi: int | None = None,
+    failed: dict[str, str] | None = None,
+) -> list[Path]:
+    """Draw figures of the paper or of any study; studies that are missing are run first.
+
+    Parameters
+    ----------
+    only
+        Figure names such as `6`, or `histories-`, `errors-`, `map-` or `pareto-` and the name of a
+        model, or studies and protocols by name or TOML file; by default the paper's and an index of
+        captions.
+    out
+        Folder of the figures; `figures` in the results folder by default.
+    results
+        Results folder.
+    jobs
+        Number of processes for missing studies.
+    style, dpi
+        Name or file of a Matplotlib style on top of the package's, and dots an inch of PNG files.
+    failed
+        Is given the figures that can't be drawn, and why: they raise no error then.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+
+    Raises
+    ------
+    VehiclemorError
+        If a name or file is wrong; at last if a figure can't be drawn, when all others are written.
+    """
+    folder = file_path("results", results)
+    target = folder / "figures" if out is None else file_path("out", out)
+    only = [only] if isinstance(only, str) else only
+    if not (isinstance(only, Sequence) and all(isinstance(name, str) for name in only)):
+        raise InputError(f"only is {quoted(only)}, not a list of names of figures")
+    # What is wrong is named before anything is computed.
+    theme.styled(style, dpi)
+    jobs = count("jobs", jobs, most=MOST_JOBS)
+    wanted = only or [name for name, entry in FIGURES.items() if entry.default]
+    chosen = {entry.name: entry for name in wanted for entry in find(name, folder)}
+    make_folder(target)
+    data: dict[str, xr.Dataset] = {}
+    for entry in chosen.values():
+        for study in entry.studies:
+            if not data.keys() >= set(entry.names):
+                data |= run_studies(study, folder, jobs)
+    written: list[Path] = []
+    wrong: dict[str, str] = {}
+    index = ["# Figures", "", PARAMETERS, ""]
+    for name, entry in chosen.items():
+        stem = name if name.startswith("figure") else f"figure-{name}"
+        files = [target / f"{stem}.{suffix}" for suffix in theme.FORMATS]
+        with theme.styled(style, dpi):
+            caption = attempt_apart(name, wrong, partial(_draw, entry, data, files))
+        index += [f"- {stem}: {text}" for text in caption]
+        written += files if caption else []
+    if not only:
+        written.append(write_text(target / "figures.md", "\n".join(index) + "\n"))
+    if failed is not None:
+        failed.update(wrong)
+    elif wrong:
+        raise InputError("; ".join(f"figure {name}: {why}" for name, why in wrong.items()))
+    return written
+
+
+def _draw(entry: Entry, data: theme.Results, files: list[Path]) -> str:
+    """Draw a figure of datasets; its caption and where it is from."""
+    figure = entry.draw(data)
+    for path in files:
+        theme.save_figure(figure, path)
+    if not entry.studies:
+        return entry.caption
+    hashes = sorted({str(data[name].attrs["kernel_hash"]) for name in entry.names})
+    return f"{entry.caption} Studies: {', '.join(entry.names)}; kernels {', '.join(hashes)}."

@@ -13,7 +13,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike
 
 from vehiclemor.errors import InputError
 from vehiclemor.report import labels
@@ -39,9 +38,9 @@ SORTED = "sorted by error"
 FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5, "label": "best approximation"}
 # Columns of maps, cells of a map with their number, and cells that a contour must enclose.
 COLUMNS, WRITTEN, ENCLOSED = 3, 100, 4
-# In % of the cells, those whose small errors the colours leave out; luminance of a colour on which
+# In % of the cells, those whose small errors the colours leave out; part of the colours on which
 # white has more contrast than black.
-LEAST, DARK = 2.0, 0.179
+LEAST, DARK = 2.0, 120 / 256
 # Label -> text, errors on the dimensions output and the axis.
 Lines = Mapping[str, tuple[str, xr.DataArray]]
 
@@ -51,10 +50,7 @@ def figure_errors(
 ) -> Figure:
     """RMS errors of studies over all that they vary.
 
-    Parameters
-    ----------
-    methods
-        Labels with their texts; by default all but the full order.
+    `methods` are labels with their texts, by default all but the full order.
     """
     first = next(iter(results.values()))
     if not {"rms_error", "signal_range"} <= set(first):
@@ -78,7 +74,7 @@ def figure_errors(
             errors = errors.max(rest)
             lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
             notes += [f"{dataset.sizes[axis]} samples"] if sampled else []
-            notes += [f"the largest error over {_words(rest)}"] if rest else []
+            notes += [f"the largest error over {_listed(rest)}"] if rest else []
         if mapped:
             notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
             figure = _map(dataset, errors, methods, outputs, shown)
@@ -109,8 +105,8 @@ def _finish(
     held = [labels.trained_runs(dataset).sel(label=list(methods)) for dataset in results.values()]
     count, size = sum(int(runs.sum()) for runs in held), sum(runs.size for runs in held)
     trained = f"{count} of {size} runs were in their own training" if count else ""
-    if words := "\n".join(filter(None, (", ".join(notes), trained))):
-        figure.suptitle(words, fontsize="medium")
+    if text := "\n".join(filter(None, (", ".join(notes), trained))):
+        figure.suptitle(text, fontsize="medium")
     theme.legend_below(figure, figure.axes)
     return figure
 
@@ -136,7 +132,7 @@ def _varied(dataset: xr.Dataset) -> list[str]:
     return sorted(names, key=order, reverse=True)
 
 
-def _words(dimensions: Sequence[str]) -> str:
+def _listed(dimensions: Sequence[str]) -> str:
     *head, last = (d.removeprefix(PARAMETER).replace("_", " ") for d in dimensions)
     return f"{', '.join(head)} and {last}" if head else last
 
@@ -149,13 +145,13 @@ def _lines(errors: xr.DataArray, methods: Mapping[str, str], others: Sequence[st
         own = [d for d in others if not bool((line == line.isel({d: 0})).all())]
         line = line.isel({d: 0 for d in others if d not in own}, drop=True)
         for place in itertools.product(*(line[d].values.tolist() for d in own)):
-            words = []
+            parts = []
             for name, value in zip(own, place, strict=True):
                 unit = str(errors[name].attrs.get("units", "")).removesuffix("1")
                 shown = value if isinstance(value, str) else f"{value:g}"
-                words.append(f"{_words([name])} {shown} {unit}".rstrip())
+                parts.append(f"{_listed([name])} {shown} {unit}".rstrip())
             chosen = line.sel(dict(zip(own, place, strict=True)))
-            found[", ".join([label, *words])] = ", ".join([text, *words]), chosen
+            found[", ".join([label, *parts])] = ", ".join([text, *parts]), chosen
     return found
 
 
@@ -171,7 +167,7 @@ def _sampled(dataset: xr.Dataset, sample: str) -> list[Places]:
 
     names = sorted(names, key=follows, reverse=True)[:SAMPLED]
     found = [places_of(dataset, name) for name in names]
-    return found or [Places(np.arange(len(ranks)), f"{_words([sample])}, {SORTED}")]
+    return found or [Places(np.arange(len(ranks)), f"{_listed([sample])}, {SORTED}")]
 
 
 def _draw_panel(
@@ -278,21 +274,14 @@ def _draw_cells(
     failed = ~np.isfinite(values)
     style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
     cells = np.where(failed, np.nan, np.maximum(values, norm.vmin or 0.0))
-    mesh = axis.pcolormesh(x, y, cells, norm=norm, **style)
+    axis.pcolormesh(x, y, cells, norm=norm, **style)
     j, i = np.nonzero(failed)
     axis.plot(x[i], y[j], color="#D55E00", **theme.CROSS)
     axis.grid(visible=False)
     for j, i in np.argwhere(~failed) if written else ():
-        color = "white" if luminance(mesh.get_cmap()(norm(cells[j, i]))[:3]) < DARK else "black"
+        color = "white" if norm(cells[j, i]) < DARK else "black"
         text: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
         axis.text(float(x[i]), float(y[j]), two_digits(float(values[j, i])), **text)
-
-
-def luminance(color: ArrayLike) -> float:
-    """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
-    parts = np.asarray(color, dtype=float)
-    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
-    return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def two_digits(value: float) -> str:

@@ -1,8 +1,13 @@
 """Figures that one question asks for: unseen inputs, rounding, order of equations, spectrum."""
 
+import json
+import textwrap
 from collections.abc import Mapping, Sequence
+from itertools import cycle
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -22,6 +27,8 @@ from vehiclemor.report.figures.theme import THIN, Results, Style, letter, panels
 from vehiclemor.report.labels import readable_unit
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.report.spectrum import spectrum
+from vehiclemor.report.unseen import method_rows, protocol_of
+from vehiclemor.study.plans.protocol import FULL_ORDER
 
 # Of the largest errors, in m; shorter bars could not be seen.
 SHORTEST, LONGEST = 1e-3, 60.0
@@ -43,16 +50,9 @@ PRESETS = {"recommended": "default settings", "literal": "literal"}
 def figure_unseen(
     results: Results, *, methods: Mapping[str, str], inputs: Mapping[str, float], shown: float
 ) -> Figure:
-    """A column for each input: paths above, largest lateral errors below.
+    """A column for each input: the first metres of paths above, largest lateral errors below.
 
-    Parameters
-    ----------
-    methods
-        Label in any of the studies -> text.
-    inputs
-        Title of a column -> amplitude factor.
-    shown
-        Length in m.
+    `methods` are texts by labels of any of the studies, `inputs` amplitude factors by title.
     """
     heights = {"height_ratios": [2.0, 1.0]}
     figure, axes = panels(2, len(inputs), (8.0, 4.4), sharey="row", gridspec_kw=heights)
@@ -78,18 +78,18 @@ def _draw_bars(axis: Axes, curves: Sequence[Curve]) -> None:
     errors = [c.run["max_error"].sel(output="lateral_position").item() for c in curves]
     colors = [curve.style["color"] for curve in curves]
     bars = axis.barh([c.text for c in curves], np.maximum(errors, SHORTEST), 0.6, color=colors)
-    axis.bar_label(bars, [*map(_length, errors)], padding=4)
+    factors = [readable_unit(error, "m") for error in errors]
+    texts = [
+        f"{two_digits(factor * error)} {unit}" if error >= MEASURABLE else "< 0.1 mm"
+        for error, (factor, unit) in zip(errors, factors, strict=True)
+    ]
+    axis.bar_label(bars, texts, padding=4)
     axis.set_ylim(len(curves) - 0.5, -0.5)
     axis.set_xscale("log")
     axis.set_xlim(SHORTEST, LONGEST)
     axis.set_xticks([1e-3, 1e-1, 1e1], ["0.001", "0.1", "10"])
     axis.minorticks_off()
     axis.grid(visible=False, axis="y")
-
-
-def _length(error: float) -> str:
-    factor, unit = readable_unit(error, "m")
-    return f"{two_digits(factor * error)} {unit}" if error >= MEASURABLE else "< 0.1 mm"
 
 
 def figure_spread(results: Results) -> Figure:
@@ -152,8 +152,8 @@ def figure_spectrum(*, models: Mapping[str, str]) -> Figure:
             values = found[variable].sel(preset=preset).transpose("mode", "window")
             values = values.where(values > 0.1 * rounding).dropna("mode", how="all")
             look: Style = {"marker": "o", "markersize": 3, **styles([method])[method]}
-            modes, words = values["mode"], f"{text}: median, all periods"
-            axis.plot(modes, values.median("window"), label=words, **look)
+            modes, label = values["mode"], f"{text}: median, all periods"
+            axis.plot(modes, values.median("window"), label=label, **look)
             band: Style = {"color": look["color"], "alpha": 0.15, "linewidth": 0.0}
             axis.fill_between(modes, values.min("window"), values.max("window"), **band)
         axis.set_yscale("log")
@@ -164,4 +164,62 @@ def figure_spectrum(*, models: Mapping[str, str]) -> Figure:
         axis.set_ylabel("" if column else label)
         axis.set_xlabel("number of modes" if row else "")
     theme.legend_below(figure, [axes[0, 0]])
+    return figure
+
+
+# Letters of a title in a line.
+TITLE = 60
+# Full-order integrators: of twelve no two look alike.
+GREYS: list[Style] = [
+    {"color": color, "linestyle": line, "marker": marker, "markersize": 4, "linewidth": 0.8}
+    for line, marker in (("-", "o"), ("--", "*"), (":", "X"))
+    for color in ("#000000", "#777777", "#AAAAAA", "#444444")
+]
+
+
+def figure_pareto(results: Results) -> Figure:
+    """Score (worst error over its bound) over the mean time of a whole call, one model.
+
+    Each full-order integrator is a line through its tolerances; a cross below the upper edge is a
+    reduced model of which a run has failed.  Bars: between the quartiles of the rounds.
+    """
+    (dataset,) = results.values()
+    rows: Any = pd.DataFrame(method_rows(dataset, protocol_of(dataset)))
+    rows["time"] = 1e6 * rows["seconds"]
+    rows["bar"] = 0.5 * rows["spread"] * rows["time"]
+    rows["tolerance"] = [json.loads(text).get("tolerance", 0.0) for text in rows["settings"]]
+    known = rows[np.isfinite(rows["score"]) & (rows["score"] > 0.0)]
+    top = 10.0 ** np.ceil(np.log10(max([1.0, *known["score"]])) + 0.5)
+    figure, axes = theme.panels(1, 1, (6.7, 4.2))
+    axis = axes[0, 0]
+    full = known[known["role"] == FULL_ORDER].sort_values("tolerance")
+    for (name, line), look in zip(full.groupby("series", sort=False), cycle(GREYS)):
+        bars: Style = {"xerr": line["bar"], "elinewidth": 0.8, "capsize": 1.5, **look}
+        label = f"full order, {str(name).removeprefix('full order')}".removesuffix(", ")
+        axis.errorbar(line["time"], line["score"], label=label, **bars)
+    for score in rows["score"][rows["method"] == "replay"]:
+        axis.axhline(score, color="#666666", linestyle=":", label="replay (no time)")
+    reduced = rows[(rows["role"] != FULL_ORDER) & (rows["method"] != "replay")]
+    looks = zip(cycle(theme.COLORS), cycle(theme.MARKERS))
+    for row in reduced[np.isfinite(reduced["time"])].itertuples():
+        color, marker = next(looks)
+        failed = not np.isfinite(row.score)
+        # Hollow, so that one shows through the other.
+        look = {"color": color, "marker": "x" if failed else marker, "linestyle": "none"}
+        look |= {"markersize": 11, "markeredgewidth": 2.4} if row.winner else {"markersize": 7}
+        look |= {"xerr": row.bar, "elinewidth": 1.0, "capsize": 2, "markerfacecolor": "none"}
+        label = f"{row.label}{' (fails)' * failed}{' (chosen)' * bool(row.winner)}"
+        axis.errorbar(row.time, top / 1.5 if failed else row.score, label=label, **look)
+    axis.axhline(1.0, **theme.THIN)
+    axis.text(0.99, 1.08, "bounds", fontsize=7, ha="right", transform=axis.get_yaxis_transform())
+    axis.set_yscale("log")
+    axis.set_xscale("log")
+    axis.set_ylim(0.5 * min([1.0, *known["score"]]), top)
+    axis.set_xlabel("mean CPU time of a whole call, all outputs delivered, in µs")
+    axis.set_ylabel("worst error / bound, judged runs")
+    theme.tick_decades(axis.xaxis, *axis.get_xlim())
+    # Of what is chosen the mark is larger than a line of the legend.
+    figure.legend(loc="outside right upper", fontsize=7, markerscale=0.7)
+    # The legend stands beside the axes, whose title can't be wrapped by itself.
+    axis.set_title(textwrap.fill(str(dataset.attrs["title"]), TITLE))
     return figure

@@ -12,8 +12,8 @@ from vehiclemor.registry import component
 from vehiclemor.report.figures.errors import figure_errors
 from vehiclemor.report.figures.runs import figure_histories, figure_paths
 from vehiclemor.report.figures.theme import Results, save_figure, styled, tell_empty
+from vehiclemor.report.labels import main_outputs, tabled_outputs
 from vehiclemor.report.result_selection import drawn
-from vehiclemor.report.shown import main_outputs, tabled_outputs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,21 +33,9 @@ DRAWINGS: dict[str, Callable[[xr.Dataset], Figure]] = {
 def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "histories") -> Figure:
     """Draw a result: full order and reduced models together, differences below.
 
-    Parameters
-    ----------
-    dataset
-        One run as `vehiclemor.simulate` returns it, or a study at one point of its grid, where the
-        methods are left; errors are drawn over the axes of the grid too.
-    path
-        Picture (PDF, SVG or PNG); none is written by default.
-    kind
-        `histories` of the outputs over the time, `paths` in the plane, or `errors`: RMS, as shares
-        of the outputs' ranges.
-
-    Raises
-    ------
-    InputError, FileError
-        If the dataset does not hold what is to be drawn, or the picture can't be written.
+    It is one run as `vehiclemor.simulate` returns it, or a study at one point of its grid, where
+    the methods are left; errors are drawn over the axes of the grid too.  A picture is written to a
+    `path` (PDF, SVG or PNG), if there is one.
     """
     with styled():
         figure = _drawn(dataset, kind)

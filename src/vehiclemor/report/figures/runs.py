@@ -39,15 +39,7 @@ class Curve(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """Runs of one panel.
-
-    Attributes
-    ----------
-    full
-        One that stands beside its full order; a failed one may have none.
-    curves
-        The others, full order left out.
-    """
+    """Runs of one panel: one that stands beside its full order, and those that are drawn."""
 
     full: xr.Dataset
     curves: Sequence[Curve]
@@ -61,11 +53,8 @@ class Runs(NamedTuple):
 def legend_of(dataset: xr.Dataset, methods: Mapping[str, str] | None = None) -> dict[str, str]:
     """Text of each reduced model by its label: trained on the run, and not ended well, if so.
 
-    Parameters
-    ----------
-    methods
-        Labels with their texts, those that the study lacks left out; by default all, or full order
-        where nothing was compared with it.
+    `methods` are labels with their texts, those that the study lacks left out; by default all, or
+    full order where nothing was compared with it.
     """
     known = [str(label) for label in dataset["label"].values]
     if methods is None:
@@ -109,18 +98,15 @@ def figure_histories(
     shown: float | None = None,
     marks: Sequence[float] = (),
 ) -> Figure:
-    """Outputs over the time: a column for each start, or for each output.
+    """Outputs over the time: a column for each start, or for each output if they stand `beside`.
 
     Parameters
     ----------
     methods
         As of `legend_of`.
     rows
-        What each output has: `history`, `error` (beside the RMS error of the best approximation),
-        `largest error` (in each control period, with the RMS error over the run beside the
-        published one).  By default histories and errors.
-    beside
-        Outputs stand beside each other, not below each other.
+        Of each output: `history`, `error` (beside that of the best approximation), `largest error`
+        (in each control period, with the RMS error over the run beside the published one).
     place
         Place in the study's grid.
     shown, marks
@@ -259,9 +245,9 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> None:
     hide_rounding(axis)
     axis.set_ylim(bottom=min([axis.get_ylim()[0], *(0.5 * rms for rms in marked)]))
     tick_decades(axis.yaxis, *axis.get_ylim())
-    words = f"largest error of {labels.label_of(output).symbol}"
-    words = words if len(words) <= LINE else words.replace(" of ", "\nof ", 1)
-    axis.set_ylabel(f"{words}\nin each {period:.2g} s ({labels.unit_of(runs.full, output)})")
+    label = f"largest error of {labels.label_of(output).symbol}"
+    label = label if len(label) <= LINE else label.replace(" of ", "\nof ", 1)
+    axis.set_ylabel(f"{label}\nin each {period:.2g} s ({labels.unit_of(runs.full, output)})")
 
 
 DRAWN: Mapping[str, Callable[[Axes, Runs, str], None]] = {
@@ -280,12 +266,7 @@ def figure_paths(
 ) -> Figure:
     """Paths in the plane, and the distances from full order at the same time below.
 
-    Parameters
-    ----------
-    methods, place
-        As of `figure_histories`.
-    parts
-        Title of a panel -> length in m that it shows; by default one of the whole path.
+    `parts` are lengths in m that panels show, by their titles; by default one of the whole path.
     """
     (dataset,) = results.values()
     dataset = dataset.sel(place or {})

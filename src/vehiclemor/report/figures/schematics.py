@@ -1,29 +1,19 @@
-"""Figures 1, 5 and 8: the paper's mechanisms drawn from their models, beside their graphs."""
+"""Figures 1, 5 and 8: the paper's mechanisms in space, beside their graphs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from vehiclemor.multibody.high_fidelity.equilibrium import wheel_places
-from vehiclemor.multibody.independent_suspension.equilibrium import derived
-from vehiclemor.parameters import load_parameters
-from vehiclemor.registry import component
 from vehiclemor.report.figures.theme import Style
 from vehiclemor.resources import data_folder
-from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.build import build
 from vehiclemor.toml_files import FileSchema, read_toml
 
 GREY, SPRING = "#555555", "#56B4E9"
 TEXT: Style = {"fontsize": 7.5, "ha": "center", "va": "center"}
 HALO: Style = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-# Only for the drawings, in m: radius of the suspension's wheel, upper ends of the 14-DOF vehicle's
-# springs.
-WHEEL_RADIUS, SPRING_TOP = 0.30, 0.92
-LEFT, UP = np.eye(3)[1:]
 # Places (3,) in m by name, and the radius of the wheels.
 Points = dict[str, Any]
 Drawing = dict[str, Any]
@@ -36,92 +26,10 @@ class SchematicsFile(FileSchema):
     drawings: dict[str, Drawing]
 
 
-def _vehicle() -> list[tuple[Points, float]]:
-    """The 14-DOF vehicle at rest in equilibrium, its left and its right side."""
-    p = _parameters("independent_suspension_vehicle")
-    d = derived(p)
-    places = zip(d.sprung_distance, (1.0, -1.0), ("front", "rear"), d.depth, strict=True)
-    points: Points = {}
-    for x, sign, end, depth in places:
-        place = np.array([sign * x, p[f"{end}_track"] / 2.0, 0.0])
-        points[f"{end}_wheel_centre"] = place + (p["sprung_height"] - depth) * UP
-        points[f"{end}_spring_top"] = place + SPRING_TOP * UP
-    return _both_sides(points, p["sprung_height"], p["tire_radius"], p["front_axle_distance"])
-
-
-def _high_fidelity() -> list[tuple[Points, float]]:
-    """The high-fidelity vehicle at its design position, from the road upwards."""
-    p = _parameters("high_fidelity_vehicle")
-    # Every tire carries a quarter of the weight: front and rear deflections differ by 0.3 mm from
-    # each other, and the pitch of 0.1 mrad from 0, which no drawing can show.
-    masses = [value for name, value in p.items() if name.endswith("_mass")]
-    # All bodies but the chassis come in pairs.
-    mass = 2.0 * sum(masses) - p["chassis_mass"]
-    deflection = mass * p["gravity"] / (4.0 * p["tire_stiffness"])
-    height = p["tire_radius"] - deflection - wheel_places(p)[0][2]
-    front, rear = (place + height * UP for place in wheel_places(p))
-    points = {
-        name: value + (rear if name.startswith("rear_") else front - p["wheel_centre"])
-        for name, value in p.items()
-        if np.shape(value) == (3,)
-    }
-    points |= {"front_wheel_centre": front, "rear_wheel_centre": rear}
-    points["rack_end"] = points["tie_rod_inner"] * [1.0, 0.0, 1.0]
-    return _both_sides(points, height, p["tire_radius"], 0.0)
-
-
-def _suspension() -> list[tuple[Points, float]]:
-    """The suspension at -0.1 and 0.1 m of travel, faint, and at its design position."""
-    model = build("double_wishbone")
-    assert isinstance(model, AlgebraicModel)
-    fixed: Points = {**model.parameters.values(), "radius": np.array(WHEEL_RADIUS)}
-    fixed |= {"frame": np.array([0.2, 0.3, -0.15])}
-    states = []
-    for travel, alpha in ((-0.1, 0.25), (0.1, 0.25), (0.0, 1.0)):
-        moving = model.joints_at(model.solve([travel, 0.0]))
-        rack = {"rack_end": moving["tie_rod_inner"] - 0.12 * LEFT}
-        states.append(({**fixed, **moving, **rack}, alpha))
-    return states
-
-
-STATES: Mapping[str, Callable[[], list[tuple[Points, float]]]] = {
-    "vehicle": _vehicle,
-    "suspension": _suspension,
-    "high_fidelity": _high_fidelity,
-}
-
-
-def _parameters(model: str) -> dict[str, Any]:
-    return load_parameters(model, component("model", model).parameters).values()
-
-
-def _both_sides(
-    points: Points, height: float, radius: float, behind: float
-) -> list[tuple[Points, float]]:
-    """Left points and their mirror images, with points on the road and the centre of mass.
-
-    Parameters
-    ----------
-    height, radius
-        Of the centre of mass above the road, and of the tires, in m.
-    behind
-        From the front axle to the centre of mass of the whole car in m.
-    """
-    road = {
-        f"{end} {side}": points[f"{end}_wheel_centre"] * [1.0, sign, 0.0]
-        for end in ("front", "rear")
-        for side, sign in (("left", 1.0), ("right", -1.0))
-    }
-    road |= {"whole right": road["front right"] - [behind, 0.0, 0.0], "below cg": np.zeros(3)}
-    road |= {"cg": height * UP, "radius": np.array(radius)}
-    mirrored = {name: place * [1.0, -1.0, 1.0] for name, place in points.items()}
-    return [(points | road, 1.0), (mirrored | road, 1.0)]
-
-
 def figure_schematic(*, name: str) -> Figure:
     """A mechanism in space, to scale (a), and its graph (b)."""
     file = read_toml(data_folder() / "figures" / "schematics.toml", SchematicsFile)
-    drawing, states = file.drawings[name], STATES[name]()
+    drawing = file.drawings[name]
     below, ratio = drawing["graph"]
     figure = Figure(figsize=(6.7, drawing["height"]))
     ratios = {"height_ratios" if below else "width_ratios": [1.0, ratio]}
@@ -132,6 +40,10 @@ def figure_schematic(*, name: str) -> Figure:
         axis.set_title(title)
     space.set_aspect("equal")
     plane = _plane(*drawing["view"])
+    states = [
+        ({key: np.array(place) for key, place in state["points"].items()}, state["alpha"])
+        for state in drawing["states"]
+    ]
     for points, alpha in states:
         _draw_bodies(space, drawing, points, plane, file.colors, alpha)
     _draw_outline(space, drawing, states[0][0], plane)
@@ -166,7 +78,7 @@ def _draw_bodies(
         line = _zigzag(points[low] @ plane, points[high] @ plane)
         axis.plot(*line.T, color=SPRING, linewidth=1.2, label="spring and damper")
     for body, name in drawing["wheels"]:
-        spin = points.get("axle_direction", LEFT)
+        spin = points.get("axle_direction", np.array([0.0, 1.0, 0.0]))
         up = np.cross([1.0, 0.0, 0.0], spin)
         up /= np.linalg.norm(up)
         angle = np.linspace(0.0, 2.0 * np.pi, 181)[:, None]

@@ -1,5 +1,6 @@
 """One look for all figures: lines, panels, axes, legends, and the files they are written to."""
 
+import string
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from itertools import cycle
@@ -18,7 +19,6 @@ from vehiclemor.arguments import count, quoted
 from vehiclemor.errors import InputError
 from vehiclemor.files import write_whole
 from vehiclemor.report.labels import MARK, TRAINED
-from vehiclemor.report.printing import alphabetic
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
 
 Results = Mapping[str, "xr.Dataset"]
@@ -86,20 +86,14 @@ def panels(
 
 def letter(number: int, title: str = "") -> str:
     """Title of a panel, counted from 0."""
-    return f"({alphabetic(number)}) {title}".rstrip()
+    name = string.ascii_lowercase[number % 26] * (number // 26 + 1)
+    return f"({name}) {title}".rstrip()
 
 
 class Places(NamedTuple):
-    """Places of the values of a dimension.
+    """Places of the values of a dimension, with the label of its axis.
 
-    Attributes
-    ----------
-    at
-        Perturbations in %, numbers, or 0, 1, 2 ... of what has `names` (values,).
-    label
-        Of the axis, with its unit.
-    names
-        Texts at the places, none where the axis is one of numbers.
+    They are perturbations in %, numbers, or 0, 1, 2 ... of what has `names`.
     """
 
     at: np.ndarray
@@ -135,13 +129,13 @@ class Places(NamedTuple):
 
 def places_of(dataset: xr.Dataset, name: str) -> Places:
     """Places of a dimension of a grid, or of a coordinate on one."""
-    values, words = dataset[name].values, name.removeprefix(PARAMETER).replace("_", " ")
+    values, text = dataset[name].values, name.removeprefix(PARAMETER).replace("_", " ")
     if name in FACTORS:
-        return Places(100.0 * (values - 1.0), f"{words.removesuffix(' factor')} perturbation (%)")
+        return Places(100.0 * (values - 1.0), f"{text.removesuffix(' factor')} perturbation (%)")
     if not np.issubdtype(values.dtype, np.number):
-        return Places(np.arange(len(values)), words, [str(value) for value in values])
+        return Places(np.arange(len(values)), text, [str(value) for value in values])
     unit = str(dataset[name].attrs.get("units", UNITS.get(name, "1")))
-    return Places(values, words if unit == "1" else f"{words} ({unit})")
+    return Places(values, text if unit == "1" else f"{text} ({unit})")
 
 
 def tick_decades(axis: Axis, low: float, high: float) -> None:
@@ -186,18 +180,12 @@ def tell_empty(figure: Figure) -> None:
         lines = [line for line in axis.lines if line.get_transform() == axis.transData]
         points = [found for line in lines if np.size(found := line.get_xydata())]
         if points and not any(np.isfinite(found).all(axis=1).any() for found in points):
-            words = f"no finite values{' above 0' if axis.get_yscale() == 'log' else ''}"
-            axis.text(0.5, 0.5, words, ha="center", va="center", transform=axis.transAxes)
+            text = f"no finite values{' above 0' if axis.get_yscale() == 'log' else ''}"
+            axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes)
 
 
 def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[None]:
-    """The package's style, with a style of Matplotlib (name or file) on top, and dots an inch.
-
-    Raises
-    ------
-    InputError
-        If there is no such style, or the resolution makes no sense.
-    """
+    """The package's style, with a style of Matplotlib (name or file) on top, and dots an inch."""
     dots = {} if dpi is None else {"savefig.dpi": count("dpi", dpi, 10, 2400)}
     changes = [OWN_STYLE, *([style] if style else []), dots]
     try:
@@ -210,13 +198,7 @@ def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[No
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure whole; its format is the file's suffix.
-
-    Raises
-    ------
-    InputError, FileError
-        If the format is not one of `FORMATS`, or the file can't be written.
-    """
+    """Write a figure whole; its format is the file's suffix."""
     suffix = path.suffix.removeprefix(".").lower()
     if suffix not in FORMATS:
         raise InputError(f"{path}: a figure is one of {', '.join(FORMATS)}")

@@ -1,34 +1,21 @@
-"""Grids: every combination of a study file's values, each an experiment with one test scenario.
-
-An experiment is made when it is asked for, and dropped after that: of a grid only the keys are
-kept.
-"""
-
-from __future__ import annotations
+"""Grids: every combination of a study file's values, each an experiment with one test scenario."""
 
 import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import (
-    FileError,
-    GeometryError,
-    InputError,
-    PlugInError,
-    VehiclemorError,
-)
+from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError, VehiclemorError
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.evaluate import refusal
 from vehiclemor.study.experiment import (
     Experiment,
-    Settings,
     complete_settings,
     default_settings,
     make_experiment,
@@ -37,6 +24,7 @@ from vehiclemor.study.plans.study_file import (
     FACTORS,
     PARAMETER,
     TEXTS,
+    MethodEntry,
     Sampling,
     StudyFile,
     values,
@@ -44,64 +32,18 @@ from vehiclemor.study.plans.study_file import (
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Overrides, Scenario, Values, check, overrides, with_parameters
 
-# Place in the grid: one index per dimension.
-Place = tuple[int, ...]
 # Histories of a study that are held at once.
 MOST_BYTES = 4e9
 # A key is 20 characters of ASCII.
 KEY = "S20"
 
 
-class Run(NamedTuple):
-    """All of a point that determines training and test scenarios.
-
-    Attributes
-    ----------
-    learner
-        The method, where the training depends on it.
-    """
-
-    maneuver: str
-    factors: tuple[float, float]
-    start: str
-    car: Overrides
-    training: tuple[str, ...]
-    learner: str
-    pairs: tuple[tuple[float, float], ...]
-
-    @property
-    def test(self) -> Scenario:
-        """What is tested."""
-        return Scenario.of(self.maneuver, self.factors, self.start, None, self.car)
-
-
-# As many as stand side by side in a grid, whose settings vary in between.
-@lru_cache(maxsize=1024)
-def _scenarios(model: Model, run: Run) -> tuple[tuple[Scenario, ...], tuple[Scenario]]:
-    """Training and test scenarios of a run."""
-    test = run.test
-    return training_set(model, run.learner, run.training, test, run.pairs), (test,)
-
-
-@lru_cache(maxsize=4096)
-def _complete(
-    model: Model, method: str, given: tuple[tuple[str, Any], ...], preset: str
-) -> Settings:
-    return Values(complete_settings(model, method, dict(given), preset))
-
-
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Experiments of a study on its dimensions.
+    """Experiments of a study on its dimensions, the last of which is `label`.
 
-    Attributes
-    ----------
-    model
-        With the study's own parameters.
-    dimensions
-        Name -> values of every grid dimension, `label` of the methods last.
-    samples
-        Name of what is sampled -> values on the dimension `sample`.
+    `samples` are the values on the dimension `sample`, by name; `keys` those of the experiments at
+    all points; `experiments` have each once, by its key.
     """
 
     name: str
@@ -109,170 +51,32 @@ class Grid:
     model: Model
     dimensions: dict[str, list[Any]]
     samples: dict[str, list[float]]
-
-    @property
-    def sizes(self) -> Place:
-        """Number of values of every dimension."""
-        return tuple(len(entry) for entry in self.dimensions.values())
-
-    @cached_property
-    def unique(self) -> UniqueCells:
-        """Key -> experiment, each once, in grid order, made when it is asked for."""
-        return UniqueCells(self)
-
-    @cached_property
-    def keys(self) -> np.ndarray:
-        """Keys of the experiments at all places."""
-        found = np.empty(self.sizes, KEY)
-        for method in range(self.sizes[-1]):
-            own = self._own_places(method)
-            keys = [self.cell(place).key for place in itertools.product(*own)]
-            found[..., method] = np.array(keys, KEY).reshape([len(part) for part in own[:-1]])
-        return found
-
-    def cell(self, place: Place) -> Experiment:
-        """The experiment at a place."""
-        point = self.point(place)
-        study, label = self.definition, point["label"]
-        entry, names = study.labelled[label], self._settings[label]
-        given = entry.settings | {d: point[d] for d in study.grid if d in names}
-        settings = _complete(self.model, entry.method, tuple(given.items()), entry.preset)
-        training, test = _scenarios(self.model, self._run(point))
-        return make_experiment(self.model, entry.method, settings, training, test, study.keep)
-
-    def point(self, place: Place) -> dict[str, Any]:
-        """Name of a dimension, or of what is sampled -> value at a place."""
-        point = {d: found[i] for (d, found), i in zip(self.dimensions.items(), place, strict=True)}
-        return point | {name: found[point["sample"]] for name, found in self.samples.items()}
-
-    def check(self) -> None:
-        """Raise `VehiclemorError` if a run can't be made, or no settings of a method fit."""
-        names = {name for found in self._settings.values() for name in found} | {"label"}
-        ranges = [
-            range(1 if name in names else len(found)) for name, found in self.dimensions.items()
-        ]
-        runs = [self._run(self.point(place)) for place in itertools.product(*ranges)]
-        if self.definition.keep == "trajectories":
-            self._check_histories({run.maneuver for run in runs})
-        for run in runs:
-            _check_run(self.model, run)
-        for method in range(self.sizes[-1]):
-            self._check_some_fit(method)
-
-    def _check_histories(self, maneuvers: set[str]) -> None:
-        """Raise `InputError` if the histories of all runs can't be held, or not side by side."""
-        first, *others = [component("maneuver", name) for name in maneuvers]
-        model, number = self.model, math.prod(self.sizes)
-        columns = len(model.coordinates) + len(model.speeds) + 2 * len(model.outputs)
-        size = 8.0 * first.samples * columns * number
-        if size > MOST_BYTES:
-            raise InputError(
-                f"histories of {number} runs take {size / 1e9:.0f} GB, more than "
-                f'{MOST_BYTES / 1e9:g}: give keep = "metrics", or make several studies of it'
-            )
-        if any(not np.array_equal(first.times, other.times) for other in others):
-            raise InputError('maneuvers of other output times need keep = "metrics"')
-
-    def _run(self, point: Mapping[str, Any]) -> Run:
-        """What the values of a point say about input, start, car and training."""
-        study, entry = self.definition, self.definition.labelled[point["label"]]
-        car = {n.removeprefix(PARAMETER): v for n, v in point.items() if n.startswith(PARAMETER)}
-        training = entry.training or point.get("training", study.training)
-        training = tuple(training) if isinstance(training, list) else (training,)
-        return Run(
-            point.get("maneuver", study.maneuver or self.model.definition.maneuver),
-            (point[FACTORS[0]], point[FACTORS[1]]),
-            point["start"],
-            overrides(car),
-            training,
-            entry.method if "protocol" in training else "",
-            tuple((pair[0], pair[1]) for pair in study.training_set),
-        )
-
-    @cached_property
-    def _settings(self) -> dict[str, set[str]]:
-        """Label of a method -> names of its settings."""
-        methods = self.definition.labelled.items()
-        return {label: set(default_settings(self.model, entry.method)) for label, entry in methods}
-
-    def _own_places(self, method: int) -> list[range]:
-        """Indices of every dimension at which the experiments of a method differ."""
-        own = self._settings[self.dimensions["label"][method]]
-        others = set().union(*self._settings.values()) - own
-        sizes = [1 if d in others else len(found) for d, found in self.dimensions.items()]
-        return [*map(range, sizes[:-1]), range(method, method + 1)]
-
-    def _check_some_fit(self, method: int) -> None:
-        """Raise the first error if no cell of a method has settings that fit the model.
-
-        Corners of a grid may not fit, such as a rank above the number of snapshots; if nothing
-        does, the study is wrong.
-        """
-        first = ""
-        for place in itertools.product(*self._own_places(method)):
-            cell = self.cell(place)
-            found = refusal(self.model, cell)
-            # Of a method that refuses the model nothing is set; a bug is a result.
-            if found is None or found.status != "rejected" or not cell.settings:
-                return
-            first = first or found.message
-        raise InputError(first)
-
-
-def _check_run(model: Model, run: Run) -> None:
-    """Raise `InputError` if the model can't be run so, with the parameters if it can't be made."""
-    try:
-        with_parameters(model, run.car)
-    except VehiclemorError as error:
-        told = ", ".join(f"{name} = {value}" for name, value in run.car)
-        raise InputError(f"{told}: {error}") from None
-    check(model, run.test)
-
-
-class UniqueCells(Mapping[str, Experiment]):
-    """Experiments of a grid by their keys, each once."""
-
-    def __init__(self, grid: Grid) -> None:
-        self._grid = grid
-        self._keys, self._first = np.unique(grid.keys.ravel(), return_index=True)
-
-    def __getitem__(self, key: str) -> Experiment:
-        at = int(np.searchsorted(self._keys, np.bytes_(key)))
-        if at == len(self._keys) or self._keys[at].decode() != key:
-            raise KeyError(key)
-        cell = self._grid.cell(np.unravel_index(self._first[at], self._grid.sizes))
-        # Its hash is known: it is half of what planning takes.
-        vars(cell)["key"] = key
-        return cell
-
-    def __iter__(self) -> Iterator[str]:
-        for key in self._keys[np.argsort(self._first)]:
-            yield key.decode()
-
-    def __len__(self) -> int:
-        return len(self._keys)
+    keys: np.ndarray
+    experiments: dict[str, Experiment]
 
 
 def expand(name: str, study: StudyFile) -> Grid:
-    """All experiments of a study.
-
-    Raises
-    ------
-    FileError
-        If the study names something unknown or a setting does not fit.
-    """
+    """All experiments of a study; `FileError` if it names something unknown or unfit."""
     try:
         model = build(study.model, overrides=study.parameters)
         samples = sampled(study.sampling) if study.sampling else {}
         dimensions = _dimensions(model, study, samples)
-        grid = Grid(name, study, model, dimensions, samples)
-        grid.check()
-        assert grid.keys.size
-        return grid
+        if study.keep == "trajectories":
+            _check_histories(model, study, dimensions)
+        keys = np.empty([len(entry) for entry in dimensions.values()], KEY)
+        experiments: dict[str, Experiment] = {}
+        own = {name: found for name, found in dimensions.items() if name != "label"}
+        for number, entry in enumerate(study.methods):
+            made = list(_of_method(model, study, entry, _points(own, samples)))
+            # Settings that a method does not have make no further experiments of it.
+            experiments |= {experiment.key: experiment for experiment in made}
+            found = np.array([experiment.key for experiment in made], KEY)
+            keys[..., number] = found.reshape(keys.shape[:-1])
     except PlugInError:
         raise
     except (InputError, GeometryError) as error:
         raise FileError(f"study {name}: {error}") from None
+    return Grid(name, study, model, dimensions, samples, keys, experiments)
 
 
 def _dimensions(
@@ -291,8 +95,89 @@ def _dimensions(
     dimensions.setdefault("start", list(study.start or [model.starts[0]]))
     if len(set(dimensions["start"])) != len(dimensions["start"]):
         raise InputError("start has the same value twice")
-    dimensions["label"] = list(study.labelled)
-    return dimensions
+    return dimensions | {"label": list(study.labelled)}
+
+
+def _check_histories(model: Model, study: StudyFile, dimensions: Mapping[str, list[Any]]) -> None:
+    """Raise `InputError` if the histories of all runs can't be held, or not side by side."""
+    names = dimensions.get("maneuver", [study.maneuver or model.definition.maneuver])
+    first, *others = [component("maneuver", name) for name in names]
+    number = math.prod(map(len, dimensions.values()))
+    columns = len(model.coordinates) + len(model.speeds) + 2 * len(model.outputs)
+    size = 8.0 * first.samples * columns * number
+    if size > MOST_BYTES:
+        raise InputError(
+            f"histories of {number} runs take {size / 1e9:.0f} GB, more than {MOST_BYTES / 1e9:g}: "
+            'give keep = "metrics", or make several studies of it'
+        )
+    if any(not np.array_equal(first.times, other.times) for other in others):
+        raise InputError('maneuvers of other output times need keep = "metrics"')
+
+
+def _points(
+    dimensions: Mapping[str, list[Any]], samples: Mapping[str, list[float]]
+) -> Iterator[dict[str, Any]]:
+    """Name of a dimension, or of what is sampled -> value, at every point."""
+    for place in itertools.product(*dimensions.values()):
+        point = dict(zip(dimensions, place, strict=True))
+        yield point | {name: found[point["sample"]] for name, found in samples.items()}
+
+
+def _of_method(
+    model: Model, study: StudyFile, entry: MethodEntry, points: Iterator[dict[str, Any]]
+) -> Iterator[Experiment]:
+    """Experiments of a method at some points; `InputError` if its settings fit at none of them.
+
+    Corners of a grid may not fit, such as a rank above the number of snapshots.
+    """
+    names, first, fits = set(default_settings(model, entry.method)), "", False
+    factors = tuple((one, other) for one, other in study.training_set)
+    for point in points:
+        given = entry.settings | {d: point[d] for d in study.grid if d in names}
+        settings = _complete(model, entry.method, tuple(given.items()), entry.preset)
+        parameters = {
+            n.removeprefix(PARAMETER): v for n, v in point.items() if n.startswith(PARAMETER)
+        }
+        maneuver = point.get("maneuver", study.maneuver or model.definition.maneuver)
+        test = _checked(
+            model, maneuver, tuple(point[f] for f in FACTORS), point["start"], overrides(parameters)
+        )
+        training = entry.training or point.get("training", study.training)
+        training = tuple(training) if isinstance(training, list) else (training,)
+        learner = entry.method if "protocol" in training else ""
+        learned = _training(model, learner, training, test, factors)
+        experiment = make_experiment(model, entry.method, settings, learned, (test,), study.keep)
+        if not fits:
+            found = refusal(model, experiment)
+            # Of a method that refuses the model nothing is set; a bug is a result.
+            fits = found is None or found.status != "rejected" or not settings
+            first = first or (found.message if found else "")
+        yield experiment
+    if not fits:
+        raise InputError(first)
+
+
+@lru_cache(maxsize=4096)
+def _complete(model: Model, method: str, given: tuple[tuple[str, Any], ...], preset: str) -> Values:
+    return Values(complete_settings(model, method, dict(given), preset))
+
+
+@lru_cache(maxsize=4096)
+def _checked(
+    model: Model, maneuver: str, factors: tuple[float, float], start: str, parameters: Overrides
+) -> Scenario:
+    """A test scenario; `InputError` if the model can't be run or made so."""
+    try:
+        with_parameters(model, parameters)
+    except VehiclemorError as error:
+        given = ", ".join(f"{name} = {value}" for name, value in parameters)
+        raise InputError(f"{given}: {error}") from None
+    scenario = Scenario.of(maneuver, factors, start, None, parameters)
+    check(model, scenario)
+    return scenario
+
+
+_training = lru_cache(maxsize=4096)(training_set)
 
 
 def sampled(plan: Sampling) -> dict[str, list[float]]:

@@ -12,18 +12,12 @@ from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.toml_files import FileSchema, read_toml
 
-# Entries of the longest lists of a study that is written stand on lines of their own.
-LINE = "\n  "
+# Between entries of a long list.
+LINE = ",\n  "
 
 
 def study_path(study: str) -> Path:
-    """Path of a study: a name from the package's data, or a TOML file.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
+    """Path of a study: a name from the package's data, or a TOML file."""
     if study.endswith(".toml"):
         return Path(study)
     return data_folder() / "studies" / f"{choice('study', study, data_names('studies'))}.toml"
@@ -63,7 +57,8 @@ def content_hash(definition: FileSchema) -> str:
 def write_study(definition: StudyFile, path: Path) -> Path:
     """Write what a study says beyond the defaults as a TOML file."""
     content = definition.model_dump(exclude_defaults=True).items()
-    lines = [f"{name} = {_toml(value, ',' + LINE)}" for name, value in content]
+    # Entries of the longest lists stand on lines of their own.
+    lines = [f"{name} = {_toml(value, LINE)}" for name, value in content]
     return write_text(path, "\n".join([*lines, ""]))
 
 

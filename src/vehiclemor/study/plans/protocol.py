@@ -1,7 +1,7 @@
 """Studies with bounds: training, validation and test scenarios of a model, and who competes.
 
-Drawn test runs follow from the file alone: its seed, its version and its boxes.  Every machine and
-every commit gets the same runs, whatever methods compete on them.
+Sampled test runs follow from the file alone: its seed, its version and its boxes.  Every machine
+and every commit gets the same runs, whatever methods compete on them.
 """
 
 import itertools
@@ -13,8 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
-from vehiclemor.reduction.interface import Method
-from vehiclemor.registry import choice, component
+from vehiclemor.registry import choice
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -35,12 +34,10 @@ from vehiclemor.toml_files import read_toml
 FULL_ORDER, CONTENDER = "full order", "contender"
 # Of the names of the package's own; the model follows.
 PREFIX = "predictive-"
-# Decimals of drawn factors and speeds: what a table prints is what was run.
+# Decimals of sampled factors and speeds: what a table prints is what was run.
 DECIMALS = 3
-# Draws tried for each run before a box counts as too small.
+# Samples tried for each run before a box counts as too small.
 TRIES = 100
-# Sets that models have learned from or were chosen by.
-LEARNED = ("training", "validation")
 
 Scenarios = tuple[Scenario, ...]
 Part = TypeVar("Part", Group, Box)
@@ -81,17 +78,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Protocol:
-    """A study with bounds, with all names resolved.
-
-    Attributes
-    ----------
-    name
-        Of its results, but for audits.
-    sets
-        Name of `SETS` -> scenarios.
-    seed
-        Of the drawn runs: the file's, or another one for an audit.
-    """
+    """A study with bounds, with all names resolved; `seed` may be another one, for an audit."""
 
     name: str
     path: Path
@@ -108,7 +95,7 @@ class Protocol:
 
     @property
     def test_set(self) -> str:
-        """Name of its drawn test set, with the seed."""
+        """Name of its sampled test set, with the seed."""
         return f"{self.path.stem}-{self.definition.version}, seed {self.seed}"
 
 
@@ -119,19 +106,9 @@ def protocol_names() -> dict[str, str]:
 
 
 def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protocol:
-    """A study with bounds, by name or TOML file.
+    """A study with bounds, by name or TOML file; for an audit, with another seed.
 
-    Parameters
-    ----------
-    seed
-        Of the drawn runs, for an audit; by default that of the file.
-    name
-        Of its results, by default that of the file.
-
-    Raises
-    ------
-    VehiclemorError
-        If the file or anything that it names is wrong.
+    `name` is that of its results, by default that of the file.
     """
     path = study_path(study)
     definition = read_toml(path, StudyFile)
@@ -156,7 +133,12 @@ def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protoc
         groups = enumerate(getattr(definition, key), start=1)
         parts = [_checked(model, f"{key}, group {n}", _of_group, group) for n, group in groups]
         sets[key] = tuple(itertools.chain(*parts))
-    _check_apart(sets)
+    seen: dict[tuple, str] = {}
+    for key, scenario in ((key, scenario) for key, part in sets.items() for scenario in part):
+        # What a method has learned from or was chosen by can't test it.
+        if (run := scenario.run_key) in seen:
+            raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
+        seen[run] = key
     draws = {key: draw for key in DRAWN if (draw := getattr(definition, key))}
     for key, draw in draws.items():
         for number, box in enumerate(draw.boxes, start=1):
@@ -212,19 +194,7 @@ def _corners(model: Model, box: Box) -> list[Scenario]:
     return [Scenario.of(box.maneuver, *corner) for corner in (*corners, *others)]
 
 
-def _check_apart(sets: dict[str, Scenarios]) -> None:
-    """No run stands twice: what a method has learned from or was chosen by can't test it."""
-    seen: dict[tuple, str] = {}
-    for key, scenarios in sets.items():
-        for scenario in scenarios:
-            run = scenario.run_key
-            if run in seen:
-                raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
-            seen[run] = key
-
-
 def _entry(model: Model, entry: MethodEntry, training: Scenarios) -> Entry:
-    method: Method = component("method", entry.method)
     label = entry.label or entry.method
     where = f"method {label!r}"
     candidates: list[Settings] = []
@@ -233,11 +203,11 @@ def _entry(model: Model, entry: MethodEntry, training: Scenarios) -> Entry:
         preset = str(own.pop("preset", entry.preset))
         complete = complete_settings(model, entry.method, {**entry.settings, **own}, preset)
         # Of a method that refuses the model all candidates are empty.
-        if complete in candidates and method.accepts(model)[0]:
+        if complete and complete in candidates:
             raise InputError(f"{where} has the same candidate twice")
         candidates.append(complete)
     learned = [entry.training] if isinstance(entry.training, str) else entry.training
-    learned = [name for name in learned if name]
+    learned = [*filter(None, learned)]
     known = {scenario.maneuver.name for scenario in training}
     for name in learned:
         choice(f"maneuver in the training of {where}", name, known)
@@ -245,43 +215,37 @@ def _entry(model: Model, entry: MethodEntry, training: Scenarios) -> Entry:
     return Entry(label, entry.method, entry.role, tuple(candidates), runs)
 
 
-def drawn_sets(protocol: Protocol) -> dict[str, Scenarios]:
-    """Drawn sets of a protocol by name; none of their runs is one of training or validation.
-
-    Raises
-    ------
-    InputError
-        If the boxes hold too few different runs.
-    """
-    # What is listed for other ends may be drawn again: else a list could strike runs from a draw.
-    known = [scenario for name in LEARNED for scenario in protocol.sets[name]]
+def sampled_sets(protocol: Protocol) -> dict[str, Scenarios]:
+    """Sampled sets by name; none of their runs is one of training or validation."""
+    # What is listed for other ends may be sampled again: else a list could strike runs from a set.
+    known = [*protocol.sets["training"], *protocol.sets["validation"]]
     found: dict[str, Scenarios] = {}
     for number, name in enumerate(DRAWN):
         if draw := getattr(protocol.definition, name):
             seeds = protocol.seed, protocol.definition.version, number
-            found[name] = drawn(protocol.model, draw, seeds, known)
+            try:
+                found[name] = sampled_runs(protocol.model, draw, seeds, known)
+            except InputError as error:
+                raise FileError(f"{protocol.path}: {error}") from None
             known += found[name]
     return found
 
 
-def drawn(
+def sampled_runs(
     model: Model, draw: Draw, seeds: Sequence[int], known: Sequence[Scenario] = ()
 ) -> Scenarios:
-    """Different scenarios of a draw, none of them known; the same wherever the seeds are the same.
+    """Different scenarios of some boxes, none of them known; the same wherever the seeds are.
 
-    Raises
-    ------
-    InputError
-        If the boxes hold too few different runs.
+    `InputError` if the boxes hold too few.
     """
-    # Of the generator only `random` is used: NumPy may change how the other functions draw.
+    # Of the generator only `random` is used: NumPy may change how the other functions sample.
     generator = np.random.Generator(np.random.PCG64(seeds))
     shares = np.cumsum([box.share for box in draw.boxes])
     seen, found = {scenario.run_key for scenario in known}, list[Scenario]()
     for _ in range(TRIES * draw.runs):
         place = generator.random() * shares[-1]
         box = draw.boxes[int(np.searchsorted(shares, place, side="right"))]
-        scenario = _one(model, box, generator)
+        scenario = _sampled_run(model, box, generator.random)
         if scenario.run_key not in seen:
             seen.add(scenario.run_key)
             found.append(scenario)
@@ -290,17 +254,15 @@ def drawn(
     raise InputError(f"the boxes hold fewer than {draw.runs} different runs")
 
 
-def _one(model: Model, box: Box, generator: np.random.Generator) -> Scenario:
-    """One point of a box."""
-
+def _sampled_run(model: Model, box: Box, random: Callable[[], float]) -> Scenario:
     def within(limits: Sequence[float]) -> float:
         low, high = limits
-        return round(low + (high - low) * generator.random(), DECIMALS)
+        return round(low + (high - low) * random(), DECIMALS)
 
     frequency, amplitude = within(box.frequency), within(box.amplitude)
-    if generator.random() < 0.5 and box.both_signs:
+    if random() < 0.5 and box.both_signs:
         amplitude = -amplitude
     speed = own_speed(model) if box.speed is None else within(box.speed)
     starts = box.start or model.starts[:1]
-    start = starts[int(generator.random() * len(starts))]
+    start = starts[int(random() * len(starts))]
     return Scenario.of(box.maneuver, (frequency, amplitude), start, speed)

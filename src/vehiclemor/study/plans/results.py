@@ -1,4 +1,4 @@
-"""Combined datasets: every cell of a grid at its place, every row of a protocol on its tests."""
+"""Combined datasets: every run of a grid at its place, every row of a protocol on its tests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.plans.protocol import Protocol
 from vehiclemor.study.plans.study_file import PARAMETER, StudyFile
 from vehiclemor.study.result import meaning_of, variables
-from vehiclemor.study.store import read_cell
+from vehiclemor.study.store import read_run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 QUANTITIES = ("output", "coordinate", "speed")
 
 
-def cells_digest(grid: Grid) -> str:
-    """Hash of a study and its cells at their places, for a combined dataset to be current."""
+def grid_digest(grid: Grid) -> str:
+    """Hash of a study and its runs at their places, for a combined dataset to be current."""
     digest = hashlib.sha256(grid.definition.model_dump_json().encode())
     digest.update(layout_digest().encode())
     digest.update(grid.keys.tobytes())
@@ -37,29 +37,24 @@ def cells_digest(grid: Grid) -> str:
 
 
 def combined(grid: Grid, folder: Path) -> xr.Dataset:
-    """All cells of a grid put together.
-
-    Raises
-    ------
-    FileError
-        If a cell is missing, corrupt or foreign.
-    """
+    """All runs of a grid put together; `FileError` if one is missing, corrupt or foreign."""
     import xarray as xr
 
     names, keys = tuple(grid.dimensions), grid.keys
     found, numbers = np.unique(keys, return_inverse=True)
     order = np.argsort(numbers, axis=None, kind="stable")
     ends = np.cumsum(np.bincount(numbers.ravel(), minlength=len(found)))
-    template = read_cell(folder, found[0].decode()).dataset()
+    template = read_run(folder, found[0].decode()).dataset()
+    # Texts of any length.
     arrays = {
-        str(name): _empty(keys.shape + variable.shape, variable.dtype)
-        for name, variable in template.data_vars.items()
+        str(name): np.empty(keys.shape + v.shape, object if v.dtype.kind in "OU" else v.dtype)
+        for name, v in template.data_vars.items()
     }
     for key, flat in zip(found.astype(str), np.split(order, ends[:-1]), strict=True):
         places = np.unravel_index(flat, keys.shape)
-        cell = read_cell(folder, key).variables
+        run = read_run(folder, key).variables
         for name, array in arrays.items():
-            array[places] = cell[name][1][()]
+            array[places] = run[name][1][()]
     whole = {
         name: (names + template[name].dims, array, template[name].attrs)
         for name, array in arrays.items()
@@ -67,19 +62,15 @@ def combined(grid: Grid, folder: Path) -> xr.Dataset:
     whole |= variables({"cell_key": keys.astype(str).astype(object)}, *names)
     coordinates = {str(name): variable for name, variable in template.coords.items()}
     dataset = xr.Dataset(whole, _coordinates(grid) | coordinates)
-    own = {"training": grid.definition.training_words}
-    return _told(dataset, grid.name, grid.definition, grid.model, **own)
+    own = {"training": grid.definition.trained_on}
+    return _with_attributes(dataset, grid.name, grid.definition, grid.model, **own)
 
 
-def _told(
+def _with_attributes(
     dataset: xr.Dataset, study: str, definition: StudyFile, model: Model, **further: object
 ) -> xr.Dataset:
-    """The dataset of a study with its global attributes."""
-    own = {
-        "study": study,
-        "model": model.name,
-        "configuration": definition.model_dump_json(exclude_defaults=True),
-    }
+    own = {"study": study, "model": model.name}
+    own["configuration"] = definition.model_dump_json(exclude_defaults=True)
     found = attributes(definition.title, model.kernel_hash, **own, **further)
     return dataset.assign_attrs(found)
 
@@ -106,10 +97,6 @@ def described(model: Model, dimension: str) -> dict[str, str]:
     return {"long_name": f"{entry.description}{component}", "units": entry.unit}
 
 
-def _empty(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
-    return np.full(shape, "", dtype=object) if dtype.kind in "OUT" else np.zeros(shape, dtype)
-
-
 def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
     """Combined datasets of several studies as rows of one, on the dimension `cell`.
 
@@ -122,11 +109,9 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
     units: dict[str, dict[str, str]] = {name: {} for name in QUANTITIES}
     for name, dataset in results.items():
         rows = dataset.drop_dims([d for d in ("time", "input") if d in dataset.dims])
-        for quantity in QUANTITIES:
-            if quantity in rows.dims:
-                pairs = zip(rows[quantity].values, rows[f"{quantity}_unit"].values, strict=True)
-                units[quantity] |= {str(label): str(unit) for label, unit in pairs}
-                rows = rows.drop_vars(f"{quantity}_unit")
+        for quantity in set(QUANTITIES) & set(rows.dims):
+            units[quantity] |= rows[f"{quantity}_unit"].to_series().to_dict()
+            rows = rows.drop_vars(f"{quantity}_unit")
         rows = rows.stack(cell=[d for d in rows.dims if d not in QUANTITIES]).reset_index("cell")
         parts.append(rows.assign_coords(study=("cell", [name] * rows.sizes["cell"])))
     labels = sorted({str(c) for part in parts for c in part.coords if part[c].dims == ("cell",)})
@@ -135,11 +120,10 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
         parts[place] = part.assign_coords({n: missing for n in labels if n not in part.coords})
     # Models differ in their quantities and counts: what a row does not have is missing in it.
     dataset = xr.concat(parts, dim="cell", coords="minimal", compat="override", join="outer")
-    for quantity in QUANTITIES:
-        if quantity in dataset.dims:
-            column = [units[quantity][str(label)] for label in dataset[quantity].values]
-            told = {"long_name": f"SI unit of the {quantity}"}
-            dataset = dataset.assign_coords({f"{quantity}_unit": (quantity, column, told)})
+    for quantity in (name for name in QUANTITIES if name in dataset.dims):
+        column = [units[quantity][label] for label in dataset[quantity].values.tolist()]
+        meaning = {"long_name": f"SI unit of the {quantity}"}
+        dataset = dataset.assign_coords({f"{quantity}_unit": (quantity, column, meaning)})
     dataset.attrs = {"source": "vehiclemor", "studies": ", ".join(results), "versions": versions()}
     return dataset
 
@@ -153,24 +137,15 @@ def protocol_dataset(
 ) -> xr.Dataset:
     """Results of all rows on the dimensions `label`, `scenario` and `output`.
 
-    `scenario_set` tells which set a scenario is of, `apart` why a drawn one is not judged;
-    `validation` of a row is the JSON list of its candidates' settings and validation results.
-
-    Parameters
-    ----------
-    found
-        Set -> results of the rows.
-    timed
-        Timing of the first scenarios of what is judged.
-    apart
-        Set -> why scenarios are not judged.
+    Given by set are the results of the rows, and why scenarios are not judged; `timed` are the
+    first scenarios of what is judged.
     """
     import xarray as xr
 
     parts: list[xr.Dataset] = []
-    for purpose, datasets in found.items():
+    for name, datasets in found.items():
         number = datasets[0].sizes["scenario"]
-        of_run = {"scenario_set": [purpose] * number, "apart": apart.get(purpose, [""] * number)}
+        of_run = {"scenario_set": [name] * number, "apart": apart.get(name, [""] * number)}
         part = xr.concat(datasets, dim="label", combine_attrs="override")
         parts.append(part.assign_coords(variables(of_run, "scenario")))
     # What does not depend on the scenario is the same in every set, but for seconds.
@@ -179,18 +154,19 @@ def protocol_dataset(
     dataset = xr.concat(rest, dim="scenario", combine_attrs="override").merge(parts[0][fixed])
     # How the files store text holds for their own longest words only.
     dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
+    cells = [
+        {name: sets[index].attrs["cell"] for name, sets in found.items()}
+        for index in range(len(rows))
+    ]
     per_row: dict[str, list[Any]] = {
         "role": [row.entry.role for row in rows],
         "series": [row.entry.label for row in rows],
         "winner": [row.winner for row in rows],
         "method": [row.entry.method for row in rows],
         "settings": [json.dumps(row.settings, sort_keys=True) for row in rows],
-        "cell_keys": [
-            json.dumps({purpose: cells[index].attrs["cell"] for purpose, cells in found.items()})
-            for index in range(len(rows))
-        ],
+        "cell_keys": [json.dumps(keys) for keys in cells],
         "validation": [_validation(row) for row in rows],
-        "validation_score": [row.validation[row.candidate].score for row in rows],
+        "validation_score": [row.result.score for row in rows],
         "offline_seconds": [float(value) for value in timed["offline_seconds"]],
     }
     dataset = dataset.assign(variables(per_row, "label")).set_coords("method")
@@ -203,14 +179,14 @@ def protocol_dataset(
         online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
         online[:, places] = timed[name].values
         dataset[name] = (("label", "scenario"), online, dict(timed[name].attrs))
-    # Of the first cell.
+    # Of the first run.
     dataset.attrs.clear()
     own = {"evaluations": protocol.model.evaluations, "test_set": _test_set(protocol, found)}
-    return _told(dataset, protocol.study, protocol.definition, protocol.model, **own)
+    return _with_attributes(dataset, protocol.study, protocol.definition, protocol.model, **own)
 
 
 def _test_set(protocol: Protocol, found: Mapping[str, Sequence[xr.Dataset]]) -> str:
-    """Name of what is judged, with a hash of the very runs where they are drawn."""
+    """Name of what is judged, with a hash of the very runs where they are sampled."""
     if "drawn" not in found:
         return "listed"
     labels = "\n".join(str(label) for label in found["drawn"][0]["scenario"].values)
@@ -218,7 +194,7 @@ def _test_set(protocol: Protocol, found: Mapping[str, Sequence[xr.Dataset]]) -> 
 
 
 def judged_set(sets: Container[str]) -> str:
-    """The set on which a protocol judges: what is drawn, else what is listed."""
+    """The set on which a protocol judges: what is sampled, else what is listed."""
     return "drawn" if "drawn" in sets else "test"
 
 

@@ -1,14 +1,14 @@
-"""Study files, `data/studies/*.toml`: methods and scenarios, validated on loading.
+"""Study files, `data/studies/*.toml`: methods and scenarios, found by name and validated.
 
 The scenarios of a study are a grid, a product of axes; or, where it has bounds, a training set, a
-validation set and a test set, which are lists or drawn from boxes.
+validation set and a test set, which are lists or sampled from boxes.
 """
 
 import math
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from vehiclemor.toml_files import FileSchema, Line
 
@@ -20,17 +20,16 @@ PARAMETER = "parameters."
 MOST_POINTS = 1_000_000
 # Of the test sets of every study that gives none.
 SEED, MOST_SEED = 20261122, 2**63 - 1
-# Sets of scenarios that a study with bounds lists, and those that it draws.
+# Sets of scenarios that a study with bounds lists, and those that it samples.
 SETS = ("training", "validation", "test", "outside")
 DRAWN = ("drawn", "drawn_outside")
-# Keys that go with bounds alone; and of a method.
+# Keys that go without bounds alone, and with bounds alone; and of a method.
+OF_GRIDS = ("grid", "sampling", "maneuver", "start", "training_set", "parameters", "keep")
 OF_TESTS = (
     *(*SETS[1:], *DRAWN, "version", "seed", "reported", "sensitive"),
     *("targets", "failure_rate", "flagged_misses", "straight"),
 )
-OF_ENTRIES = {"candidates", "role"}
-# Keys that go without bounds alone.
-OF_GRIDS = ("grid", "sampling", "maneuver", "start", "training_set", "parameters", "keep")
+OF_ENTRIES = ("candidates", "role")
 
 
 class Span(FileSchema):
@@ -41,7 +40,7 @@ class Span(FileSchema):
     count: int = Field(ge=1, le=10_000)
 
 
-# Told apart by their form, so that what is wrong with one is not read as the other.
+# By its form, so that what is wrong with one is not read as the other.
 Axis = Annotated[
     Annotated[list[int | float | str], Tag("values")] | Annotated[Span, Tag("span")],
     Discriminator(lambda value: "span" if isinstance(value, Span | dict) else "values"),
@@ -73,7 +72,6 @@ class Sampling(FileSchema):
         return self
 
 
-Car = dict[str, float | list[float]]
 Training = str | Annotated[list[str], Field(min_length=1)]
 Settings = dict[str, int | float | str]
 
@@ -124,13 +122,20 @@ class Group(FileSchema):
 
 
 Groups = Annotated[list[Group], Field(min_length=1)]
-# Told apart by their form, as axes are.
 Learned = Annotated[
     Annotated[Training, Tag("names")] | Annotated[Groups, Tag("runs")],
     Discriminator(lambda value: "runs" if _is_listed(value) else "names"),
 ]
-Range = Annotated[list[float], Field(min_length=2, max_length=2)]
 Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+def _ordered(limits: list[float]) -> list[float]:
+    if not (math.isfinite(limits[0]) and limits[0] <= limits[1] < math.inf):
+        raise ValueError("a range is [from, to] with finite numbers in order")
+    return limits
+
+
+Range = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
 
 
 class Box(FileSchema):
@@ -146,22 +151,19 @@ class Box(FileSchema):
         default_factory=list, description="initial conditions, equally likely; the model's first"
     )
 
-    @model_validator(mode="after")
-    def _ordered(self) -> "Box":
-        ranges = (self.frequency, self.amplitude, self.speed)
-        for low, high in filter(None, ranges):
-            if not (math.isfinite(low) and low <= high < math.inf):
-                raise ValueError("a range is [from, to] with finite numbers in order")
-        if self.frequency[0] <= 0.0:
+    @field_validator("frequency")
+    @classmethod
+    def _positive(cls, value: list[float]) -> list[float]:
+        if value[0] <= 0.0:
             raise ValueError("frequency factors are positive")
-        return self
+        return value
 
 
 class Draw(FileSchema):
-    """Runs drawn from boxes."""
+    """Runs sampled from boxes."""
 
     runs: int = Field(ge=1, le=100_000, description="how many")
-    boxes: list[Box] = Field(min_length=1, description="what they are drawn from")
+    boxes: list[Box] = Field(min_length=1, description="what they are sampled from")
 
 
 class SpeedTarget(FileSchema):
@@ -177,7 +179,7 @@ class SpeedTarget(FileSchema):
 
 
 class Straight(FileSchema):
-    """Scenarios without steering, in which the car must stay on its line."""
+    """Scenarios without steering, in which the vehicle must stay on its line."""
 
     maneuver: str = Field(description="registered name")
     output: str = Field(description="its lateral position")
@@ -222,9 +224,9 @@ class StudyFile(FileSchema):
         default_factory=list, description="of a collection: names of studies, or TOML files"
     )
     model: str = Field("", description="registered name; needed for a grid")
-    parameters: Car = Field(
+    parameters: dict[str, float | list[float]] = Field(
         default_factory=dict,
-        description="parameter -> value in SI units where the study's car is not the model's",
+        description="parameter -> value in SI units where the study's are not the model's",
     )
     maneuver: str = Field("", description="registered name; the model's own by default")
     start: list[str] = Field(
@@ -287,7 +289,7 @@ class StudyFile(FileSchema):
     flagged_misses: int = Field(
         3, ge=0, description="runs outside of the bounds that the chosen model may have flagged"
     )
-    straight: Straight | None = Field(None, description="whether a car drives straight on")
+    straight: Straight | None = Field(None, description="whether a vehicle drives straight on")
 
     @property
     def labelled(self) -> dict[str, MethodEntry]:
@@ -295,14 +297,14 @@ class StudyFile(FileSchema):
         return {entry.label or entry.method: entry for entry in self.methods}
 
     @property
-    def training_words(self) -> str:
+    def trained_on(self) -> str:
         """What is trained on, in one line."""
-        words = [self.training] if isinstance(self.training, str) else self.training
-        return ", ".join(w if isinstance(w, str) else w.maneuver for w in words)
+        given = [self.training] if isinstance(self.training, str) else self.training
+        return ", ".join(one if isinstance(one, str) else one.maneuver for one in given)
 
     @property
     def points(self) -> int:
-        """Number of points of the grid, or of tests; one cell may stand at several of them."""
+        """Number of points of the grid, or of tests; one run may stand at several of them."""
         if self.bounds:
             listed = sum(group.scenarios for group in (*self.test, *self.outside))
             draws = sum(draw.runs for draw in (self.drawn, self.drawn_outside) if draw)
@@ -344,42 +346,41 @@ class StudyFile(FileSchema):
         labels = [entry.label or entry.method for entry in self.methods]
         if doubles := [label for label in labels if labels.count(label) > 1]:
             raise ValueError(f"label {doubles[0]!r} is used twice")
+        foreign = [name for name in OF_GRIDS if name in self.model_fields_set]
         if self.bounds:
-            self._check_test()
+            for name in SETS[:2]:
+                if not _is_listed(getattr(self, name)):
+                    raise ValueError(f"a study with bounds needs [[{name}]]")
+            if not (self.test or self.drawn):
+                raise ValueError("there is nothing to test: neither test nor drawn is given")
+            if foreign:
+                raise ValueError(f"a study with bounds has no {foreign[0]}")
             return self
-        given = [name for name in OF_TESTS if name in self.model_fields_set]
-        given += [f"methods.{n}" for e in self.methods for n in OF_ENTRIES & e.model_fields_set]
-        given += ["[[training]]"] * _is_listed(self.training)
-        if given:
-            raise ValueError(f"{given[0]} is of a study with bounds")
-        self._set_once()
+        given = self.model_fields_set.union(*(entry.model_fields_set for entry in self.methods))
+        foreign = [name for name in (*OF_TESTS, *OF_ENTRIES) if name in given]
+        if foreign or _is_listed(self.training):
+            raise ValueError(f"{[*foreign, '[[training]]'][0]} is of a study with bounds")
+        self._check_set_once()
         if self.points > MOST_POINTS:
             raise ValueError(f"the grid has {self.points} points, more than {MOST_POINTS}")
         return self
 
-    def _check_test(self) -> None:
-        for name in SETS[:2]:
-            if not _is_listed(getattr(self, name)):
-                raise ValueError(f"a study with bounds needs [[{name}]]")
-        if not (self.test or self.drawn):
-            raise ValueError("there is nothing to test: neither test nor drawn is given")
-        for name in OF_GRIDS:
-            if name in self.model_fields_set:
-                raise ValueError(f"a study with bounds has no {name}")
-
-    def _set_once(self) -> None:
+    def _check_set_once(self) -> None:
         own = {f"{PARAMETER}{name}" for name in self.parameters}
         own |= {name for name in ("maneuver", "start") if getattr(self, name)}
-        ranges = set(self.sampling.ranges if self.sampling else ())
-        grid, places = ("grid", set(self.grid)), [("sampling", ranges), ("study", own)]
-        settings = [
-            (f"settings of {label}", {*entry.settings, *["training"] * bool(entry.training)})
+        axes = {
+            "grid": {*self.grid},
+            "sampling": {*(self.sampling.ranges if self.sampling else ())},
+        }
+        settings = {
+            f"settings of {label}": {*entry.settings, *["training"] * bool(entry.training)}
             for label, entry in self.labelled.items()
-        ]
-        pairs = [*((grid, other) for other in [*places, *settings]), places]
-        for (one, names), (other, more) in pairs:
-            for name in sorted(names & more):
-                raise ValueError(f"{name} is set twice: in the {one} and in the {other}")
+        }
+        others = axes | {"study": own} | settings
+        for one, names in axes.items():
+            for other, more in others.items():
+                for name in sorted(names & more) if other != one else ():
+                    raise ValueError(f"{name} is set twice: in the {one} and in the {other}")
 
 
 def values(entry: Axis) -> list[int | float | str]:

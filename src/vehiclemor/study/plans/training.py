@@ -36,14 +36,9 @@ def training_set(
     given
         None is the training of the model's protocol if the method competes there, else `nominal`.
     test
-        What is tested: maneuvers are run from its start, at its speed, by its model.
+        What is tested: maneuvers are run from its start, at its speed, with its parameters.
     factors
         Of `set`: pairs (frequency, amplitude).
-
-    Raises
-    ------
-    InputError
-        If an entry is none of these, or can't be run.
     """
     if given is None:
         given = "protocol" if _of_protocol(model.name, method) else "nominal"

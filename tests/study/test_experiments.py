@@ -1,24 +1,27 @@
-"""Experiments: identity follows from content, and each run is what a model of its car gives."""
+"""Experiments: identity follows from content, runs are measured, what is common is fitted once."""
 
 import dataclasses
+import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
-
+from hypothesis import given, settings
+from hypothesis import strategies as st
 import vehiclemor as vm
 from vehiclemor import provenance
 from vehiclemor.codegen import cache
-from vehiclemor.errors import InputError
-from vehiclemor.inputs.signal import Signal
+from vehiclemor.errors import ConvergenceError
+from vehiclemor.failure import Failure
 from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods import pod, slow_manifold
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
-from vehiclemor.study.evaluate import evaluate
+from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, known_inputs
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set
-from vehiclemor.study.scenario import Scenario, start_of, training_run
+from vehiclemor.study.scenario import Scenario
 
 CAR = "independent_suspension_vehicle"
 HEAVY = (("sprung_mass", 1500.0), ("initial_speed", 25.0))
@@ -104,61 +107,6 @@ def test_a_method_that_fits_others_has_their_source_in_its_key(vehicle, monkeypa
     assert code("guarded") != before["guarded"]
 
 
-def test_inputs_are_known_by_their_values_and_names():
-    def constant(value):
-        return dataclasses.replace(
-            sine_travel, signal=lambda times, *_: np.full((len(times), 2), value)
-        )
-
-    def log(name):
-        return Signal.from_samples([0.0, 1.0], [0.0, 0.01], inputs=[name])
-
-    given = constant(0.0), constant(-0.0), constant(0.01), log("z"), log("s0")
-    zero, minus_zero, *others = [Scenario(each, "equilibrium").run_key for each in given]
-    assert zero == minus_zero
-    assert len({zero, *others}) == 4
-
-
-def test_another_geometry_gives_another_key_and_result(cell):
-    moved = build("double_wishbone", overrides={"tie_rod_inner": [-0.2, 0.4921, -0.0962]})
-    other = make_cell(moved, sine_travel, "full_order", {})
-    assert other.key != cell.key
-    # The low-bump-steer tie rod of the source: toe within 0.06 deg over +-0.1 m.
-    toe = evaluate(other)["outputs"].sel(output="toe")
-    assert float(abs(toe).max()) < 0.06 * 3.15 / 180.0
-
-
-def test_a_bug_of_a_plug_in_model_in_the_reference_spoils_only_its_cell(cell, model, monkeypatch):
-    def broken(*_):
-        raise ZeroDivisionError("in a plug-in")
-
-    monkeypatch.setattr(type(model), "simulate", broken)
-    dataset = evaluate(cell)
-    assert dataset["status"].item() == "error"
-    assert "ZeroDivisionError: in a plug-in" in dataset["message"].item()
-
-
-def test_a_training_set_needs_and_uses_its_factors():
-    model = build("double_wishbone")
-    with pytest.raises(InputError, match="training_set"):
-        make_cell(model, sine_travel, "pod", {}, training="set")
-    errors = {}
-    for factors in (((1.0, 1.0),), ((1.0, 1.0), (1.2, 1.0))):
-        faster, trained = sine_travel.perturbed(1.2), {"training": "set", "factors": factors}
-        cell = make_cell(model, faster, "pod", {"rank": 4}, **trained)
-        errors[len(factors)] = float(evaluate(cell)["rms_error"].sel(output="spindle_y"))
-    assert errors[2] < 0.5 * errors[1]
-
-
-def test_settings_of_a_method_that_refuses_the_model_are_not_judged():
-    cell = make_cell(build("double_wishbone"), sine_travel, "slow_manifold", {"rnk": 3})
-    assert cell.settings == {}
-    dataset = evaluate(cell)
-    assert dataset["status"].item() == "rejected"
-    assert "double_wishbone" in dataset["message"].item()
-    assert np.isnan(dataset["coordinates"]).all()
-
-
 def test_a_run_is_measured_the_same_way_in_grids_and_protocols(vehicle):
     tests = [
         Scenario.of("lane_change", (1.0, amplitude), "equilibrium", 20.0) for amplitude in (1, 1.5)
@@ -210,29 +158,6 @@ def test_of_a_run_that_has_failed_nothing_counts_in_a_protocol(model):
 # Runs of other cars
 
 
-def test_a_run_of_another_car_is_that_of_a_model_made_with_its_parameters(vehicle):
-    alone = vm.model(CAR, dict(HEAVY))
-    change = Scenario.of("lane_change", (1.0, 1.0), "dropped", None, HEAVY)
-    run = training_run(vehicle, change).recorded()
-    expected = alone.simulate(component("maneuver", "lane_change"), "dropped")
-    np.testing.assert_array_equal(run.states, expected.states)
-    # It stands lower on its springs, and starts faster.
-    assert not np.array_equal(alone.start("dropped"), vehicle.start("dropped"))
-    own = vm.model(CAR, dict(HEAVY) | {"initial_speed": 31.0})
-    faster = dataclasses.replace(change, speed=31.0)
-    np.testing.assert_array_equal(start_of(vehicle, faster), own.start("dropped"))
-
-
-def test_a_component_of_a_point_is_a_parameter(model):
-    x, y, _ = model.parameters["tie_rod_inner"]
-    whole = vm.model(model.name, {"tie_rod_inner": [x, y, -0.09]})
-    moved = vm.model(model.name, dict(MOVED))
-    np.testing.assert_array_equal(moved.constants, whole.constants)
-    for wrong in ({"tie_rod_inner.w": 0.0}, {"tie_rod_inner.z": [0.0, 0.0]}):
-        with pytest.raises(InputError, match=next(iter(wrong))):
-            vm.model(model.name, wrong)
-
-
 def test_a_method_is_not_used_on_a_model_that_it_was_not_trained_on(model):
     runs = Scenario(sine_travel, "equilibrium"), Scenario(sine_travel, "equilibrium", None, MOVED)
     found = evaluate(of_runs(model, "pod", runs[:1], runs[1:], rank=3))
@@ -240,3 +165,125 @@ def test_a_method_is_not_used_on_a_model_that_it_was_not_trained_on(model):
     assert "another" in found["message"].item()
     with pytest.raises(ValueError, match="of one model"):
         of_runs(model, "pod", runs[:1], runs, rank=3)
+
+
+FAILING = 3
+SCENARIOS = (Scenario(component("maneuver", "lane_change"), "equilibrium"),)
+
+
+def experiment(model, method, **settings):
+    complete = complete_settings(model, method, settings)
+    return make_experiment(model, method, complete, SCENARIOS, SCENARIOS, "errors")
+
+
+@pytest.fixture
+def fits(monkeypatch):
+    """Fits of the slow manifold that are made: their arguments."""
+    method, found = component("method", "slow_manifold"), []
+
+    def fit(*given):
+        found.append(given)
+        if given[-1].terms == FAILING:
+            raise ConvergenceError("no fit")
+        return method.fit(*given)
+
+    def spied(kind, name):
+        return replace(method, fit=fit) if name == method.name else component(kind, name)
+
+    monkeypatch.setattr("vehiclemor.study.evaluate.component", spied)
+    return found
+
+
+def guarded(terms):
+    words = f"terms = {terms}, steps = 0"
+    return {"fast": "slow_manifold", "fast_settings": words, "tolerance": 5e-3}
+
+
+def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(vehicle, fits):
+    alone = kept_fit(vehicle, experiment(vehicle, "slow_manifold", terms=2, steps=0))
+    both = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
+    assert len(fits) == 1
+    assert both.ahead.tolerance == 5e-3
+    assert both.fast.coefficients is alone.coefficients
+    assert both.offline.seconds == pytest.approx(alone.offline.seconds)
+    # What a user fits is fitted for itself, and is the same.
+    anew = fresh_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
+    assert anew.fast.coefficients is not alone.coefficients
+    np.testing.assert_array_equal(anew.fast.coefficients, alone.coefficients)
+    failed = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(FAILING)))
+    assert failed == Failure("diverged", "no fit")
+
+
+def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
+    method, raised = component("method", "slow_manifold"), []
+
+    def fit(*given):
+        raised.append(given)
+        raise ZeroDivisionError if len(raised) < 3 else ConvergenceError("no fit")
+
+    broken = replace(method, fit=fit)
+    monkeypatch.setattr("vehiclemor.study.evaluate.component", lambda *_: broken)
+    wanted = experiment(vehicle, "slow_manifold", terms=1, steps=0)
+    found = [kept_fit(vehicle, wanted).status for _ in range(4)]
+    assert found == ["error", "error", "diverged", "diverged"]
+    assert len(raised) == 3
+
+
+def sent(maneuver):
+    """What another process gets of a scenario's maneuver."""
+    return pickle.loads(pickle.dumps(Scenario(maneuver, "equilibrium"))).maneuver  # noqa: S301 - own
+
+
+def test_a_registered_maneuver_that_was_sent_is_the_same_again():
+    # Its functions are made by another, which no process could find by name.
+    maneuver = component("maneuver", "lane_change").perturbed(1.1, 0.9)
+    assert sent(maneuver) == maneuver
+    # Of two batches it is one, by which a worker finds what it has fitted.
+    assert sent(maneuver) is sent(maneuver)
+
+
+MODELS = {
+    "independent_suspension_vehicle": "lane_change",
+    "high_fidelity_vehicle": "rack_multisine",
+}
+
+
+def scenario(model, frequency=1.0, amplitude=1.0, speed=20.0):
+    maneuver = component("maneuver", MODELS[model]).perturbed(frequency, amplitude)
+    return Scenario(maneuver, "equilibrium", speed)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@settings(max_examples=20)
+@given(frequency=st.floats(0.5, 2.0), amplitude=st.floats(-2.0, 2.0), speed=st.floats(15.0, 25.0))
+def test_a_run_is_trusted_exactly_within_the_range(model, frequency, amplitude, speed):
+    training = (scenario(model, 1.0, 1.2, 18.0), scenario(model, 1.3, -0.8, 22.0))
+    known, test = known_inputs(build(model), training, False), scenario(model, frequency, amplitude, speed)
+    found = known.trust(build(model), test.maneuver, speed_of(build(model), test))
+    if abs(amplitude) > 1.201 or not 17.99 < speed < 22.01:
+        assert found.indicator > 1.0
+        assert found.reason
+    # Slower and clearly smaller than a training run.
+    elif abs(amplitude) <= 1.0 and frequency <= 1.0:
+        assert found.indicator <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("method", "amplitude", "status"),
+    [
+        ("linear_single_track", 1.0, "ok"),
+        ("linear_single_track", 1.5, "untrusted"),
+        ("full_order", 1.5, "ok"),
+        ("replay", 1.5, "ok"),
+    ],
+)
+def test_no_trained_method_is_silent_beyond_its_training(method, amplitude, status):
+    model = build("independent_suspension_vehicle")
+    tests = (scenario(model.name, 1.0, amplitude),)
+    chosen = complete_settings(model, method)
+    training = (scenario(model.name, 1.0, 1.1),)
+    found = evaluate(make_experiment(model, method, chosen, training, tests, "errors"))
+    assert found["status"].item() == status
+    if status == "untrusted":
+        assert "input delta is beyond its known range" in found["message"].item()
+        assert found["trust_indicator"].item() == pytest.approx(amplitude / 1.1, rel=1e-5)
