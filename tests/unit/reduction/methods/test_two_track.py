@@ -53,12 +53,12 @@ def test_the_tires_are_those_of_the_vehicle():
     run = vehicle().simulate(case.maneuver, start_of(vehicle(), case))
     parameters = {name: float(vehicle().parameters[name]) for name in FIALA}
     for wheel in WHEELS:
-        text = tf.Text()
-        tf.fiala(text, wheel, "z0", "z1", tf.Tire(parameters, 1000.0, 1.3))
-        features = text.features(0, [f"1000.0 * F_{wheel}", f"1000.0 * M_{wheel}"])
+        made = tf.TireFeatures(0)
+        force, moment, _ = tf.fiala(made, wheel, *made.z[:2], tf.Tire(parameters, 1000.0, 1.3))
+        features = made.of(made.alone((1000.0 * force, 1000.0 * moment)))
         slips = np.column_stack([np.tan(of(run, f"slip_angle_{wheel}")), of(run, f"Fz_{wheel}")])
         z = np.hstack([slips, np.zeros((len(slips), 3))])
-        columns = feature_columns(features, z, np.zeros((len(z), 0)), np.array(text.values))
+        columns = feature_columns(features, z, np.zeros((len(z), 0)), np.array(made.parameters))
         moment = parameters["tire_width"] * columns[:, 1]
         for given, name in ((columns[:, 0], "Fy"), (moment, "Mz")):
             truth = of(run, f"{name}_{wheel}")
