@@ -12,7 +12,7 @@ from tests.oracles import complex_step
 from tests.reducing import training_runs
 from vehiclemor.codegen.derivatives import Sensitivity
 from vehiclemor.errors import InputError
-from vehiclemor.exporting.exported import exported_system
+from vehiclemor.exporting.systems import exported_system
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import KINDS

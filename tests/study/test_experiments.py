@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 import vehiclemor as vm
 from vehiclemor import provenance
 from vehiclemor.codegen import cache
@@ -21,7 +22,7 @@ from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, known_inputs
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set
-from vehiclemor.study.scenario import Scenario
+from vehiclemor.study.scenario import Scenario, speed_of
 
 CAR = "independent_suspension_vehicle"
 HEAVY = (("sprung_mass", 1500.0), ("initial_speed", 25.0))
@@ -258,7 +259,8 @@ def scenario(model, frequency=1.0, amplitude=1.0, speed=20.0):
 @given(frequency=st.floats(0.5, 2.0), amplitude=st.floats(-2.0, 2.0), speed=st.floats(15.0, 25.0))
 def test_a_run_is_trusted_exactly_within_the_range(model, frequency, amplitude, speed):
     training = (scenario(model, 1.0, 1.2, 18.0), scenario(model, 1.3, -0.8, 22.0))
-    known, test = known_inputs(build(model), training, False), scenario(model, frequency, amplitude, speed)
+    known = known_inputs(build(model), training, False)
+    test = scenario(model, frequency, amplitude, speed)
     found = known.trust(build(model), test.maneuver, speed_of(build(model), test))
     if abs(amplitude) > 1.201 or not 17.99 < speed < 22.01:
         assert found.indicator > 1.0

@@ -61,10 +61,11 @@ def c_files(system: ExportedSystem, step: float) -> dict[str, str]:
         _array("parameters", system.values),
         *(_array(_start(name), state) for name, state in system.starts.items()),
     ]
+    tangents = {f"{name}_tangent": found for name, found in system.tangents().items()}
     return {
         HEADER: _header(system, step),
         MODEL: _source(system, "its functions", values, system.functions),
-        TANGENT: _source(system, "derivatives of its functions", [], system.tangents()),
+        TANGENT: _source(system, "derivatives of its functions", [], tangents),
     } | shipped
 
 

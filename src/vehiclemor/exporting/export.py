@@ -129,7 +129,7 @@ def name_of(model: str, method: str | None) -> str:
 
 def system_of(model: Model | ReducedOrderModel) -> ExportedSystem:
     """The system that a model is exported as."""
-    from vehiclemor.exporting.exported import exported_system
+    from vehiclemor.exporting.systems import exported_system
     from vehiclemor.reduction.reduced_model import ReducedOrderModel
     from vehiclemor.simulation.model import Model
 

@@ -15,6 +15,8 @@ from vehiclemor.codegen.derivatives import derivative
 from vehiclemor.codegen.operations import SEED, Kernel, Listing, Operation, Value, needed, uses
 from vehiclemor.codegen.vector_lanes import padded
 
+# Functions of a system.
+NAMES = ("constants", "derivative", "outputs")
 # Functions that other systems must have.
 FUNCTIONS = (
     *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
@@ -67,9 +69,10 @@ class Lines(Listing):
         """Numbers."""
         return [self.number(value) for value in values]
 
-    def function(self, results: Sequence[Value]) -> StraightLine:
-        """The function of these results."""
-        return StraightLine(self.operations, [result.number for result in results])
+    def functions(self, results: Mapping[str, Sequence[Value]]) -> dict[str, StraightLine]:
+        """Name -> function; what has no results is a function too."""
+        listed = {name: [value.number for value in results.get(name, ())] for name in NAMES}
+        return {name: StraightLine(self.operations, numbers) for name, numbers in listed.items()}
 
     def include(self, kernel: Kernel, given: Given) -> list[Value]:
         """Write a kernel out; its results, row by row.

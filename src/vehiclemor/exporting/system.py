@@ -47,7 +47,7 @@ class ExportedSystem(ShortRepr):
     functions
         `constants` of the array `p`, `derivative` and `outputs` of the arrays `x`, `u` and `c`.
     tangents
-        Makes the functions of `TANGENTS`.
+        Makes the derivatives of these functions, by the same names, see `TANGENTS`.
     table
         What `entry(row, place)` reads, a number at row + place; empty if there is none.
     """

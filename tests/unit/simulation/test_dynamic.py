@@ -75,9 +75,8 @@ def test_hash_of_a_dynamic_model_follows_its_loops(standard, monkeypatch):
 @pytest.mark.parametrize("lacking", ["second_order", "speeds"])
 def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
     whole = standard()
-    shapes = {k: v for k, v in whole.equations.shapes.items() if k != lacking}
     sources = {k: v for k, v in whole.equations.sources.items() if k != lacking}
-    equations = replace(whole.equations, shapes=shapes, sources=sources)
+    equations = replace(whole.equations, sources=sources)
     model = replace(whole, equations=equations)
     settings = DynamicPodSettings(rank=1, snapshots=2, formulation="state", inner_product="range")
     check_subspace(model, settings)
