@@ -8,16 +8,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
 
+from vehiclemor.inputs.polynomials import signal_of
 from vehiclemor.inputs.steering import rack_lane_change
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.input_polynomials import signal_of
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.integrators.catalogue import rhs_loop
 from vehiclemor.simulation.integrators.loop import scratch_end
 from vehiclemor.simulation.integrators.structures import FINISHED, Place
-from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
 from vehiclemor.symbolic.program import Program
 

@@ -12,8 +12,8 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.integrators.structures import FINISHED
-from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
 from vehiclemor.symbolic.program import Program
 

@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from vehiclemor.errors import VehiclemorError
+from vehiclemor.exceptions import VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.study.evaluate import kept_fit, model_of

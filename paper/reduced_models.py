@@ -19,7 +19,7 @@ import numpy as np
 
 from vehiclemor import VehiclemorError
 from vehiclemor.api import RESULTS, reduce
-from vehiclemor.errors import FileError
+from vehiclemor.exceptions import FileError
 from vehiclemor.files import make_folder
 from vehiclemor.provenance import code_digest
 from vehiclemor.reduction.model_file import content

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vehiclemor.api import simulate as simulate
     from vehiclemor.api import status as status
     from vehiclemor.api import studies as studies
-    from vehiclemor.errors import VehiclemorError as VehiclemorError
+    from vehiclemor.exceptions import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.inputs.maneuver import maneuver as maneuver
     from vehiclemor.inputs.signal import Signal as Signal
@@ -42,7 +42,7 @@ _DEFINED_IN = {
     ),
     **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.inputs.signal",
-    "VehiclemorError": "vehiclemor.errors",
+    "VehiclemorError": "vehiclemor.exceptions",
     "convert": "vehiclemor.report.study_formats",
     "export": "vehiclemor.exporting.export",
     "compare": "vehiclemor.report.comparison",

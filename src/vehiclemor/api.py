@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import file_path, number, quoted, real_array
-from vehiclemor.errors import InputError, UnreachableError, VehiclemorError
+from vehiclemor.exceptions import InputError, UnreachableError, VehiclemorError
 from vehiclemor.registry import component, names
 
 if TYPE_CHECKING:
@@ -260,8 +260,8 @@ def _scenario(
     factors: tuple[float, float],
 ) -> Scenario:
     """What is simulated, checked."""
+    from vehiclemor.inputs.checks import checked_maneuver
     from vehiclemor.inputs.maneuver import FACTORS, checked_factor
-    from vehiclemor.simulation.maneuver_checks import checked_maneuver
     from vehiclemor.study.scenario import Scenario, check
 
     chosen = model.definition.maneuver if maneuver is None else maneuver
@@ -396,7 +396,7 @@ def _require_runs(run: Any, full: Any) -> None:
     for name, given in (("run", run), ("full", full)):
         if not isinstance(given, Trajectory):
             raise InputError(f"{name} is {quoted(given)}, not a run as `simulate` gives it")
-    if not np.array_equal(run.time, full.time):
+    if not np.array_equal(run.times, full.times):
         raise InputError("the runs have other output times: simulate both with the same input")
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.short_repr import shortened
 
 
@@ -100,3 +100,10 @@ def file_path(name: str, value: object) -> Path:
     except OSError as error:
         raise InputError(f"{name}: {quoted(value)} is not a path ({error.strerror})") from None
     return path
+
+
+def loop_array(values: Any) -> np.ndarray:
+    """Floats in the one kind of array that the loops are compiled for."""
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.flags.carray:
+        return values
+    return np.require(real_array(values), float, ("C", "A", "W"))

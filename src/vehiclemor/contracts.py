@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.reduction.interface import Method
@@ -60,7 +60,7 @@ def _check_algebraic(model: AlgebraicModel, maneuver: Maneuver) -> None:
     assert np.isfinite(trajectory.coordinates).all(), f"{name}: coordinates are not finite"
     largest = np.abs(model.residual_at(trajectory.coordinates, trajectory.inputs)).max()
     assert largest < 1e-10, f"{name}: residual {largest:.1e} along the nominal run"
-    q, u = trajectory.coordinates[len(trajectory.time) // 3], trajectory.inputs[0]
+    q, u = trajectory.coordinates[len(trajectory.times) // 3], trajectory.inputs[0]
     step = 1e-6
     differences = np.column_stack(
         [
@@ -77,12 +77,14 @@ def _check_dynamic(model: Any, maneuver: Maneuver) -> None:
     size = len(model.coordinates) + len(model.speeds)
     u = maneuver.at(maneuver.times)[0]
     for start in model.starts:
-        derivative = model.derivative(model.start(start), u)
+        derivative = model.rhs(model.start(start), u)
         assert derivative.shape == (size,), f"{name}: the derivative has a wrong shape"
         assert np.isfinite(derivative).all(), f"{name}: derivative at {start!r} is not finite"
     trajectory = model.simulate(maneuver)
     assert trajectory.status == "ok", f"{name}: the nominal run is {trajectory.status}"
-    assert trajectory.states.shape == (len(trajectory.time), size), f"{name}: wrong shape of states"
+    assert trajectory.states.shape == (len(trajectory.times), size), (
+        f"{name}: wrong shape of states"
+    )
     for history in (trajectory.states, trajectory.outputs):
         assert np.isfinite(history).all(), f"{name}: the nominal run is not finite"
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from vehiclemor.errors import (
+from vehiclemor.exceptions import (
     ConvergenceError,
     InputError,
     MachineError,

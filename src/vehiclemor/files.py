@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from vehiclemor.errors import FileError, MachineError, machine_reason
+from vehiclemor.exceptions import FileError, MachineError, machine_reason
 
 # Beginning of temporary names; and age (s) of a file that nobody is writing any more.
 TEMPORARY, OLD = ".partial-", 3600.0

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.errors import CorruptError, FileError, MachineError, machine_reason
+from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
 from vehiclemor.files import write_whole
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.arguments import quoted, real_array
-from vehiclemor.errors import FileError, InputError, did_you_mean
+from vehiclemor.exceptions import FileError, InputError, did_you_mean
 from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.toml_files import FileSchema, Line, read_toml

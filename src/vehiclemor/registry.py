@@ -10,7 +10,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import InputError, PlugInError, blame, did_you_mean
+from vehiclemor.exceptions import InputError, PlugInError, blame, did_you_mean
 
 GROUPS = {
     "model": "vehiclemor.models",

@@ -3,7 +3,7 @@
 from functools import cache
 from pathlib import Path
 
-from vehiclemor.errors import FileError
+from vehiclemor.exceptions import FileError
 
 
 @cache

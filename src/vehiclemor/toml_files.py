@@ -6,7 +6,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
-from vehiclemor.errors import FileError
+from vehiclemor.exceptions import FileError
 
 Schema = TypeVar("Schema", bound="FileSchema")
 

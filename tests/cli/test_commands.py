@@ -16,7 +16,7 @@ import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.cli.app import COMMANDS, ended
 from vehiclemor.cli.options import key_values
-from vehiclemor.errors import MachineError
+from vehiclemor.exceptions import MachineError
 from vehiclemor.parameters import load_parameters
 from vehiclemor.reduction.methods import replay
 from vehiclemor.registry import component, names

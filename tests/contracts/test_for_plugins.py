@@ -12,7 +12,7 @@ import pytest
 import vehiclemor as vm
 from tests.plugin.installation import installed
 from vehiclemor import contracts
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.registry import component, names
 from vehiclemor.study.experiment import complete_settings

@@ -11,7 +11,7 @@ import pytest
 from tests.oracles import complex_step
 from tests.reducing import training_runs
 from vehiclemor.codegen.derivatives import Sensitivity
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.systems import exported_system
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.signal import Signal
@@ -140,7 +140,7 @@ def test_every_preset_simulates_the_nominal_maneuver(pair):
         for name in ("coordinates", "speeds", "outputs"):
             shape = pair.maneuver.samples, len(getattr(pair.model, name))
             assert getattr(run, name).shape == shape
-        np.testing.assert_array_equal(run.time, pair.maneuver.times)
+        np.testing.assert_array_equal(run.times, pair.maneuver.times)
         np.testing.assert_array_equal(run.inputs, pair.maneuver.at(pair.maneuver.times))
         assert np.isfinite(run.states).all()
         assert np.isfinite(run.outputs).all()

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 import vehiclemor as vm
 from vehiclemor.contracts import check_method
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.validation import validated
@@ -74,7 +74,7 @@ def test_loose_steps_from_rest_do_not_pass_over_the_road(car, frequency):
     # The W-method's error estimate of one step over the whole run is zero by chance at 0.9.
     road = component("maneuver", car.definition.maneuver).perturbed(frequency, 1.0)
     run = car.simulate(road, solver="ros34pw2", tolerance=2e-3)
-    expected = exact(car, np.zeros(4), sine(frequency), run.time)
+    expected = exact(car, np.zeros(4), sine(frequency), run.times)
     assert run.counts["steps"] > 50
     np.testing.assert_allclose(run.states, expected, atol=0.05 * np.abs(expected).max())
 
@@ -156,7 +156,7 @@ def test_all_modes_of_a_linear_model_give_its_exact_solution(car):
     assert (reduced.order, few.order) == (4, 2)
     run = reduced.simulate(ramp(201), start)
     # An input that is linear between the output times.
-    expected = exact(car, start, np.array([[0.0, 0.3], [0.0, 0.0]]), run.time)
+    expected = exact(car, start, np.array([[0.0, 0.3], [0.0, 0.0]]), run.times)
     np.testing.assert_allclose(run.states, expected, rtol=0, atol=1e-9)
     # Whatever these are.
     finer = reduced.simulate(ramp(4001), start)

@@ -69,7 +69,7 @@ def current(name: str) -> dict:
         size = 2 * len(model.coordinates)
         turning = model.start("dropped") + 0.01 * np.sin(np.arange(float(size)))
         inputs = [0.02, 0.03, -0.05][: len(model.inputs)]
-        result["derivative"] = model.derivative(turning, inputs).tolist()
+        result["derivative"] = model.rhs(turning, inputs).tolist()
         cases = {start: {"start": start} for start in model.starts}
     result["runs"] = {}
     for run, arguments in RUNS[name].items():

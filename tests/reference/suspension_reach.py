@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 
-from vehiclemor.errors import VehiclemorError
+from vehiclemor.exceptions import VehiclemorError
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 

@@ -15,9 +15,9 @@ from tests.oracles.projected_simulation import (
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
-from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.simulation.workspaces import Solver
 
@@ -156,7 +156,7 @@ def test_the_lane_change_is_the_published_one(
     assert on_road.min() == pytest.approx(lightest, abs=0.05)
     assert on_road.max() == pytest.approx(5787.4, abs=0.1)
     across = np.column_stack([-np.sin(x[:, 3]), np.cos(x[:, 3])])
-    slopes = vehicle.derivatives_at(x, LANE_CHANGE.at(times))[:, N : N + 2]
+    slopes = vehicle.rhs_at(x, LANE_CHANGE.at(times))[:, N : N + 2]
     assert np.abs(np.sum(across * slopes, axis=1)).max() == pytest.approx(5.048, abs=1e-3)
 
 

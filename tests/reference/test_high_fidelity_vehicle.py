@@ -107,7 +107,7 @@ def outputs(model: DynamicModel, x: np.ndarray, u: np.ndarray) -> dict[str, floa
 
 def test_equations_of_motion_are_the_oracles_and_pinocchios(vehicle, cases):
     for case in cases:
-        found = vehicle.derivative(*case.at)
+        found = vehicle.rhs(*case.at)
         np.testing.assert_array_equal(found[:N], case.state.qd)
         assert error(found[N:], case.qdd) < 1e-12
         mass, force, _, _ = vehicle.descriptor(*case.at)
@@ -159,7 +159,7 @@ def test_elimination_solves_the_equations_with_multipliers(vehicle, cases, rng):
         systems[k, N:, :N] = jacobian
         right[k] = [*force, *gamma]
     expected = np.linalg.solve(systems, right[..., None])[:, :N, 0]
-    found = vehicle.derivatives_at(x, u)[:, N:]
+    found = vehicle.rhs_at(x, u)[:, N:]
     largest = np.abs(expected).max(axis=1)
     assert (np.abs(found - expected).max(axis=1) / largest).max() < 1e-13
 
@@ -206,7 +206,7 @@ def test_the_equilibrium_is_the_published_one(vehicle):
     np.testing.assert_allclose(np.delete(x[:N] - design(), [2, 4]), 0.0, atol=1e-15)
     np.testing.assert_allclose(x[48:], np.repeat([64.04125940508, 64.09877154573], 2), rtol=1e-12)
     np.testing.assert_array_equal(x[N:48], [20.0, *np.zeros(21)])
-    assert np.abs(vehicle.derivative(x, REST)[N:]).max() < 1e-9
+    assert np.abs(vehicle.rhs(x, REST)[N:]).max() < 1e-9
     found = outputs(vehicle, x, REST)
     loads = [found[f"Fz_{wheel}"] for wheel in WHEELS]
     np.testing.assert_allclose(loads, np.repeat([4016.3188, 4095.0110], 2), atol=5e-5)
@@ -304,7 +304,7 @@ def steady_turn(model: DynamicModel, speed: float) -> tuple[float, float]:
     jacobian = model.system.jacobian(x, REST)
     # In axes that turn with the vehicle its lateral speed can be steady.
     jacobian[N + 1, N + 3] -= speed
-    sides = (model.derivative(x, np.array([sign * h, 0.0, 0.0])) for sign in (1, -1))
+    sides = (model.rhs(x, np.array([sign * h, 0.0, 0.0])) for sign in (1, -1))
     by_rack = np.subtract(*sides) / (2 * h)
     # Lateral motions are the ones that the mirror reverses; path, heading and wheel angles play
     # no part.

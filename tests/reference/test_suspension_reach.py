@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.reference.suspension_reach import failures, is_on_branch, points
-from vehiclemor.errors import InputError, UnreachableError
+from vehiclemor.exceptions import InputError, UnreachableError
 
 # Change of the limits (m) for 1 m of rack: 3.8 at the most, where the stop of the wheel's angle is
 # met at a rack of 0.1 m; and what the search for the limits leaves open.

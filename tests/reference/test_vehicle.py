@@ -10,8 +10,8 @@ from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.simulation.workspaces import Solver
 
@@ -96,10 +96,10 @@ def speeds(model: DynamicModel, q, rates) -> np.ndarray:
 def test_accelerations_are_those_of_dalemberts_principle(vehicle, extended):
     """The published vehicle, and one with every parameter in play."""
     for x, delta in LARGE:
-        close(vehicle.derivative(x, delta), oracle.accelerations(x, delta))
+        close(vehicle.rhs(x, delta), oracle.accelerations(x, delta))
     for x, delta in states(2, 12):
         expected = oracle.accelerations(x, delta, EXTENDED_ORACLE)
-        close(extended.derivative(x, delta), expected)
+        close(extended.rhs(x, delta), expected)
 
 
 def test_tire_forces_and_slips_are_those_of_the_specification(vehicle):
@@ -177,7 +177,7 @@ def test_equations_of_motion_are_those_of_pinocchio(vehicle):
             moment = np.cross(-at.translation[2] * up, shear) + forces["Mz"][wheel] * up
             push = shear + forces["Fz"][wheel] * up
             outside[spin] = pin.Force(at.rotation.T @ push, at.rotation.T @ moment)
-        rates, found, expected = vehicle.derivative(x, delta)[14:], np.empty(14), np.zeros(14)
+        rates, found, expected = vehicle.rhs(x, delta)[14:], np.empty(14), np.zeros(14)
         loads = pin.StdVec_Force(outside)
         found[order] = pin.rnea(tree, data, position, nu[order], rates[order], loads)
         # What the joints must do: nothing but the springs and dampers on the slides.
@@ -196,7 +196,7 @@ def test_equations_of_motion_are_those_of_pinocchio(vehicle):
 def test_straight_running_is_an_equilibrium(vehicle):
     x = vehicle.start("equilibrium")
     np.testing.assert_allclose(x, oracle.equilibrium(), rtol=1e-15)
-    rates = vehicle.derivative(x, 0.0)
+    rates = vehicle.rhs(x, 0.0)
     assert np.abs(rates[14:]).max() < 1e-9
     assert rates[0] == pytest.approx(20.0)
     p = oracle.PARAMETERS
@@ -207,14 +207,14 @@ def test_straight_running_is_an_equilibrium(vehicle):
 def test_any_speed_and_any_load_has_its_equilibrium(extended):
     fast = build(NAME, overrides={"initial_speed": 37.0, "product_of_inertia": -20.0})
     for model in (fast, extended):
-        rates = model.derivative(model.start(), 0.0)
+        rates = model.rhs(model.start(), 0.0)
         assert np.abs(rates[14:]).max() < 1e-9
 
 
 def test_the_dropped_start_keeps_its_velocity_in_space(vehicle):
     x = vehicle.start("dropped")
     np.testing.assert_allclose(x, oracle.dropped(), rtol=1e-15)
-    np.testing.assert_allclose(vehicle.derivative(x, 0.0)[:3], [20.0, 0.0, 0.0], atol=1e-14)
+    np.testing.assert_allclose(vehicle.rhs(x, 0.0)[:3], [20.0, 0.0, 0.0], atol=1e-14)
 
 
 # Energy
@@ -235,7 +235,7 @@ def integrate(
 
 def test_energy_changes_by_the_power_of_tires_and_dampers(vehicle):
     for x, delta in LARGE:
-        rates = vehicle.derivative(x, delta)
+        rates = vehicle.rhs(x, delta)
         rate = oracle.energy(x + 1e-30j * rates, delta=delta).imag / 1e-30
         assert rate == pytest.approx(oracle.power(x, delta), rel=1e-9, abs=1e-5)
 
@@ -273,7 +273,7 @@ def test_dampers_and_tires_take_energy_away(vehicle):
 def test_yaw_gain_is_the_single_track_vehicles(vehicle):
     x = vehicle.start()
     h = 1e-5
-    by_steer = (vehicle.derivative(x, h) - vehicle.derivative(x, -h)) / (2 * h)
+    by_steer = (vehicle.rhs(x, h) - vehicle.rhs(x, -h)) / (2 * h)
     jacobian = vehicle.system.jacobian(x, np.zeros(1))
     # Lateral motions are the ones that the mirror reverses; cyclic states play no part.
     reverse = (np.eye(28) - np.array([oracle.mirror(e) for e in np.eye(28)])) / 2

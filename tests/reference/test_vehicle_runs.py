@@ -12,8 +12,8 @@ from sksundae.cvode import CVODE
 from tests.oracles import high_fidelity_data, vehicle_lagrange
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
-from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.workspaces import Solver
 
 PLAIN, FIDELITY = VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
@@ -82,8 +82,8 @@ def test_mirrored_turned_and_moved_the_vehicle_accelerates_alike(name, rng):
     n, heading = len(model.coordinates), model.coordinates.index("psi")
     for _ in range(60):
         x, u = random_motion(model, rng)
-        rates = model.derivative(x, u)
-        close(model.derivative(MIRROR[name](x), -u), MIRROR[name](rates))
+        rates = model.rhs(x, u)
+        close(model.rhs(MIRROR[name](x), -u), MIRROR[name](rates))
         # Place, heading and wheel angles have no influence.
         angle = rng.uniform(-6.0, 6.0)
         moved = turn(model, x, angle)
@@ -91,7 +91,7 @@ def test_mirrored_turned_and_moved_the_vehicle_accelerates_alike(name, rng):
         moved[n - 4 : n] += rng.uniform(-50.0, 50.0, 4)
         expected = turn(model, rates, angle)
         expected[heading] -= angle
-        close(model.derivative(moved, u), expected)
+        close(model.rhs(moved, u), expected)
 
 
 @pytest.mark.parametrize("start", STARTS)
@@ -175,7 +175,7 @@ def case(request):
         times = [*(t for t in TIMES if a < t < b), b]
 
         def rates(t, x):
-            return model.derivative(x, STEERING[name](t))
+            return model.rhs(x, STEERING[name](t))
 
         solution = solve_ivp(rates, (a, b), x, "LSODA", times, rtol=1e-10, atol=1e-11)
         x = solution.y[:, -1]
@@ -195,7 +195,7 @@ def test_compiled_solvers_and_sundials_agree_with_lsoda(case):
     x, steering = model.start(start), STEERING[model.name]
 
     def rates(t, x, slope):
-        slope[:] = model.derivative(x, steering(t))
+        slope[:] = model.rhs(x, steering(t))
 
     for a, b in pairwise(EDGES):
         # Straight running is at rest: steps would become too long to notice a wheel that lands.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor import registry
-from vehiclemor.errors import InputError, UnreachableError
+from vehiclemor.exceptions import InputError, UnreachableError
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.reduction.interface import Method, OfflineCost
 from vehiclemor.reduction.settings import Settings

@@ -8,7 +8,7 @@ import xarray as xr
 import vehiclemor as vm
 from tests.study.small import small_study
 from vehiclemor.cli import main
-from vehiclemor.errors import VehiclemorError
+from vehiclemor.exceptions import VehiclemorError
 
 GRID = 'grid = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], rank = [2, 3] }\n'
 

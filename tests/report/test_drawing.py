@@ -9,7 +9,7 @@ import vehiclemor as vm
 from tests.report import endings
 from tests.report.figure_texts import checked, varied
 from vehiclemor.cli import main
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.report.figures import result_plot, theme
 from vehiclemor.report.figures.result_plot import plot_result

@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 from tests.report.figure_texts import checked, varied
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component
 from vehiclemor.report.figures.catalogue import FIGURES

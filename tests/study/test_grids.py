@@ -5,7 +5,7 @@ import pytest
 
 import vehiclemor as vm
 from tests.study.small import small_study
-from vehiclemor.errors import FileError
+from vehiclemor.exceptions import FileError
 from vehiclemor.study.plans.grid import expand, sampled
 from vehiclemor.study.plans.loading import load_studies, write_study
 from vehiclemor.study.plans.results import flattened

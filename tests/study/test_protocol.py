@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.study.plans.choice import Validation, choose, outcomes, reasons
 from vehiclemor.study.plans.protocol import (
     load_protocol,

@@ -23,7 +23,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import vehiclemor as vm
 from tests.study.small import assert_same, small_study
 from vehiclemor.cli import main
-from vehiclemor.errors import (
+from vehiclemor.exceptions import (
     ConvergenceError,
     FileError,
     InputError,

@@ -11,7 +11,7 @@ import xarray as xr
 
 from tests.study.small import TIMED, small_study
 from vehiclemor import netcdf_file
-from vehiclemor.errors import CorruptError, InputError
+from vehiclemor.exceptions import CorruptError, InputError
 from vehiclemor.netcdf_file import read_dataset, write_dataset
 from vehiclemor.report.result_selection import stored_result
 from vehiclemor.study import store, workers

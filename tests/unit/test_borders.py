@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor.errors import VehiclemorError
+from vehiclemor.exceptions import VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 
 SUSPENSION, CAR = "double_wishbone", "independent_suspension_vehicle"
@@ -125,11 +125,11 @@ def trained(points):
         (lambda v: vm.simulate_many(car(), [STEER], outputs=v), [{}, *WRONG], "output"),
         (lambda v: vm.simulate_many(car(), [STEER], v), [np.array(1.0), 10**400], "start"),
         (lambda v: vm.simulate_many(car(), [STEER], jobs=v), NO_JOBS, "jobs is"),
-        (lambda v: car().derivative(v, 0.0), [np.zeros(27)], "x has shape (27,)"),
-        (lambda v: car().derivative(v, 0.0), [np.full(28, np.nan)], "x[0] is not finite"),
-        (lambda v: car().derivative(np.zeros(28), v), [[0.0, 0.0]], "u has shape (2,)"),
-        (lambda v: car().derivative(np.zeros(28), v), [np.inf], "u[0] is not finite"),
-        (lambda v: car().derivative(np.zeros(28), v), [None, *NO_NUMBERS[:-2]], "u is"),
+        (lambda v: car().rhs(v, 0.0), [np.zeros(27)], "x has shape (27,)"),
+        (lambda v: car().rhs(v, 0.0), [np.full(28, np.nan)], "x[0] is not finite"),
+        (lambda v: car().rhs(np.zeros(28), v), [[0.0, 0.0]], "u has shape (2,)"),
+        (lambda v: car().rhs(np.zeros(28), v), [np.inf], "u[0] is not finite"),
+        (lambda v: car().rhs(np.zeros(28), v), [None, *NO_NUMBERS[:-2]], "u is"),
         (lambda v: car().start(v), [[1.0, [2.0]], {}, ["0"] * 28, MASKED, 3, "nothing"], "start"),
         (lambda v: car().start(car().start() * v), [1j, np.nan], "start"),
         (lambda v: vm.simulate(car(), start=v), [[1.0, 2.0], np.full(28, np.nan)], "start"),

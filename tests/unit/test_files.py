@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from vehiclemor.errors import MachineError
+from vehiclemor.exceptions import MachineError
 from vehiclemor.files import remove_leftovers, temporary_path, write_text, write_whole
 
 

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vehiclemor as vm
+from vehiclemor.inputs.checks import check_resolved
 from vehiclemor.registry import names
-from vehiclemor.simulation.maneuver_checks import check_resolved
 
 factors, amplitudes = st.floats(0.1, 4.0), st.floats(-3.0, 3.0)
 

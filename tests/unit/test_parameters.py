@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.parameters import Declared, load_parameters, parameter_path, point
 from vehiclemor.simulation.build import build
 

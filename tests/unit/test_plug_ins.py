@@ -10,7 +10,7 @@ import vehiclemor as vm
 from tests.plugin.installation import installed
 from vehiclemor import registry
 from vehiclemor.cli import main
-from vehiclemor.errors import InputError, VehiclemorError
+from vehiclemor.exceptions import InputError, VehiclemorError
 from vehiclemor.reduction.methods import pod, replay
 from vehiclemor.registry import component, names, unknown
 
@@ -317,6 +317,6 @@ def test_a_model_that_breaks_is_named(car, change, words):
 
 def test_plain_numbers_among_the_results_of_a_model(car):
     model = car("faulty(derive=derived(lambda x: [x[2], x[3], 0, -1.5], [0, 1, 2.5]))")
-    np.testing.assert_array_equal(model.derivative([0, 0, 1, 2], 0.0), [1, 2, 0, -1.5])
+    np.testing.assert_array_equal(model.rhs([0, 0, 1, 2], 0.0), [1, 2, 0, -1.5])
     outputs = model.outputs_at(np.zeros((2, 4)), np.zeros((2, 1)))
     np.testing.assert_array_equal(outputs, [[0, 1, 2.5]] * 2)

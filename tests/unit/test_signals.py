@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, interp1d
 
 import vehiclemor as vm
-from vehiclemor.errors import InputError, VehiclemorError
+from vehiclemor.exceptions import InputError, VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -175,7 +175,7 @@ def test_the_run_begins_with_the_first_sample_and_a_car_is_its_own_mirror_image(
         for times, values in ((t, u), (t, -u), (t + 1024.0, u))
     ]
     np.testing.assert_array_equal(runs[0].states, runs[2].states)
-    assert runs[2].time[0] == 0.0
+    assert runs[2].times[0] == 0.0
     yaw = car.outputs.index("yaw")
     np.testing.assert_allclose(runs[1].outputs[:, yaw], -runs[0].outputs[:, yaw], atol=1e-9)
 
@@ -262,7 +262,7 @@ def test_a_signal_is_run_wherever_a_maneuver_is(car):
     signal = vm.Signal.from_samples(t, 0.01 * np.sin(t) ** 3, "cubic")
     full = car.simulate(signal, "equilibrium")
     result = vm.simulate(car, "pod", maneuver=signal, amplitude=0.9, training="nominal")
-    assert len(full.time) == 201
+    assert len(full.times) == 201
     np.testing.assert_allclose(result["inputs"][:, 0], 0.9 * full.inputs[:, 0], atol=1e-12)
 
 

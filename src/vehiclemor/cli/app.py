@@ -12,7 +12,7 @@ from vehiclemor.cli.names import cite, list_components, new_plugin, show
 from vehiclemor.cli.options import FAILED, strict
 from vehiclemor.cli.runs import export, plot, simulate
 from vehiclemor.cli.studies import compare, convert, figures, report, run, status
-from vehiclemor.errors import MachineError, PlugInError, VehiclemorError, machine_reason
+from vehiclemor.exceptions import MachineError, PlugInError, VehiclemorError, machine_reason
 from vehiclemor.resources import handbook_folder
 
 # Wrong input; and what the number of a signal is added to.

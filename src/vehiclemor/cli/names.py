@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from vehiclemor import api
 from vehiclemor.cli.options import All, Json, ParameterFile, Parameters, key_values
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import write_folder
 from vehiclemor.registry import GROUPS, names
 from vehiclemor.report.printing import table, wrapped

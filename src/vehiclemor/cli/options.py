@@ -6,7 +6,7 @@ from typing import Annotated, Any, get_args
 
 from cyclopts import Parameter, Token, convert
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 
 # A bound is missed, where that is asked for; a simulation, a study, a plug-in or the machine has
 # failed.

@@ -18,7 +18,7 @@ from vehiclemor.cli.options import (
     picture_file,
     result_file,
 )
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.export import STEP, FileTarget, destination, name_of
 from vehiclemor.report.printing import wrapped
 

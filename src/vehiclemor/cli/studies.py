@@ -13,7 +13,7 @@ from cyclopts import Parameter
 import vehiclemor as vm
 from vehiclemor.api import RESULTS
 from vehiclemor.cli.options import FAILED, MISSED, All, Jobs, Json, Results, Seed, new_file
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.report.printing import ends_text, wrapped
 from vehiclemor.report.study_formats import Format
 

@@ -24,7 +24,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Any, BinaryIO, TypeVar
 
-from vehiclemor.errors import FileError, MachineError, machine_reason
+from vehiclemor.exceptions import FileError, MachineError, machine_reason
 from vehiclemor.files import write_whole
 from vehiclemor.progress import making
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
 from vehiclemor.codegen.cache import fetched
-from vehiclemor.errors import PlugInError
+from vehiclemor.exceptions import PlugInError
 
 PACKAGE = Path(__file__).resolve().parents[1]
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from vehiclemor.arguments import file_path, number, quoted, within
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.files import make_folder, not_written, temporary_path, write_whole
 from vehiclemor.registry import choice
 

@@ -12,7 +12,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.c import DRIVER, SOURCES, c_files
 from vehiclemor.exporting.model_description import COMPILED, UNIT, model_description
 from vehiclemor.exporting.system import ExportedSystem

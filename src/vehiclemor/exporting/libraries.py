@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.straight_line import FUNCTIONS, evaluated
 from vehiclemor.exporting.system import ExportedSystem
 from vehiclemor.short_repr import ShortRepr

@@ -9,7 +9,7 @@ import numpy as np
 
 from vehiclemor.codegen.operations import Kernel, Value
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.exporting.system import SEED, SIGNATURES, TRUST, ExportedSystem
 from vehiclemor.multibody.quantities import Quantity
@@ -55,7 +55,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
         case PathMapModel():
             return map_system(what, name)
         case ReducedVehicle():
-            return reduced_system(what, name, what.lift.kernel(0))
+            return reduced_system(what, name, what.decoder.kernel(0))
         case ReducedSystem() if what.spaces.formulation == "full":
             if what.states == what.model.definition.states:
                 return reduced_system(what, name, None)
@@ -153,13 +153,13 @@ def parameter_quantities(model: Model) -> tuple[Quantity, ...]:
 
 
 def reduced_system(
-    reduced: ReducedSystem, name: str, lift: tuple[Kernel, np.ndarray] | None
+    reduced: ReducedSystem, name: str, decoder: tuple[Kernel, np.ndarray] | None
 ) -> ExportedSystem:
-    """A reduced system: its states are lifted, then the model's outputs follow from them.
+    """A reduced system: its states are decoded, then the model's outputs follow from them.
 
     Parameters
     ----------
-    lift
+    decoder
         The kernel that gives full states, and after them what is watched, with its constants; none
         where the states are the model's.
     """
@@ -172,16 +172,16 @@ def reduced_system(
     }
     rates, source = system.kernels.sources["derivative"], model.kernels.sources["outputs"]
     of_rates = own | {"_constants": lines.numbers(system.constants)}
-    lifted, of_lift = own["_x"], own
-    if lift is not None:
-        of_lift = own | {"_constants": lines.numbers(lift[1])}
-        lifted = lines.include(lift[0], of_lift)
-    given = {"_x": lifted, "_u": own["_u"], "_constants": lines.numbers(model.constants)}
-    outputs, used = lines.include(source, given), lifted[full:]
+    decoded, of_decoder = own["_x"], own
+    if decoder is not None:
+        of_decoder = own | {"_constants": lines.numbers(decoder[1])}
+        decoded = lines.include(decoder[0], of_decoder)
+    given = {"_x": decoded, "_u": own["_u"], "_constants": lines.numbers(model.constants)}
+    outputs, used = lines.include(source, given), decoded[full:]
 
     def tangents() -> dict[str, StraightLine]:
         seeds = seeds_of(lines, own)
-        moved = seeds["_x"] if lift is None else lines.derivative(lift[0], of_lift, seeds)
+        moved = seeds["_x"] if decoder is None else lines.derivative(decoder[0], of_decoder, seeds)
         found = lines.derivative(source, given, seeds | {"_x": moved})
         further = [lines.largest_derivative(used, moved[full:])] if used else []
         rising = lines.derivative(rates, of_rates, seeds)

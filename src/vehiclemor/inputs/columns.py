@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import FileError, InputError, one_line
+from vehiclemor.exceptions import FileError, InputError, one_line
 
 # What may stand between columns in the place of the separator that is expected.
 SEPARATORS = ",;\t| "

@@ -7,7 +7,7 @@ from itertools import islice
 import numpy as np
 
 from vehiclemor.arguments import count, line_of_text, number, quoted, real_array, within
-from vehiclemor.errors import InputError, PlugInError, blamed
+from vehiclemor.exceptions import InputError, PlugInError, blamed
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 

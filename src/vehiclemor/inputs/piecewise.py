@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 
 from vehiclemor.codegen.loops import Loop, loops
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.sample_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
 
 # Times that differ by so little, relative to what they are, are one.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
-from vehiclemor.errors import InputError, blamed, one_line
+from vehiclemor.exceptions import InputError, blamed, one_line
 from vehiclemor.inputs.columns import array_columns, chosen_columns, csv_columns, listed
 from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
 from vehiclemor.inputs.piecewise import HOLDS, at, derivative, scaled, through

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import line_of_text
-from vehiclemor.errors import InputError, did_you_mean
+from vehiclemor.exceptions import InputError, did_you_mean
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr

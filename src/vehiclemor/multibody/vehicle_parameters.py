@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vehiclemor.errors import GeometryError
+from vehiclemor.exceptions import GeometryError
 from vehiclemor.parameters import Declared
 
 GRAVITY = Declared("m/s^2", above=0.0, at_most=100.0)

@@ -13,7 +13,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from vehiclemor.arguments import line_of_text, quoted
-from vehiclemor.errors import InputError, blamed
+from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
 from vehiclemor.registry import choice
@@ -55,7 +55,7 @@ class FittedModel(Protocol):
     """What `fit` returns: whole runs.
 
     One that can be stepped too is a `ReducedSystem` or a `ReducedMechanism`, or has `states`,
-    `begin`, `step`, `rates`, `derivatives`, `decode` and `trust` as these do.
+    `begin`, `step`, `rates`, `sensitivities`, `decode` and `trust` as these do.
     """
 
     @property

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import file_path, quoted
-from vehiclemor.errors import FileError, InputError, VehiclemorError, one_line
+from vehiclemor.exceptions import FileError, InputError, VehiclemorError, one_line
 from vehiclemor.netcdf_file import INTEGRITY, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
 from vehiclemor.reduction.interface import Method

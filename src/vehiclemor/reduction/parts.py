@@ -22,7 +22,7 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.operations import Operation, as_arrays, of_arrays
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.registry import GROUPS
 from vehiclemor.simulation.model import Model
 from vehiclemor.sizes import require

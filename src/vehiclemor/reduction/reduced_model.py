@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import number
-from vehiclemor.errors import InputError, blamed
+from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction import model_file
 from vehiclemor.reduction.interface import FittedModel, simulated
@@ -223,7 +223,7 @@ class ReducedOrderModel(ShortRepr):
             If an argument is wrong, or the model has no such derivatives.
         """
         u = self._inputs(inputs)
-        return self._stepped.derivatives(self._state(state), u, time, with_respect_to, of)
+        return self._stepped.sensitivities(self._state(state), u, time, with_respect_to, of)
 
     def full_state(self, state: Any, inputs: Any) -> np.ndarray:
         """State (n,) of the full model, or states (samples, n) of as many."""

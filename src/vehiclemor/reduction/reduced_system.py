@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.exceptions import ConvergenceError, InputError
+from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
-from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.kernel_derivatives import (
     CONSTANTS,
     INPUTS,
@@ -23,7 +24,6 @@ from vehiclemor.simulation.kernel_derivatives import (
     chosen,
     parameter_names,
 )
-from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.stepping import Sensitivity, SteppedSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Run, Solver
@@ -100,7 +100,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
     def _starts(self) -> dict[tuple[str | bytes, bytes], Any]:
         return {}
 
-    def derivatives(
+    def sensitivities(
         self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
     ) -> np.ndarray:
         """Analytic derivatives of the rates or of the outputs."""
@@ -118,10 +118,10 @@ class ReducedSystem(SteppedSystem, ShortRepr):
             return self.rate_sensitivities(state, inputs, time, sensitivity)
         full = self.decode(state[None], inputs[None])[0]
         slopes = self.decoder_slopes(state, inputs)
-        by_state = self.model.derivatives(function, full, inputs, "state")
+        by_state = self.model.jacobian_of(function, full, inputs, "state")
         if sensitivity.argument == STATE:
             return by_state @ slopes[STATE]
-        found = self.model.derivatives(function, full, inputs, by)
+        found = self.model.jacobian_of(function, full, inputs, by)
         return found + by_state @ slopes[INPUTS] if sensitivity.argument == INPUTS else found
 
     def run(
@@ -199,7 +199,7 @@ class ReducedMechanism(ShortRepr):
         del state, inputs, time
         raise InputError(f"{self.model.name} is kinematic: its equations have no rates")
 
-    def derivatives(
+    def sensitivities(
         self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
     ) -> np.ndarray:
         """Those of `coordinates` or `outputs`; there are no rates."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.simulation.input_polynomials import extent_of
+from vehiclemor.inputs.polynomials import extent_of
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.sizes import shaped

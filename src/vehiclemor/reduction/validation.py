@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import InputError, PlugInError, blamed, printable
+from vehiclemor.exceptions import InputError, PlugInError, blamed, printable
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import FitOther, FittedModel, Method, OfflineCost
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings

@@ -9,7 +9,7 @@ import pandas as pd
 import xarray as xr
 
 from vehiclemor.arguments import count, file_path
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report.criteria import CRITERIA

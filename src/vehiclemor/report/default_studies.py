@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component, names
 from vehiclemor.report.findings import INDISTINGUISHABLE
 from vehiclemor.report.labels import default_rank, tabled_outputs

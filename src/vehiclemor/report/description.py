@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import FACTORS
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.multibody.quantities import Quantity

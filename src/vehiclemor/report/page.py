@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import write_text
 from vehiclemor.netcdf_file import read_dataset

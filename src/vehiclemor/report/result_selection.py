@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_names

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.algebraic import AlgebraicProjection
 from vehiclemor.reduction.projection.dynamic import DynamicProjection

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from vehiclemor.arguments import file_path
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import write_folder, write_text, write_whole
 from vehiclemor.registry import choice
 

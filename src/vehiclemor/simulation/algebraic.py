@@ -11,25 +11,25 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
+from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
+from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import choice
-from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import (
     check_positive,
     checked_array,
     checked_inputs,
     output_times,
 )
-from vehiclemor.simulation.input_polynomials import recorded_inputs
 from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.kinematic_derivatives import kinematic_derivatives
-from vehiclemor.simulation.lane_loops import LaneKernels
-from vehiclemor.simulation.lane_runs import LaneRuns
-from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.newton import newton_loops
+from vehiclemor.simulation.newton.lane_loops import LaneKernels
+from vehiclemor.simulation.newton.lane_runs import LaneRuns
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Names, Start, Trajectory
@@ -42,7 +42,7 @@ SOLVERS = ("newton", "newton_lanes")
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
-KINEMATIC_LOOPS = ("simulation.newton_loops",)
+KINEMATIC_LOOPS = ("simulation.newton.newton_loops",)
 INLINED_KERNELS = ("residual", "residual_jacobian", "newton_step", "tangent_parts", "tangent")
 REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
@@ -290,7 +290,7 @@ class AlgebraicModel(Model):
         addresses = [address_of(self.kernels, name, LANES) for name in names]
         kernels = ready(LaneKernels(np.array(addresses, dtype=np.int64)))
         sizes = len(self.coordinates), len(self.inputs), len(self.outputs)
-        loop = self.loop("lane_path", "simulation.lane_loops")
+        loop = self.loop("lane_path", "simulation.newton.lane_loops")
         return LaneRuns(loop, self._ready_mechanism, kernels, sizes)
 
     @cached_property
@@ -320,7 +320,7 @@ class AlgebraicModel(Model):
             status = "diverged"
             message = f"{REASONS[failure[0]]} at t = {times[failure[1]]:.6g} s"
         return Trajectory.of(
-            time=times,
+            times=times,
             inputs=inputs,
             coordinates=path,
             speeds=path[:, :0],

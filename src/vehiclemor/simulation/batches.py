@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import MOST_JOBS, count, quoted, real_array
-from vehiclemor.errors import ConvergenceError, InputError, VehiclemorError
+from vehiclemor.exceptions import ConvergenceError, InputError, VehiclemorError
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.parameters import parameter_and_axis

@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import real_array
 from vehiclemor.codegen.derivation import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
-from vehiclemor.errors import GeometryError, InputError, blamed
+from vehiclemor.exceptions import GeometryError, InputError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.parameters import ParameterSet, load_parameters, overridden, parameter_path
 from vehiclemor.progress import first_use

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import number, quoted, real_array, within
-from vehiclemor.errors import InputError
+from vehiclemor.arguments import loop_array, number, quoted, within
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 
@@ -157,10 +157,3 @@ def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray)
         if sample < len(times)
     ]
     return f"off the ground for a time: {', '.join(off)}"
-
-
-def loop_array(values: Any) -> np.ndarray:
-    """Floats in the one kind of array that the loops are compiled for."""
-    if type(values) is np.ndarray and values.dtype == np.float64 and values.flags.carray:
-        return values
-    return np.require(real_array(values), float, ("C", "A", "W"))

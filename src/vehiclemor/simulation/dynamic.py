@@ -9,21 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import number
-from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.arguments import loop_array, number
+from vehiclemor.exceptions import ConvergenceError, InputError
+from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.simulation.checks import (
     left_validity,
     lifted_wheels,
-    loop_array,
 )
-from vehiclemor.simulation.input_polynomials import recorded_inputs
+from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.integrators.catalogue import integrator
+from vehiclemor.simulation.integrators.mirror_image import partners
 from vehiclemor.simulation.kernel_derivatives import By, chosen
-from vehiclemor.simulation.maneuver_checks import checked_maneuver, cut_short
-from vehiclemor.simulation.mirror_image import partners
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.recording import Recorder, Recording
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import (
@@ -94,8 +93,8 @@ class DynamicModel(Model):
             partners=partners(self.definition.states),
         )
 
-    def derivative(self, x: Any, u: Any) -> np.ndarray:
-        """Time derivative (2 n,) of the state x at inputs u.
+    def rhs(self, x: Any, u: Any) -> np.ndarray:
+        """Right-hand side f(x, u) (2 n,): the time derivative of the state x at inputs u.
 
         Raises
         ------
@@ -107,7 +106,7 @@ class DynamicModel(Model):
             raise InputError(f"the derivative of {self.name} is not finite at this state")
         return result
 
-    def derivatives_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    def rhs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State derivatives (samples, 2 n) along a path of states and inputs."""
         return self.along("derivative", states, inputs, finite=True)
 
@@ -126,7 +125,7 @@ class DynamicModel(Model):
         InputError
             If an argument is wrong, or the derivatives aren't finite.
         """
-        return self.derivatives(chosen(of, RESULTS), state, u, with_respect_to)
+        return self.jacobian_of(chosen(of, RESULTS), state, u, with_respect_to)
 
     def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
         """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""
@@ -219,7 +218,7 @@ class DynamicModel(Model):
         self,
         maneuver: Maneuver,
         state: np.ndarray,
-        windows: ProjectionWindows,
+        windows: ControlPeriods,
         how: Solver,
         outputs: tuple[str, ...] | None = None,
     ) -> Trajectory:
@@ -307,7 +306,7 @@ class DynamicModel(Model):
             message = left_validity(self.definition, name, value, times[left])
         lifted = lifted_wheels(self.definition.loads, first[limited:], times)
         fields = {
-            "time": times,
+            "times": times,
             "inputs": inputs,
             "counts": dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
             "seconds": run.seconds,

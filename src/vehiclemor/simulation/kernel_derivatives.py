@@ -10,7 +10,7 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.registry import choice
 
 # Places of the arguments of a kernel.

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.simulation.kernel_derivatives import By, chosen
 from vehiclemor.simulation.model import Model
 
@@ -30,14 +30,14 @@ def kinematic_derivatives(model: Model, q: Any, u: Any, by: By, of: str) -> np.n
     if by == "state" and not function:
         raise InputError("derivatives of the coordinates are by inputs or parameters")
     if of == "residual" or by == "state":
-        return model.derivatives(function, q, u, by)
+        return model.jacobian_of(function, q, u, by)
     gap = float(np.abs(model.evaluated("residual", q, u)).max())
     if not gap < CLOSED:
         raise InputError(f"{model.name}: at these coordinates the joints are {gap:.3g} m apart")
-    change = model.derivatives("residual", q, u, by)
+    change = model.jacobian_of("residual", q, u, by)
     moved = -np.linalg.solve(model.evaluated("residual_jacobian", q, u)[:, :-1], change)
     if not function:
         return moved
     return (
-        model.derivatives(function, q, u, by) + model.derivatives(function, q, u, "state") @ moved
+        model.jacobian_of(function, q, u, by) + model.jacobian_of(function, q, u, "state") @ moved
     )

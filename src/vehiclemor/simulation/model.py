@@ -13,7 +13,7 @@ import numpy as np
 
 from vehiclemor.codegen.derivation import Derivation
 from vehiclemor.codegen.kernels import BareKernel, Kernels
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
@@ -221,12 +221,13 @@ class Model(ShortRepr):
         Parameters
         ----------
         function
-            Such as `derivative` or `outputs`.
+            `rhs`, `outputs`, or another of the equations.
         """
+        function = {"rhs": "derivative"}.get(function, function)
         self.require(function)
         return self.kernels.bare(function, self.constants)
 
-    def derivatives(self, function: str, state: Any, u: Any, by: By) -> np.ndarray:
+    def jacobian_of(self, function: str, state: Any, u: Any, by: By) -> np.ndarray:
         """Analytic derivatives (results, columns) of a function of the equations, see `jacobian`.
 
         Raises

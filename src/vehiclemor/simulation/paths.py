@@ -9,7 +9,7 @@ import numpy as np
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.simulation.checks import checked_path
 
 PATH_LOOPS = ("simulation.integrators.structures", "simulation.path_loops")

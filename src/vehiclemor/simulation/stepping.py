@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vehiclemor.codegen.loops import ready
-from vehiclemor.errors import ConvergenceError
+from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.simulation.integrators.structures import Output, Spans
 from vehiclemor.simulation.kernel_derivatives import CONSTANTS, STATE, along, partial
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import NO_POINTS, Drive, Solver, Workspace
+from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Solver, Workspace
 
 # Shortest step in s: the time loop takes times that differ by less for one.
 SHORTEST = 1e-9
@@ -70,7 +70,7 @@ class SteppedSystem:
     Attributes
     ----------
     system, spaces
-        A `System`, and its formulation with the subspaces, `ProjectionWindows`; in more windows
+        A `System`, and its formulation with the subspaces, `ControlPeriods`; in more windows
         than one the time says which.
     solver, tolerance
         Integrator and its tolerance.
@@ -104,7 +104,7 @@ class SteppedSystem:
             If the integration fails.
         """
         try:
-            held = self._spare.pop()
+            held = self._pool.pop()
         except IndexError:
             held = self._packed()
         space, coefficients = held.space, held.coefficients
@@ -130,11 +130,11 @@ class SteppedSystem:
                 raise ConvergenceError(f"{REASONS[status]} at t = {reached:.6g} s")
             start[:] = output.path[0]
         found = start.copy()
-        self._spare.append(held)
+        self._pool.append(held)
         return found
 
     @cached_property
-    def _spare(self) -> list[StepSpace]:
+    def _pool(self) -> list[StepSpace]:
         return []
 
     def _parts(self, time: float, dt: float) -> Iterator[tuple[float, float, int]]:
@@ -158,7 +158,7 @@ class SteppedSystem:
         path, windows = np.empty((1, len(self.system.error_scale))), self.spaces
         if self.moved:
             windows = replace(windows, means=windows.means.copy())
-        drive = Drive(signal, spans, NO_POINTS[0])
+        drive = DrivenBy(signal, spans, NO_POINTS[0])
         output = Output(sample, path, counts, *NO_POINTS, np.inf)
         space = self.system.packed(windows, Solver(self.solver, self.tolerance), drive, output)
         words = space.call.words

@@ -7,16 +7,19 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from vehiclemor.arguments import loop_array
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import recorded_inputs, signal_of
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import check_positive, loop_array, output_times
+from vehiclemor.simulation.checks import check_positive, output_times
+from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.formulations import FORMULATIONS
-from vehiclemor.simulation.input_polynomials import recorded_inputs, signal_of
 from vehiclemor.simulation.integrators import catalogue
+from vehiclemor.simulation.integrators.mirror_image import mirror_blocks, signs
 from vehiclemor.simulation.integrators.step_kernels import Frame
 from vehiclemor.simulation.integrators.structures import (
     NOT_FINITE,
@@ -27,12 +30,10 @@ from vehiclemor.simulation.integrators.structures import (
     Method,
     Output,
 )
-from vehiclemor.simulation.mirror_image import mirror_blocks, signs
 from vehiclemor.simulation.paths import address_of, along, path_loops
-from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import NO_POINTS, Drive, Run, Solver, Spare, Workspace
+from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Pool, Run, Solver, Workspace
 
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
@@ -211,7 +212,7 @@ class System(ShortRepr):
         self,
         maneuver: Maneuver,
         state: np.ndarray,
-        windows: ProjectionWindows,
+        windows: ControlPeriods,
         solver: Solver,
         direct_until: float = np.inf,
     ) -> Run:
@@ -241,7 +242,7 @@ class System(ShortRepr):
             # Of runs over whole maneuvers with the same output times.
             length = maneuver.duration, maneuver.samples
             kind = length, id(windows), name, tolerance, longest, direct_until
-            space, left = self._spare.taken(kind, make), partial(self._spare.give_back, kind)
+            space, left = self._pool.taken(kind, make), partial(self._pool.give_back, kind)
             if space.signal is not signal_of(maneuver):
                 space.take(self._drive(maneuver, windows, space.output.samples))
         output = space.output
@@ -253,13 +254,13 @@ class System(ShortRepr):
         return Run(output.samples, output.path, output.counts, seconds, failure, space, left)
 
     @cached_property
-    def _spare(self) -> Spare[Workspace]:
-        return Spare()
+    def _pool(self) -> Pool[Workspace]:
+        return Pool()
 
     def workspace(
         self,
         maneuver: Maneuver,
-        windows: ProjectionWindows,
+        windows: ControlPeriods,
         solver: Solver,
         direct_until: float = np.inf,
     ) -> Workspace:
@@ -278,16 +279,16 @@ class System(ShortRepr):
         return self.packed(windows, solver, drive, output)
 
     def _drive(
-        self, maneuver: Maneuver, windows: ProjectionWindows, times: np.ndarray, begin: float = 0.0
-    ) -> Drive:
+        self, maneuver: Maneuver, windows: ControlPeriods, times: np.ndarray, begin: float = 0.0
+    ) -> DrivenBy:
         """What of a maneuver goes into a run."""
         signal = signal_of(maneuver)
         end = float(times[-1]) if len(times) else maneuver.duration
         spans = windows.spans(signal.bundle.edges, end, begin)
-        return Drive(signal, spans, recorded_inputs(maneuver)[1])
+        return DrivenBy(signal, spans, recorded_inputs(maneuver)[1])
 
     def packed(
-        self, windows: ProjectionWindows, solver: Solver, drive: Drive, output: Output
+        self, windows: ControlPeriods, solver: Solver, drive: DrivenBy, output: Output
     ) -> Workspace:
         """The time loop with all its arguments, see `integrators/loop.integrate`."""
         name = catalogue.ALIASES.get(solver.name, solver.name)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import quoted, real_array
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
@@ -81,7 +81,7 @@ class Trajectory(ShortRepr):
 
     Attributes
     ----------
-    time
+    times
         Output times (samples,) in s.
     inputs, coordinates, speeds, outputs
         Histories (samples, number of quantities), SI units; a kinematic model has 0 speeds.
@@ -103,7 +103,7 @@ class Trajectory(ShortRepr):
         Of which it is.
     """
 
-    time: np.ndarray
+    times: np.ndarray
     inputs: np.ndarray
     coordinates: np.ndarray
     speeds: np.ndarray
@@ -122,8 +122,8 @@ class Trajectory(ShortRepr):
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if histories are of other samples than the times."""
-        samples = max(len(self.time), 1)
-        shaped("time", (self.time, samples))
+        samples = max(len(self.times), 1)
+        shaped("times", (self.times, samples))
         for history in (self.inputs, self.coordinates, self.speeds, self.outputs):
             shaped("samples", (history, samples, *history.shape[1:2]))
 
@@ -202,8 +202,8 @@ class Trajectory(ShortRepr):
             fields |= {"names": names, "coordinates": nothing, "speeds": nothing}
             fields["outputs"] = self._columns(names)
         if times is not None:
-            rows = sample_rows(times, self.time)
-            for history in ("time", "inputs", "coordinates", "speeds", "outputs"):
+            rows = sample_rows(times, self.times)
+            for history in ("times", "inputs", "coordinates", "speeds", "outputs"):
                 if history in fields:
                     fields[history] = fields[history][rows]
             if "recording" in fields:
@@ -298,7 +298,7 @@ def trajectory_dataset(
     ):
         variables[name] = ((), getattr(trajectory, name), {"long_name": long_name})
     names = trajectory.names or model.outputs
-    labels = _labels(model.definition, held, names, trajectory.time.tobytes())
+    labels = _labels(model.definition, held, names, trajectory.times.tobytes())
     return with_units(xr.Dataset(variables | (further or {}), labels))
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Prepared, Ready
 from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.integrators.structures import NODES, Output
-from vehiclemor.simulation.projection_windows import ProjectionWindows
 
 Kept = TypeVar("Kept")
 # Kinds of runs whose workspaces are kept.
@@ -23,7 +23,7 @@ MOST_KINDS = 64
 NO_POINTS = np.empty((0, 0)), np.empty((0, 0)), np.empty(0), np.empty((0, 2))
 
 
-class Spare(Generic[Kept]):
+class Pool(Generic[Kept]):
     """What no run holds at present, by what all runs of a kind share."""
 
     def __init__(self) -> None:
@@ -70,7 +70,7 @@ class Solver(NamedTuple):
     begin: float = 0.0
 
 
-class Drive(NamedTuple):
+class DrivenBy(NamedTuple):
     """What of a maneuver goes into a run.
 
     Attributes
@@ -113,14 +113,14 @@ class Workspace:
         start: np.ndarray,
         output: Output,
         buffer: np.ndarray,
-        windows: ProjectionWindows,
+        windows: ControlPeriods,
         signal: Ready,
     ) -> None:
         self.call, self.start, self.output, self.buffer = call, start, output, buffer
         self.windows, self.signal = windows, signal
         self.kept: dict[str, Any] = {}
 
-    def take(self, drive: Drive) -> None:
+    def take(self, drive: DrivenBy) -> None:
         """Have the next run driven by another maneuver of the same output times."""
         self.call.give("signal", drive.signal)
         self.call.give("spans", drive.spans)
@@ -188,7 +188,9 @@ class Run:
         if self.space is None or self._left is None:
             return self.times, inputs
         output = self.space.output
-        return (output.moments, output.inputs) if len(self.places) else (self.times, output.given)
+        return (
+            (output.point_times, output.inputs) if len(self.places) else (self.times, output.given)
+        )
 
     @property
     def kept(self) -> dict[str, Any]:

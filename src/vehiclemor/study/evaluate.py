@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.errors import ConvergenceError, InputError, PlugInError, blamed
+from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, blamed
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use

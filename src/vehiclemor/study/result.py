@@ -150,7 +150,7 @@ def _missing(model: Model, maneuver: Maneuver, failure: Failure) -> Trajectory:
 def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
     """What is known of any run, by names of variables; no errors without a reference."""
     run, full, trust = outcome.trajectory, outcome.reference, outcome.trajectory.trust
-    outputs, times = run.outputs, run.time
+    outputs, times = run.outputs, run.times
     early = np.searchsorted(times, FIRST_SECONDS, side="right")
     landed = np.searchsorted(times, min(LANDED, times[-1]))
     found: dict[str, object] = {

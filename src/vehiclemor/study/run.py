@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vehiclemor.arguments import MOST_JOBS, count
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.progress import tell, telling
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.grid import Grid, expand

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.checks import check_resolved, checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.reduction.training import SPEED, TrainingRun, own_speed
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import reparametrised
-from vehiclemor.simulation.maneuver_checks import check_resolved, checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start
 

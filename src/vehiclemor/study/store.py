@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.errors import CorruptError, FileError, MachineError, machine_reason
+from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
 from vehiclemor.files import (
     make_folder,
     not_written,

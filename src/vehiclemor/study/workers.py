@@ -23,7 +23,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vehiclemor.codegen.cache import cache_folder, once
-from vehiclemor.errors import InputError, MachineError, machine_reason, one_line
+from vehiclemor.exceptions import InputError, MachineError, machine_reason, one_line
 from vehiclemor.progress import tell
 from vehiclemor.provenance import code_digest
 from vehiclemor.study.evaluate import evaluate, model_of

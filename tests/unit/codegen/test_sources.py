@@ -13,7 +13,7 @@ from vehiclemor.codegen import derivation as kept
 from vehiclemor.codegen import sources
 from vehiclemor.codegen.derivation import derivation
 from vehiclemor.codegen.sources import plug_in_digest
-from vehiclemor.errors import PlugInError
+from vehiclemor.exceptions import PlugInError
 from vehiclemor.multibody import definition
 
 EQUATIONS = "def derive():\n    return {}\n"
@@ -230,4 +230,4 @@ def test_the_source_read_back_computes_what_the_model_says(standard):
     model = standard(rate=3.0, growth=0.5)
     x, u = np.array([0.3, -0.7, 0.2, 1.1]), np.array([0.4, 0.9, -0.6])
     expected = [0.2, 3.0 * (0.9 + 0.7) - 0.6, 0.4 - np.sin(0.3), 0.5 * 1.1**2]
-    np.testing.assert_allclose(model.derivative(x, u), expected, rtol=1e-15)
+    np.testing.assert_allclose(model.rhs(x, u), expected, rtol=1e-15)

@@ -92,8 +92,8 @@ def test_the_suspension_needs_no_states(drivers, kind):
     _, rows = driven(driver, inputs, 0.05)
     signal = vm.Signal.from_samples(t, inputs)
     run = model.simulate(signal)
-    wanted = np.array([np.interp(t, run.time, column) for column in run.outputs.T]).T
-    at = np.isin(np.round(t, 9), np.round(run.time, 9))
+    wanted = np.array([np.interp(t, run.times, column) for column in run.outputs.T]).T
+    at = np.isin(np.round(t, 9), np.round(run.times, 9))
     assert at.sum() > 5
     assert np.abs(rows[at, :-1] - wanted[at]).max() < 1e-12
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.unit import standard_problems
 from vehiclemor import registry
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.multibody import definition
 from vehiclemor.registry import component
 

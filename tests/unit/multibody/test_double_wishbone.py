@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.oracles import kinematics
-from vehiclemor.errors import GeometryError
+from vehiclemor.exceptions import GeometryError
 from vehiclemor.simulation.build import build
 
 # Specification of the model, "What to expect", to 5 digits; spindle's y; bump steer in degrees.

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.unit.programs import pivot_shares
-from vehiclemor.errors import GeometryError
+from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.high_fidelity.equations import CORNER, LOWER_ARMS, PIVOTS
 from vehiclemor.multibody.high_fidelity.equilibrium import check
 from vehiclemor.multibody.quantities import WHEELS
@@ -82,7 +82,7 @@ def test_the_design_position_is_at_rest_for_any_vehicle(given_values, factors, s
     p = model.parameters.values()
     x = model.start()
     # Rounding of forces of some 1e4 N, which move parts of 1 kg.
-    assert np.abs(model.derivative(x, REST)[N:]).max() < 1e-9 * max(1.0, float(p["gravity"]))
+    assert np.abs(model.rhs(x, REST)[N:]).max() < 1e-9 * max(1.0, float(p["gravity"]))
     # Joints as they were designed, no roll, no heading; the corners are closed.
     design = built().start()[:N]
     np.testing.assert_array_equal(np.delete(x[:N] - design, [2, 4]), 0.0)
@@ -114,7 +114,7 @@ def test_the_equilibrium_is_where_the_vehicle_comes_to_rest():
         for sign in (1.0, -1.0):
             pushed = x.copy()
             pushed[place] += sign * push
-            assert sign * model.derivative(pushed, REST)[N + place] < 0.0
+            assert sign * model.rhs(pushed, REST)[N + place] < 0.0
 
 
 def test_a_stiffer_spring_has_the_same_preload(given_values):
@@ -137,7 +137,7 @@ def test_a_vehicle_that_is_dropped_from_above_the_road_falls_freely(given_values
     lifted = model.start("dropped")
     found = outputs(model, lifted)
     assert [found[f"Fz_{wheel}"] for wheel in WHEELS] == [0.0] * 4
-    mass, accelerations = model.descriptor(lifted, REST)[0], model.derivative(lifted, REST)[N:]
+    mass, accelerations = model.descriptor(lifted, REST)[0], model.rhs(lifted, REST)[N:]
     weight = statics(given_values)[0] * given_values["gravity"]
     assert mass[2] @ accelerations == pytest.approx(-weight, rel=1e-12)
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 import vehiclemor as vm
-from vehiclemor.errors import InputError
-from vehiclemor.simulation.input_polynomials import extent_of
+from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.polynomials import extent_of
 from vehiclemor.study.plans.protocol import load_protocol, sampled_runs
 
 CAR = "independent_suspension_vehicle"

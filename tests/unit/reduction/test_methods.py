@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.reducing import figure_errors, fitted, floor_errors, training_runs, two_way_travel
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.projection.bases import Basis
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.validation import validated

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.training import TrainingRun, difference
 from vehiclemor.reduction.validation import fitted, for_model, validated
 from vehiclemor.registry import component, names

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
 from vehiclemor.registry import component
 from vehiclemor.simulation.integrators.catalogue import MOST_CALLS
@@ -47,7 +47,7 @@ def test_it_tells_what_it_is(full, linear, wishbone):
 def test_the_full_model_answers_as_the_model_itself(full):
     x, u = full.state("dropped"), [0.02]
     np.testing.assert_array_equal(x, full.model.start("dropped"))
-    np.testing.assert_array_equal(full.rhs(x, u), full.model.derivative(x, u))
+    np.testing.assert_array_equal(full.rhs(x, u), full.model.rhs(x, u))
     np.testing.assert_array_equal(full.full_state(x, u), x)
     expected = full.model.outputs_at(x[None], np.array([u]))[0]
     np.testing.assert_array_equal(full.outputs(x, u), expected)

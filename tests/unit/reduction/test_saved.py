@@ -20,7 +20,7 @@ import vehiclemor as vm
 from vehiclemor import netcdf_file
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.operations import KINDS, MOST_SIZE
-from vehiclemor.errors import FileError, InputError
+from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.reduction import parts
 from vehiclemor.reduction.parts import Reader, Writer
@@ -340,9 +340,9 @@ bicycle modes transient.rates=ones(22)|transient.left=ones([22,21])|transient.ri
 bicycle largest input_range.largest=a[:-1] input_range.largest=a[:,:0]
 bicycle largest input_range.largest=a.astype(int)
 car lateral features.lateral=4
-car features lifted_features.states=10 lifted_features.inputs=2
+car features decoded_features.states=10 decoded_features.inputs=2
 car coefficients coefficients=a[:-1] coefficients=a[:,:-1] coefficients=a.astype(int)
-car lifting lifting=a[:-1] lifting=a[:,:-1]
+car decoding decoding=a[:-1] decoding=a[:,:-1]
 car encoding encoding=a[:,:-1] feedthrough=a[:-1]
 car error_scale error_scale=a[:-1]
 car transient transient.rates=a[:-1] transient.left=a[:-1] transient.right=a[:-1]
@@ -371,7 +371,7 @@ windows basis bases.0.mean=a[:-1] bases.0.mean=a.astype(int)
 windows bases bases.1.mean=a[:-1]|bases.1.vectors=a[:-1]
 windows rank bases.0.vectors=ones((len(a),len(a)+1))
 replay samples recorded.0.inputs=a[:-1] recorded.0.outputs=a[:-1] recorded.0.speeds=ones(3)
-replay time recorded.0.time=a[:0] recorded.0.time=a.astype(int)
+replay time recorded.0.times=a[:0] recorded.0.times=a.astype(int)
 replay outputs recorded.0.outputs=a[:,:-1]
 """
 ROWS = [row.split() for row in SIZES.strip().splitlines()]

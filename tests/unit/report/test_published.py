@@ -2,7 +2,7 @@
 
 import pytest
 
-from vehiclemor.errors import FileError
+from vehiclemor.exceptions import FileError
 from vehiclemor.report.published import load_published
 from vehiclemor.resources import data_folder
 

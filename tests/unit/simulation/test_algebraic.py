@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vehiclemor.errors import ConvergenceError, InputError, UnreachableError
+from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
 from vehiclemor.reduction.methods.full_order import FullOrderMechanism
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vehiclemor as vm
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 from vehiclemor.simulation import batches
 from vehiclemor.simulation.trajectory import FINISHED
@@ -46,7 +46,7 @@ def check_alone(model, signals, found, starts=None):
         table = np.hstack([alone.outputs, alone.coordinates, alone.speeds])
         names = [*model.model.outputs, *model.model.coordinates, *model.model.speeds]
         columns = [names.index(name) for name in found.output.values]
-        rows = np.searchsorted(alone.time, found.time.values - 1e-9)
+        rows = np.searchsorted(alone.times, found.time.values - 1e-9)
         expected = table[np.ix_(rows, columns)]
         np.testing.assert_array_equal(found["values"].values[run], expected)
         own = found.isel(run=run)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from vehiclemor.errors import ConvergenceError
+from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.system import Solver
 
 PLAIN, FIDELITY = VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
@@ -28,7 +28,7 @@ TENTH = {
 def test_samples_in_lanes_give_what_each_gives_alone(name, samples):
     model = build(name)
     run = model.simulate(component("maneuver", model.definition.maneuver))
-    places = np.linspace(0, len(run.time) - 1, samples).astype(int)
+    places = np.linspace(0, len(run.times) - 1, samples).astype(int)
     states, inputs = run.states[places], run.inputs[places]
     alone = [model.evaluated("outputs", x, u) for x, u in zip(states, inputs, strict=True)]
     scale = 1.0 + np.abs(run.outputs).max(axis=0)
@@ -59,7 +59,7 @@ def test_a_run_read_at_few_points_is_the_run_at_its_samples(name, maneuver, solv
     space = whole_space(2 * len(model.coordinates))
     run = model.system.run(given, model.start(start), space, own, 0.0)
     assert len(run.places)
-    assert len(run.path) < len(few.time)
+    assert len(run.path) < len(few.times)
 
 
 @pytest.mark.parametrize("solver", ["ros34pw2", "dopri5"])

@@ -8,14 +8,14 @@ import pytest
 from tests.unit.standard_problems import maneuver
 from vehiclemor.codegen import kernels as codegen_kernels
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, check_subspace
 from vehiclemor.registry import component
 from vehiclemor.simulation import build
+from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
-from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.workspaces import Solver
 
 STRAIGHT = component("maneuver", "rack_straight_ahead")
@@ -85,7 +85,7 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
             check_subspace(model, settings.model_copy(update=wrong))
     nothing = np.zeros((1, 1, 4))
     edges, rank = np.array([0.0, 9.0]), np.array([2])
-    space = ProjectionWindows("coordinates", edges, np.zeros((1, 4)), nothing, nothing, rank)
+    space = ControlPeriods("coordinates", edges, np.zeros((1, 4)), nothing, nothing, rank)
     with pytest.raises(InputError, match=f"has no {lacking}"):
         model.integrate(QUIET, model.start(), space, Solver("dopri5", 1e-3))
     function = model.mass_matrix if lacking == "second_order" else model.speeds_of_rates
@@ -143,9 +143,9 @@ def test_a_cut_run_goes_on_as_the_uncut_one(name, maneuver):
     whole = model.simulate(maneuver, "dropped", tolerance=1e-8)
     scale = np.abs(whole.states).max(axis=0) + 1.0
     for sample in (0, 17, 50, 55, 60, 181, 250):
-        begin = float(whole.time[sample])
+        begin = float(whole.times[sample])
         later = model.simulate(maneuver, whole.states[sample], tolerance=1e-8, begin=begin)
-        np.testing.assert_array_equal(later.time, whole.time[sample:])
+        np.testing.assert_array_equal(later.times, whole.times[sample:])
         # Both runs are wrong by their tolerance a step, in hundreds of steps.
         assert np.abs((later.states - whole.states[sample:]) / scale).max() < 3e-5
 
@@ -158,8 +158,8 @@ def test_a_run_begins_within_its_maneuver_between_output_times_too():
     whole, begin = model.simulate(maneuver), 1.0137
     state = model.simulate(maneuver, times=[0.0, begin]).states[-1]
     later = model.simulate(maneuver, state, begin=begin)
-    np.testing.assert_array_equal(later.time, whole.time[whole.time > begin])
-    np.testing.assert_allclose(later.states, whole.states[-len(later.time) :], atol=1e-5)
+    np.testing.assert_array_equal(later.times, whole.times[whole.times > begin])
+    np.testing.assert_allclose(later.states, whole.states[-len(later.times) :], atol=1e-5)
     for wrong in (-0.1, 5.1, np.nan):
         with pytest.raises(InputError, match="begin"):
             model.simulate(maneuver, begin=wrong)

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import driven, maneuver
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
 from vehiclemor.inputs.piecewise import at
+from vehiclemor.inputs.polynomials import ACCURACY, recorded_inputs
+from vehiclemor.inputs.polynomials import signal_of as ready_signal_of
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.registry import component
-from vehiclemor.simulation.input_polynomials import ACCURACY, recorded_inputs
-from vehiclemor.simulation.input_polynomials import signal_of as ready_signal_of
-from vehiclemor.simulation.projection_windows import whole_space
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.system import Solver
 
 LANE_CHANGE = component("maneuver", "lane_change")

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.oracles import complex_step
 from vehiclemor.codegen.derivatives import Sensitivity
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 
@@ -33,7 +33,7 @@ def runs():
 @given(part=st.floats(0.3, 1.0), seed=st.integers(0, 2**32 - 1))
 def test_jacobians_are_those_of_the_complex_step(runs, name, of, by, part, seed):
     model, run = runs[name]
-    sample = round(part * (len(run.time) - 1))
+    sample = round(part * (len(run.times) - 1))
     x, u = run.states[sample], run.inputs[sample]
     source = model.equations.sources[FUNCTIONS[of]]
     place = ("state", "inputs").index(by)

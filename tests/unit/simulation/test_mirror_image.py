@@ -5,7 +5,7 @@ import pytest
 
 from vehiclemor.registry import component
 from vehiclemor.simulation import build
-from vehiclemor.simulation.mirror_image import mirror_blocks, partners, signs
+from vehiclemor.simulation.integrators.mirror_image import mirror_blocks, partners, signs
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 
@@ -26,8 +26,8 @@ def test_the_equations_are_their_own_mirror_image(name):
     run = model.simulate(maneuver, solver="ros34pw2", tolerance=1e-3)
     states, inputs = run.states[::50], run.inputs[::50]
     assert np.abs(inputs).max() > 0.0
-    rates = model.derivatives_at(states, inputs)
-    image = model.derivatives_at(np.ascontiguousarray(sign * states[:, system.partners]), -inputs)
+    rates = model.rhs_at(states, inputs)
+    image = model.rhs_at(np.ascontiguousarray(sign * states[:, system.partners]), -inputs)
     reflected = sign * image[:, system.partners]
     np.testing.assert_allclose(reflected, rates, atol=1e-8 * np.abs(rates).max())
 

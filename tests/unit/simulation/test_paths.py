@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reducing import fitted
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 

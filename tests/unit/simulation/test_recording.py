@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.errors import ConvergenceError, InputError
+from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.registry import component
 
 DYNAMIC = ("independent_suspension_vehicle", "high_fidelity_vehicle")
@@ -30,7 +30,7 @@ def test_one_output_is_that_of_all(name, solver):
     one, all_of_them = run(name, solver), run(name, solver)
     whole = all_of_them.outputs
     some = [*one.names[::3], one.model.coordinates[-1], one.model.speeds[0]]
-    chosen = all_of_them.chosen(some, times=one.time[5::100])
+    chosen = all_of_them.chosen(some, times=one.times[5::100])
     assert chosen.names == tuple(some)
     for column, quantity in enumerate(some):
         known = quantity in one.names
@@ -80,7 +80,7 @@ def test_from_where_a_run_has_left_the_model_on_there_are_no_numbers():
     finite = np.isfinite(found.states).all(axis=1)
     left = int(finite.argmin())
     assert 0 < left < len(finite)
-    assert f"{found.time[left]:.6g} s" in found.message
+    assert f"{found.times[left]:.6g} s" in found.message
     assert not finite[left:].any()
     assert np.isnan(found["yaw"][left:]).all()
     assert np.isfinite(found["yaw"][:left]).all()

@@ -10,11 +10,11 @@ import pytest
 from vehiclemor.codegen.loops import cache_lines
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.integrators.structures import NODE_1, NODE_2, Outputs
 from vehiclemor.simulation.paths import path_loops
-from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.simulation.workspaces import MOST_KINDS, Solver, Spare
+from vehiclemor.simulation.workspaces import MOST_KINDS, Pool, Solver
 
 CASES = {
     "independent_suspension_vehicle": ("ros34pw2", ("equilibrium", "dropped")),
@@ -86,7 +86,7 @@ def test_a_run_keeps_its_path_until_it_gives_it_back():
 
 
 def test_spare_spaces_are_found_by_kind_and_are_few():
-    spare: Spare[list] = Spare()
+    spare: Pool[list] = Pool()
     mine = spare.taken("a", list)
     spare.give_back("a", mine)
     assert spare.taken("b", list) is not mine

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vehiclemor.errors import GeometryError
+from vehiclemor.exceptions import GeometryError
 from vehiclemor.parameters import Declared, point
 
 # Hard points at the design position, left side.

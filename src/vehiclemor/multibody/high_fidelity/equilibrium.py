@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import GeometryError
+from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.definition import Derivative
 from vehiclemor.multibody.double_wishbone.points import POINTS, check_linkage, tie_rod_angles
 from vehiclemor.multibody.vehicle_parameters import check_moments

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import GeometryError
+from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.independent_suspension.quantities import COORDINATES, FRONT, SPEEDS
 from vehiclemor.multibody.vehicle_parameters import check_moments
 

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.errors import ConvergenceError
+from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost, Presets
 from vehiclemor.reduction.reduced_system import ReducedMechanism, ReducedSystem
@@ -20,10 +20,10 @@ from vehiclemor.reduction.settings import (
 )
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
+from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -100,7 +100,7 @@ class FullOrderSystem(FullOrder, ReducedSystem):
         return self.model.system
 
     @cached_property
-    def spaces(self) -> ProjectionWindows:
+    def spaces(self) -> ControlPeriods:
         """The whole space."""
         return whole_space(2 * len(self.model.coordinates))
 

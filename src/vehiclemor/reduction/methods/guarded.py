@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import FitOther, FittedModel, Method, OfflineCost, simulated
 from vehiclemor.reduction.settings import OnlineSettings, Settings, Solver, Tolerance

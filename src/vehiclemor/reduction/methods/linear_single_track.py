@@ -71,8 +71,8 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
     c = np.zeros((len(terms), 3 + PLANAR))
     c[[3, 4], :2], c[2, :2], c[5, 0] = tire.T, condensed[:, 2], -1.0
     c[1, 3], c[6, 4], c[0, 5] = 1.0, 1.0, 1.0
-    lifting = np.zeros((len(terms), len(shape.reference)))
-    lifting[:3], lifting[7] = follow.T, modes.speed_right
+    decoding = np.zeros((len(terms), len(shape.reference)))
+    decoding[:3], decoding[7] = follow.T, modes.speed_right
     turn = CORNERING / shape.speed
     return ReducedVehicle(
         model,
@@ -80,7 +80,7 @@ def fit(model: DynamicModel, training: Training, settings: OnlineSettings) -> Re
         features,
         np.array([shape.speed]),
         c,
-        lifting,
+        decoding,
         np.vstack([np.eye(len(linear.a))[kept], modes.speed_left]),
         np.zeros((3, inputs)),
         np.array([MARGIN * SIDEWARD, MARGIN * turn, SPEED, HEADING, PLACE, PLACE]),

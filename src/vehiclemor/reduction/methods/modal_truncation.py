@@ -21,7 +21,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
@@ -134,13 +134,13 @@ def fit(
     # The vehicle is its own mirror image: the speed moves nothing sideways, steering changes no U.
     groups = ((tuple(odd), (*range(k), k + 1, k + 3)), (tuple(even), (k, k + 2)))
     features = listing.features(terms, groups)
-    lifting = np.zeros((len(features.terms), len(linear.a)))
-    lifting[odd] = np.vstack([lateral.right.T, lateral.follow.T])
-    lifting[k + 1] = modes.speed_right
+    decoding = np.zeros((len(features.terms), len(linear.a)))
+    decoding[odd] = np.vstack([lateral.right.T, lateral.follow.T])
+    decoding[k + 1] = modes.speed_right
     c = np.zeros((len(features.terms), k + 4))
     c[odd[: k + 1], :k] = np.vstack([lateral.a.T, lateral.b])
     for column, row in ((k + 1, 0), (k + 3, 2)):
-        c[odd, column] = lifting[odd] @ linear.motion_a[row]
+        c[odd, column] = decoding[odd] @ linear.motion_a[row]
         c[odd[k:], column] += linear.motion_b[row]
     c[even, k + 2] = shape.speed, 1.0
     return ReducedVehicle(
@@ -149,7 +149,7 @@ def fit(
         features,
         np.zeros(0),
         c,
-        lifting,
+        decoding,
         np.vstack([lateral.left, modes.speed_left]),
         np.vstack([lateral.feedthrough, np.zeros(inputs)]),
         np.concatenate([error_scale(shape, lateral), [SPEED, HEADING, PLACE, PLACE]]),

@@ -22,7 +22,7 @@ from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
 from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value
 from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.errors import InputError, UnreachableError
+from vehiclemor.exceptions import InputError, UnreachableError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.map_loops import REPORTED, Cells
@@ -33,10 +33,10 @@ from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.newton_loops import Samples
+from vehiclemor.simulation.newton.newton_loops import Samples
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
-from vehiclemor.simulation.workspaces import Spare
+from vehiclemor.simulation.workspaces import Pool
 from vehiclemor.sizes import apart, require, shaped, within
 
 # Above this degree, powers lose digits to rounding.
@@ -80,7 +80,7 @@ def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -
 def map_loop(inputs: int, moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> Loop:
     """Compiled loop of polynomials of that total degree in those of the inputs that move."""
     sizes = {"INPUTS": inputs, "QUANTITIES": len(columns)}
-    modules = "simulation.newton_loops", "reduction.map_loops"
+    modules = "simulation.newton.newton_loops", "reduction.map_loops"
     kernels = {"polynomials": map_kernel(moving, degree, columns)}
     return loops(modules, ("map_path",), kernels, sizes)["map_path"]
 
@@ -148,8 +148,8 @@ class PathMapModel(ReducedMechanism):
         return map_loop(len(self.ranges), self.moving, self.degree, self.columns)
 
     @cached_property
-    def _spare(self) -> Spare[Prepared]:
-        return Spare()
+    def _pool(self) -> Pool[Prepared]:
+        return Pool()
 
     def _packed(self, given: Ready, size: int) -> Prepared:
         """The loop for some inputs, to be given space of that size."""
@@ -185,7 +185,7 @@ class PathMapModel(ReducedMechanism):
         moved = table[: len(self.model.coordinates)]
         if of == "coordinates":
             return moved
-        own, slopes = (self.model.derivatives(of, state, inputs, by) for by in ("inputs", "state"))
+        own, slopes = (self.model.jacobian_of(of, state, inputs, by) for by in ("inputs", "state"))
         return own + slopes @ moved
 
     def _evaluated(self, times: np.ndarray, inputs: np.ndarray, given: Ready) -> Trajectory:
@@ -193,10 +193,10 @@ class PathMapModel(ReducedMechanism):
         model, samples = self.model, len(times)
         size = samples * len(self.columns)
         space = np.empty(size + REPORTED + inputs.shape[1])
-        call = self._spare.taken(given, lambda: self._packed(given, len(space)))
+        call = self._pool.taken(given, lambda: self._packed(given, len(space)))
         call.words[call.address("space")] = address_of_array(space)
         _, seconds = timed(call)
-        self._spare.give_back(given, call)
+        self._pool.give_back(given, call)
         table = space[:size].reshape(samples, -1)
         indicator, left = space[size : size + REPORTED].tolist()
         status, message, until, reason = "ok", "", np.inf, ""
@@ -209,7 +209,7 @@ class PathMapModel(ReducedMechanism):
                 table[left:] = np.nan
         n = len(model.coordinates)
         return Trajectory.of(
-            time=times,
+            times=times,
             inputs=inputs,
             coordinates=table[:, :n],
             speeds=table[:, :0],

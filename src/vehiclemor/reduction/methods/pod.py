@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, create_model
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import FittedModel, Method
 from vehiclemor.reduction.projection import algebraic, dynamic
 from vehiclemor.reduction.projection.bases import Snapshots, window_edges

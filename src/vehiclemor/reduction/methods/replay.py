@@ -49,17 +49,17 @@ class ReplayModel(ShortRepr):
         self.model.start(start)
         times = maneuver.times
         inputs = maneuver.at(times)
-        alike = [run for run in self.recorded if np.array_equal(run.time, times)]
+        alike = [run for run in self.recorded if np.array_equal(run.times, times)]
         nearest = min(alike or self.recorded, key=lambda run: _distance(run, times, inputs))
         if not alike:
             nearest = replace(
                 nearest,
-                coordinates=_resampled(nearest.time, nearest.coordinates, times),
-                speeds=_resampled(nearest.time, nearest.speeds, times),
+                coordinates=_resampled(nearest.times, nearest.coordinates, times),
+                speeds=_resampled(nearest.times, nearest.speeds, times),
             )
         return replace(
             nearest,
-            time=times,
+            times=times,
             inputs=inputs,
             outputs=self.model.outputs_at(nearest.states, inputs),
             counts=dict.fromkeys(self.model.counts, 0),
@@ -73,8 +73,8 @@ class ReplayModel(ShortRepr):
 
 def _distance(run: Trajectory, times: np.ndarray, inputs: np.ndarray) -> float:
     """Mean square of the difference of the inputs over the time that both cover."""
-    shared = times <= run.time[-1]
-    difference = _resampled(run.time, run.inputs, times[shared]) - inputs[shared]
+    shared = times <= run.times[-1]
+    difference = _resampled(run.times, run.inputs, times[shared]) - inputs[shared]
     return float(np.mean(difference**2))
 
 

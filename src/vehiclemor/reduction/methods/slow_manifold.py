@@ -171,7 +171,7 @@ def _fitted_on_rates(
         modes.input_shift,
         np.concatenate([3.0 * scale, ABSOLUTE]),
         transient=modes.symmetric,
-        lifted_features=made.of_terms(decoded, sum(term in odd for term in decoded)),
+        decoded_features=made.of_terms(decoded, sum(term in odd for term in decoded)),
     )
 
 
@@ -187,20 +187,20 @@ def _with_decoding(
     Where one of these fails it is to where the training runs are.  Of what the mirror reverses only
     odd terms tell, of the rest only even ones.
     """
-    features, states = reduced.lifted_features, reduced.features.states
+    features, states = reduced.decoded_features, reduced.features.states
     assert features is not None
     paths = [reduced.path(run.maneuver, run.start) for run in training]
     parts = [
-        reduced.encoded_path(true.states, true.inputs) if path is None else path[-len(true.time) :]
+        reduced.encoded_path(true.states, true.inputs) if path is None else path[-len(true.times) :]
         for path, true in zip(paths, settled, strict=True)
     ]
     z = np.ascontiguousarray(np.concatenate(parts)[:, :states])
     columns = feature_columns(features, z, samples.inputs, reduced.parameters)
-    lifting, image = reduced.lifting.copy(), samples.deviations @ reduced.shape.mirror.T
+    decoding, image = reduced.decoding.copy(), samples.deviations @ reduced.shape.mirror.T
     for (terms, _), sign in zip(features.groups, (-1, 1), strict=True):
         values = 0.5 * (samples.deviations + sign * image)
-        lifting[list(terms)] = ridge_fit(columns[:, list(terms)], values, ridge)
-    return replace(reduced, lifting=lifting)
+        decoding[list(terms)] = ridge_fit(columns[:, list(terms)], values, ridge)
+    return replace(reduced, decoding=decoding)
 
 
 METHOD = Method(

@@ -9,7 +9,7 @@ sizes.
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
-from vehiclemor.simulation.newton_loops import (
+from vehiclemor.simulation.newton.newton_loops import (
     CONVERGED,
     INPUTS,
     SAMPLE,

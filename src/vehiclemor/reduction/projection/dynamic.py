@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
@@ -31,11 +31,11 @@ from vehiclemor.reduction.projection.bases import (
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import ProjectedSolver, Settings, Tolerance
 from vehiclemor.reduction.training import Training
+from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.loop import scratch_end
 from vehiclemor.simulation.integrators.structures import Place
-from vehiclemor.simulation.projection_windows import ProjectionWindows
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 from vehiclemor.simulation.workspaces import Solver
@@ -105,7 +105,7 @@ class DynamicProjection(ReducedSystem):
     """
 
     model: DynamicModel
-    spaces: ProjectionWindows
+    spaces: ControlPeriods
     offline: OfflineCost
     solver: str
     tolerance: float
@@ -174,7 +174,7 @@ class DynamicProjection(ReducedSystem):
             return mean + (states - mean) @ test[:rank].T @ trial[:rank]
         trial, test = trial[: rank // 2, :n], test[: rank // 2, :n]
         inputs = np.zeros((len(states), len(self.model.inputs)))
-        rates = self.model.derivatives_at(states, inputs)[:, :n]
+        rates = self.model.rhs_at(states, inputs)[:, :n]
         result = np.empty_like(states)
         result[:, :n] = mean[:n] + (states[:, :n] - mean[:n]) @ test.T @ trial
         result[:, n:] = rates @ test.T @ trial
@@ -197,7 +197,7 @@ class DynamicProjection(ReducedSystem):
             if spaces.formulation == "coordinates":
                 # Rates are coordinates of their own, and the test basis has nothing of speeds.
                 rank, no_input = spaces.ranks[k] // 2, np.zeros((1, len(model.inputs)))
-                (of_mean,) = model.derivatives_at(spaces.means[k : k + 1], no_input)
+                (of_mean,) = model.rhs_at(spaces.means[k : k + 1], no_input)
                 of_mean[len(model.coordinates) :] = 0.0
                 y[rank:] = spaces.test_basis[k, :rank, :] @ of_mean
             rates[k] = np.linalg.eigvals(self.reduced_jacobian(k, y)).real.max()
@@ -263,7 +263,7 @@ def _spaces(
     means: np.ndarray,
     bases: Sequence[Basis],
     how: tuple[np.ndarray, str],
-) -> ProjectionWindows:
+) -> ControlPeriods:
     """Subspaces around the means (windows, 2 n), by a weight and a formulation, for the loops."""
     (weight, formulation), n, windows = how, len(model.coordinates), len(bases)
     rows = max(basis.rank for basis in bases) * (2 if formulation == "paired" else 1)
@@ -280,7 +280,7 @@ def _spaces(
             trial[k, r : 2 * r, n:], test[k, r : 2 * r, n:] = up @ turn.T, down @ back
         ranks[k] = r if formulation == "state" else 2 * r
     form = "coordinates" if formulation == "coordinates" else "state"
-    return ProjectionWindows(form, edges, means, trial, test, ranks)
+    return ControlPeriods(form, edges, means, trial, test, ranks)
 
 
 def speeds_per_rates(model: DynamicModel) -> np.ndarray:

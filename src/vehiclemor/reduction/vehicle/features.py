@@ -225,7 +225,7 @@ def columns_kernel(features: Features) -> Kernel:
     return _kernel(listing, "columns")
 
 
-def lifting_kernel(features: Features, layout: Layout, parameters: int, modes: int) -> Kernel:
+def decoding_kernel(features: Features, layout: Layout, parameters: int, modes: int) -> Kernel:
     """What gives full states, and after them what is watched.
 
     Constants are the features' parameters, then rows of coefficients: of the terms, of the shape at

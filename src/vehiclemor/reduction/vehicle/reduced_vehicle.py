@@ -7,10 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
 from vehiclemor.reduction.trust import trust_of
+from vehiclemor.reduction.vehicle.decoding import NO_TRANSIENT, Decoding, Transient, decayed
 from vehiclemor.reduction.vehicle.features import (
     PLANAR,
     Features,
@@ -18,13 +21,10 @@ from vehiclemor.reduction.vehicle.features import (
     feature_system,
     needed_parameters,
 )
-from vehiclemor.reduction.vehicle.lifting import NO_TRANSIENT, Lifting, Transient, decayed
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach
+from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.input_polynomials import recorded_inputs
-from vehiclemor.simulation.maneuver_checks import checked_maneuver
-from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.sizes import require, shaped
@@ -59,7 +59,7 @@ class ReducedVehicle(ReducedSystem):
         Features of the equations and the parameters in their text.
     coefficients
         C (terms, states + 3) of the equations.
-    lifting
+    decoding
         Coefficients (terms, n) of the deviation of the shape from straight running.
     encoding
         Reduced coordinates per deviation of the shape (states, n).
@@ -68,9 +68,9 @@ class ReducedVehicle(ReducedSystem):
     error_scale
         Magnitude of each reduced state (states + 3,) below which its error counts absolutely.
     transient
-        What is added to the lifted shapes.
-    lifted_features
-        Features of the lifting, with the same parameters, if not those of the equations.
+        What is added to the decoded shapes.
+    decoded_features
+        Features of the decoding, with the same parameters, if not those of the equations.
     reach
         What the training runs have shown of durations and starts.
 
@@ -82,7 +82,7 @@ class ReducedVehicle(ReducedSystem):
     features: Features
     parameters: np.ndarray
     coefficients: np.ndarray
-    lifting: np.ndarray
+    decoding: np.ndarray
     encoding: np.ndarray
     feedthrough: np.ndarray
     error_scale: np.ndarray
@@ -90,29 +90,29 @@ class ReducedVehicle(ReducedSystem):
     solver: str = "dopri5"
     tolerance: float = 1e-6
     transient: Transient = NO_TRANSIENT
-    lifted_features: Features | None = None
+    decoded_features: Features | None = None
     reach: TrainingReach = NOTHING_KNOWN
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if kernels would read or write beyond these arrays."""
-        own, lifted, reach = self.features, self.lifted_features or self.features, self.reach
+        own, decoded, reach = self.features, self.decoded_features or self.features, self.reach
         k, n, inputs = own.states, len(self.shape.kept), len(self.model.inputs)
-        require((own.inputs, lifted.inputs, lifted.states) == (inputs, inputs, k), "features")
+        require((own.inputs, decoded.inputs, decoded.states) == (inputs, inputs, k), "features")
         shaped("parameters", (self.parameters, len(self.parameters)))
-        needed = max(needed_parameters(own), needed_parameters(lifted))
+        needed = max(needed_parameters(own), needed_parameters(decoded))
         require(len(self.parameters) >= needed, "parameters")
         shaped("coefficients", (self.coefficients, len(own.terms), k + PLANAR))
-        shaped("lifting", (self.lifting, len(lifted.terms), n))
+        shaped("decoding", (self.decoding, len(decoded.terms), n))
         shaped("encoding", (self.encoding, k, n), (self.feedthrough, k, inputs))
         shaped("error_scale", (self.error_scale, k + PLANAR))
         modes = len(self.transient.rates)
         require(not modes or self.transient.left.shape[1:] == (n,), "transient")
         require(modes <= n, "modes")
         require(reach.inputs.shape[1] in (0, inputs), "reach")
-        require(0 <= own.lateral == lifted.lateral <= len(lifted.watched), "lateral")
+        require(0 <= own.lateral == decoded.lateral <= len(decoded.watched), "lateral")
         if len(reach.lasted):
             known = len(reach.lasted), len(reach.decaying), len(reach.left)
-            require(known == (2 * lifted.lateral, modes, n), "lasted")
+            require(known == (2 * decoded.lateral, modes, n), "lasted")
 
     @property
     def order(self) -> int:
@@ -137,7 +137,7 @@ class ReducedVehicle(ReducedSystem):
         return feature_system(self.features, *arrays, np.zeros(self.features.states))
 
     @property
-    def spaces(self) -> ProjectionWindows:
+    def spaces(self) -> ControlPeriods:
         """The whole space of the reduced states."""
         return whole_space(self.order)
 
@@ -152,18 +152,18 @@ class ReducedVehicle(ReducedSystem):
         return self._decoded(states, inputs)[:, : 2 * len(self.model.coordinates)]
 
     def _decoded(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        return self.lift.states(np.zeros(len(states)), states, inputs, NOTHING_EXCITED)[0]
+        return self.decoder.states(np.zeros(len(states)), states, inputs, NOTHING_EXCITED)[0]
 
     def decoder_slopes(
         self, state: np.ndarray, inputs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the full state by the reduced one and by the inputs."""
-        return self.lift.slopes(state, inputs)
+        return self.decoder.slopes(state, inputs)
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
         """Of states one by one: they tell neither how long a run has lasted nor of its start."""
-        names = [name for _, name in self.lift.features.watched]
-        used = self._decoded(states, inputs)[:, self.lift.layout.size :]
+        names = [name for _, name in self.decoder.features.watched]
+        used = self._decoded(states, inputs)[:, self.decoder.layout.size :]
         return trust_of(np.zeros(len(states)), used, names) if names else None
 
     def encode(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -178,11 +178,11 @@ class ReducedVehicle(ReducedSystem):
         return np.hstack([z, states[:, [heading, x, y]]])
 
     @cached_property
-    def lift(self) -> Lifting:
+    def decoder(self) -> Decoding:
         """The compiled way back to full states."""
-        shape, features = self.shape, self.lifted_features or self.features
-        of_shape = self.lifting, shape.reference, shape.layout
-        return Lifting(features, self.parameters, *of_shape, self.transient, self.reach)
+        shape, features = self.shape, self.decoded_features or self.features
+        of_shape = self.decoding, shape.reference, shape.layout
+        return Decoding(features, self.parameters, *of_shape, self.transient, self.reach)
 
     def path(
         self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None
@@ -196,11 +196,11 @@ class ReducedVehicle(ReducedSystem):
     def simulate(
         self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
-        """Integrate the reduced equations, then lift to states at the maneuver's output times."""
+        """Integrate the reduced equations, then decode states at the maneuver's output times."""
         maneuver, inputs, driven = self._driven(maneuver)
         known = self.known(start, inputs[0])
         run = self.run(maneuver, known.encoded, direct_until=known.until)
-        states, trust = self.lift.of_run(run, inputs, known.excited, (*known.told, *driven))
+        states, trust = self.decoder.of_run(run, inputs, known.excited, (*known.told, *driven))
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state
@@ -219,16 +219,16 @@ class ReducedVehicle(ReducedSystem):
         return lru_cache(MOST_STARTS)(made)
 
     def excited(self, state: np.ndarray) -> np.ndarray:
-        """What of the transient a full state excites, see `Lifting.excited`."""
-        return self.lift.excited(self.shape.of(state[None])[0] - self.shape.reference)
+        """What of the transient a full state excites, see `Decoding.excited`."""
+        return self.decoder.excited(self.shape.of(state[None])[0] - self.shape.reference)
 
     def remainder(
         self, states: np.ndarray, inputs: np.ndarray, excited: np.ndarray = NOTHING_EXCITED
     ) -> np.ndarray:
         """What of the shapes (samples, n) of full states their own reduced states don't give."""
         path = self.encoded_path(states, inputs)
-        lifted, _ = self.lift.states(np.zeros(len(path)), path, inputs, excited)
-        return self.shape.of(states) - self.shape.of(lifted[:, : states.shape[1]])
+        decoded, _ = self.decoder.states(np.zeros(len(path)), path, inputs, excited)
+        return self.shape.of(states) - self.shape.of(decoded[:, : states.shape[1]])
 
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
         """Reduced state of a start."""

@@ -20,7 +20,7 @@ from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.vehicle.features import Layout
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.mirror_image import partners
+from vehiclemor.simulation.integrators.mirror_image import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -125,7 +125,7 @@ class VehicleShape:
     def motion(self, shapes: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rates of the shapes (samples, n), and psi', U, V (samples, 3), by the full equations."""
         states = self.states(shapes, np.zeros((len(shapes), 3)))
-        rates = self.model.derivatives_at(states, inputs)
+        rates = self.model.rhs_at(states, inputs)
         x, y, heading = self.model.planar
         turn = rates[:, heading]
         for a, b in self.pairs:

@@ -18,6 +18,7 @@ import numpy as np
 from vehiclemor.codegen.operations import Value
 from vehiclemor.multibody.components.tire_coefficients import FIALA
 from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.reduction.vehicle.decoding_loops import MOVING
 from vehiclemor.reduction.vehicle.features import (
     FeatureListing,
     Features,
@@ -26,7 +27,6 @@ from vehiclemor.reduction.vehicle.features import (
     monomials,
     product,
 )
-from vehiclemor.reduction.vehicle.lifting_loops import MOVING
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.lifting import Transient
+from vehiclemor.reduction.vehicle.decoding import Transient
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 # Modes that steering moves by less than this (relative) are symmetric: they don't steer.

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import extent_of
 from vehiclemor.reduction.trust import inputs_beyond
-from vehiclemor.reduction.vehicle.lifting_loops import LEVELS, MOVING, PARTS, STILL
-from vehiclemor.simulation.input_polynomials import extent_of
+from vehiclemor.reduction.vehicle.decoding_loops import LEVELS, MOVING, PARTS, STILL
 from vehiclemor.sizes import shaped
 
 # A run may last so many times as long as any training run, and this (s) where none has been.
@@ -58,7 +58,7 @@ class TrainingReach:
         When (s) known starts that excite modes were steered first, 0 if none was, and their
         amplitudes (modes,).
     left
-        What lifting leaves of the states of the shape (n,).
+        What decoding leaves of the states of the shape (n,).
     starts, begun
         Directions (m, n), in parts of `left`, in which known starts leave more, and how far.
     inputs
@@ -92,7 +92,7 @@ class TrainingReach:
         return used, np.inf if used <= 1.0 else inputs_beyond(maneuver, self.inputs).min()
 
     def settled(self, excited: np.ndarray) -> float:
-        """Time in s from which on a start's transient, as `Lifting.excited` gives it, is known."""
+        """Time in s from which on a start's transient, as `Decoding.excited` gives it, is known."""
         rates, amplitudes = excited
         if not len(rates) or not len(self.decaying):
             return 0.0
@@ -116,7 +116,7 @@ class TrainingReach:
 
 
 def known_starts(remainders: np.ndarray, left: np.ndarray) -> dict[str, np.ndarray]:
-    """`starts` and `begun` of starts of which lifting leaves so much (starts, n)."""
+    """`starts` and `begun` of starts of which decoding leaves so much (starts, n)."""
     scaled = remainders / left
     _, sizes, directions = np.linalg.svd(scaled, full_matrices=False)
     directions = directions[sizes > UNLIKE]

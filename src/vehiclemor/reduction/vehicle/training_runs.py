@@ -12,8 +12,8 @@ import numpy as np
 
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.trust import largest_inputs
-from vehiclemor.reduction.vehicle.lifting import ROUNDING, Transient
-from vehiclemor.reduction.vehicle.lifting_loops import MOVING
+from vehiclemor.reduction.vehicle.decoding import ROUNDING, Transient
+from vehiclemor.reduction.vehicle.decoding_loops import MOVING
 from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_modes import SlowModes
@@ -47,7 +47,7 @@ def after_transient(transient: Transient, shape: VehicleShape, run: Trajectory) 
     deviation = shape.of(run.states[:1])[0] - shape.reference
     if np.abs(transient.left @ deviation).max(initial=0.0) < STILL:
         return run
-    later = run.time > 2.0 * LANDED
+    later = run.times > 2.0 * LANDED
     return replace(run, **{name: getattr(run, name)[later] for name in PATHS})
 
 
@@ -65,13 +65,13 @@ def with_transients(
     # Another speed excites nothing.
     starts, changes = [modes.speed_right], [np.zeros(len(seeing), dtype=complex)]
     for run in runs:
-        steered = run.time[run.inputs.any(axis=1)]
-        still = (run.time >= LANDED) & (run.time < np.append(steered, LONGEST)[0])
+        steered = run.times[run.inputs.any(axis=1)]
+        still = (run.times >= LANDED) & (run.times < np.append(steered, LONGEST)[0])
         if not still.any():
             continue
         start = shape.of(run.states[:1])[0] - shape.reference
         seen = (shape.of(run.states[still]) - shape.reference) @ seeing.T
-        moves = np.vstack([expm(rates * time) for time in run.time[still]])
+        moves = np.vstack([expm(rates * time) for time in run.times[still]])
         starts.append(start)
         changes.append(np.linalg.lstsq(moves, seen.ravel())[0] - seeing @ start)
     change = (np.linalg.pinv(np.array(starts), rcond=RANK) @ np.array(changes)).T
@@ -94,23 +94,23 @@ def training_reach(
         path = reduced.path(given.maneuver, given.start)
         if path is None:
             return NOTHING_KNOWN
-        sizes = reduced.lift.states(run.time, path, run.inputs, NOTHING_EXCITED)[0]
+        sizes = reduced.decoder.states(run.times, path, run.inputs, NOTHING_EXCITED)[0]
         sizes = np.abs(sizes[:, shape.layout.size :])[:, :lateral]
-        lasted.append(durations(run.time, sizes)[-1])
+        lasted.append(durations(run.times, sizes)[-1])
         sideways.append(float(sizes[0].max(initial=0.0)))
         excited = reduced.excited(run.states[0])
-        at = run.time[(sizes > MOVING).any(axis=1)]
+        at = run.times[(sizes > MOVING).any(axis=1)]
         if excited.size and len(at):
             faded.append(float(at[0]))
             amplitudes.append(np.hypot(*excited[1].T))
         later = after_transient(transient, shape, run)
-        moving = (sizes[-len(later.time) :] > MOVING).any(axis=1)
+        moving = (sizes[-len(later.times) :] > MOVING).any(axis=1)
         deviations = shape.of(later.states) - shape.reference
         decaying.append(np.abs(deviations[moving] @ transient.left.T).max(axis=0, initial=0.0))
         left.append(np.abs(reduced.remainder(later.states, later.inputs)).max(axis=0))
         starts.append(reduced.remainder(run.states[:1], run.inputs[:1], excited)[0])
     leaves, steered = np.max(left, axis=0), np.max(decaying, axis=0)
-    lasted, longest = np.max(lasted, axis=0), max(run.time[-1] for run in runs)
+    lasted, longest = np.max(lasted, axis=0), max(run.times[-1] for run in runs)
     # A little may last as long as any run does, and no longer.
     lasted[:lateral, 0], lasted[lateral:, 0] = longest, longest**2
     amplitudes = np.max(amplitudes or [np.zeros_like(steered)], axis=0)

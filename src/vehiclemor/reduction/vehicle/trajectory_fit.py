@@ -77,7 +77,7 @@ def targets_of(
         last = len(z) - 1
         rest = int(restless[-1]) if len(restless) else 0
         steps = [*range(0, rest, STRIDE), *range(rest, last, LONG_STRIDE), last]
-        result.append(Target(run, true.time, true.inputs, states, np.array(steps)))
+        result.append(Target(run, true.times, true.inputs, states, np.array(steps)))
     return result
 
 

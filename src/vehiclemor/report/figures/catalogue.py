@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from pydantic import Field
 
 from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.registry import component, names, unknown

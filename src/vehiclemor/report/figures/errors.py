@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.runs import legend_of

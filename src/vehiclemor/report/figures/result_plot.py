@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 from vehiclemor.report.figures.errors import figure_errors
 from vehiclemor.report.figures.runs import figure_histories, figure_paths

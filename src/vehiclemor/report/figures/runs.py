@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.theme import CROSS, FULL, Results, Style, hide_rounding, tick_decades

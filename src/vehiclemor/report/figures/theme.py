@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
 from vehiclemor.arguments import count, quoted
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.files import write_whole
 from vehiclemor.report.labels import MARK, TRAINED
 from vehiclemor.study.plans.study_file import FACTORS, PARAMETER

@@ -1,6 +1,7 @@
 """What the integrators see of a system: the full state, or its projection on a subspace.
 
-Each formulation gives `rhs`, `lift`, `project` and `error_norm`, compiled with the one time loop.
+Each formulation gives `rhs`, `reconstruct`, `project` and `error_norm`, compiled with the one time
+loop.
 """
 
 # Formulation -> kernels that it calls; a kernel of whole steps may come besides.

@@ -7,7 +7,7 @@ basis are V^T, those of the test basis its left inverse.
 import math
 
 from vehiclemor.codegen.loop_types import call_kernel
-from vehiclemor.simulation.formulations.inputs import input_at
+from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.integrators.structures import (
     DERIVATIVE,
     RHS_CALLS,
@@ -15,14 +15,14 @@ from vehiclemor.simulation.integrators.structures import (
     SPEEDS,
 )
 
-INLINED = ("rhs", "lift", "positions_and_rates", "galerkin", "product")
+INLINED = ("rhs", "reconstruct", "positions_and_rates", "galerkin", "product")
 
 
 def rhs(problem, t, y, dy):
     """Right-hand side at time t into dy (dim,)."""
     equations, r = problem.equations, len(y) // 2
     input_at(problem, t, problem.u)
-    lift(problem, y, problem.x)
+    reconstruct(problem, y, problem.x)
     call_kernel(
         equations.kernels,
         SECOND_ORDER,
@@ -37,7 +37,7 @@ def rhs(problem, t, y, dy):
         dy[r + j] = problem.small[j, r]
 
 
-def lift(problem, y, x):
+def reconstruct(problem, y, x):
     """State x (n,) of reduced coordinates y (dim,)."""
     equations, n = problem.equations, len(x) // 2
     positions_and_rates(problem, y, x)

@@ -1,11 +1,11 @@
 """The full system: y is the state x = (coordinates, speeds), dy = f(x, u)."""
 
 from vehiclemor.codegen.loop_types import call_kernel
-from vehiclemor.simulation.formulations.inputs import input_at
+from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.integrators.structures import DERIVATIVE
 
 # One place in each integrator calls it for all stages of a step.
-INLINED = ("rhs", "lift")
+INLINED = ("rhs", "reconstruct")
 
 
 def rhs(problem, t, y, dy):
@@ -15,7 +15,7 @@ def rhs(problem, t, y, dy):
     call_kernel(equations.kernels, DERIVATIVE, y, problem.u, equations.constants, dy)
 
 
-def lift(problem, y, x):
+def reconstruct(problem, y, x):
     """State x (n,) of reduced coordinates y (dim,)."""
     for i in range(len(x)):
         x[i] = y[i]

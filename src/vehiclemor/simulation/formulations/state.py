@@ -4,17 +4,17 @@ The rows of the trial basis are V^T, those of the test basis W.
 """
 
 from vehiclemor.codegen.loop_types import call_kernel
-from vehiclemor.simulation.formulations.inputs import input_at
+from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.integrators.structures import DERIVATIVE
 
-INLINED = ("rhs", "lift")
+INLINED = ("rhs", "reconstruct")
 
 
 def rhs(problem, t, y, dy):
     """Right-hand side at time t into dy (dim,)."""
     x, dx, test, equations = problem.x, problem.dx, problem.test, problem.equations
     input_at(problem, t, problem.u)
-    lift(problem, y, x)
+    reconstruct(problem, y, x)
     call_kernel(equations.kernels, DERIVATIVE, x, problem.u, equations.constants, dx)
     for j in range(len(y)):
         total = 0.0
@@ -23,7 +23,7 @@ def rhs(problem, t, y, dy):
         dy[j] = total
 
 
-def lift(problem, y, x):
+def reconstruct(problem, y, x):
     """State x (n,) of reduced coordinates y (dim,)."""
     mean, trial = problem.mean, problem.trial
     for i in range(len(x)):

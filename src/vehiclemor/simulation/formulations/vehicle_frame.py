@@ -5,11 +5,11 @@ turned by a right angle).  A model in which nothing turns stays as it is.
 """
 
 from vehiclemor.codegen.loop_types import call_kernel
-from vehiclemor.simulation.formulations.inputs import input_at
+from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.integrators.step_grid import heading_of, rotate
 from vehiclemor.simulation.integrators.structures import DERIVATIVE
 
-INLINED = ("rhs", "lift")
+INLINED = ("rhs", "reconstruct")
 
 
 def rhs(problem, t, y, dy):
@@ -32,7 +32,7 @@ def rhs(problem, t, y, dy):
         dy[turning[k + 1]] -= rate * y[turning[k]]
 
 
-def lift(problem, y, x):
+def reconstruct(problem, y, x):
     """State x (n,) of the transformed one y (n,)."""
     turning = problem.equations.turning
     for i in range(len(x)):

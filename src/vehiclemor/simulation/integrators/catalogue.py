@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.codegen.operations import Kernel
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.progress import first_use
 from vehiclemor.registry import choice
 from vehiclemor.simulation.formulations import FORMULATIONS
@@ -231,9 +231,10 @@ def control_of(name: str, tolerance: float, longest: float) -> Ready:
 
 def _problem_modules(formulation: str) -> tuple[str, ...]:
     # What a formulation doesn't say is as of the full system.
-    own = dict.fromkeys(("inputs", "full", formulation))
+    own = dict.fromkeys(("full", formulation))
     return (
         "simulation.integrators.structures",
+        "inputs.polynomial_loops",
         *(f"simulation.formulations.{name}" for name in own),
     )
 
@@ -272,7 +273,8 @@ def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, whole_steps:
 
 # All source that a run may be compiled from.
 LOOP_SOURCES = (
-    *(f"simulation.formulations.{name}" for name in ("inputs", *FORMULATIONS)),
+    "inputs.polynomial_loops",
+    *(f"simulation.formulations.{name}" for name in FORMULATIONS),
     *(
         f"simulation.integrators.{name}"
         for own in INTEGRATORS.values()

@@ -1,15 +1,16 @@
 """The one time loop: spans and windows, samples, limits, step sizes.
 
 An integrator gives `work_space`, `begin`, `longest_step`, `step`, `accept`, `prepare_curve` and
-`interpolate`, a formulation `rhs`, `lift`, `project` and `error_norm`: they are compiled together.
+`interpolate`, a formulation `rhs`, `reconstruct`, `project` and `error_norm`: they are compiled
+together.
 """
 
 import math
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
+from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.inputs.sample_loops import Pieces
-from vehiclemor.simulation.formulations.full import error_norm, lift, project, rhs
-from vehiclemor.simulation.formulations.inputs import input_at
+from vehiclemor.simulation.formulations.full import error_norm, project, reconstruct, rhs
 from vehiclemor.simulation.integrators.dopri5 import (
     accept,
     begin,
@@ -88,7 +89,7 @@ def integrate(
         if entered:
             project(problem, t, x, work.y, counts)
             while sample < len(samples) and samples[sample] <= t + 1e-12 * (1.0 + abs(t)):
-                lift(problem, work.y, path[next_point(output, sample)])
+                reconstruct(problem, work.y, path[next_point(output, sample)])
                 record_sample(output, sample)
                 sample += 1
         if segment >= 0 and spans.segments[span] != segment:
@@ -96,7 +97,7 @@ def integrate(
         segment = spans.segments[span]
         times = (t, spans.edges[span + 1])
         status, t, h, sample = over_span(problem, times, h, method, control, work, output, sample)
-        lift(problem, work.y, x)
+        reconstruct(problem, work.y, x)
         for i in range(n):
             if status == FINISHED and not math.isfinite(x[i]):
                 status = NOT_FINITE
@@ -230,7 +231,7 @@ def record_samples(problem, step, work, output, sample):
         record_step(problem, (t, h), first, own, work, output)
     for k in range(own, sample):
         interpolate((samples[k] - t) / h, h, work)
-        lift(problem, work.middle, output.path[next_point(output, k)])
+        reconstruct(problem, work.middle, output.path[next_point(output, k)])
         record_sample(output, k)
     return sample
 
@@ -241,7 +242,7 @@ def record_sample(output, sample):
         return
     row = next_point(output, sample)
     output.places[sample, 0], output.places[sample, 1] = row, -1.0
-    output.moments[row] = output.samples[sample]
+    output.point_times[row] = output.samples[sample]
     for j in range(output.given.shape[1]):
         output.inputs[row, j] = output.given[sample, j]
 
@@ -254,8 +255,8 @@ def record_step(problem, step, first, following, work, output):
         part = NODE_1 if node in (0, 3) else NODE_2
         part = part if node < 2 else 1.0 - part
         interpolate(part, h, work)
-        lift(problem, work.middle, output.path[row + node])
-        output.moments[row + node] = t + part * h
+        reconstruct(problem, work.middle, output.path[row + node])
+        output.point_times[row + node] = t + part * h
         input_at(problem, t + part * h, output.inputs[row + node])
     for k in range(first, following):
         output.places[k, 0], output.places[k, 1] = row, max((output.samples[k] - t) / h, 0.0)

@@ -29,7 +29,7 @@ from vehiclemor.simulation.integrators.exponential_functions import (
     MIDDLE,
     SECOND,
 )
-from vehiclemor.simulation.mirror_image import Block
+from vehiclemor.simulation.integrators.mirror_image import Block
 
 # Vectors that a step hands back.
 RESULTS = ("new", "rates", "error")

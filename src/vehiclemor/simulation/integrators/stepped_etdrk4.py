@@ -4,8 +4,8 @@ See `step_kernels.exponential_step`.
 """
 
 from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
+from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.formulations.full import rhs
-from vehiclemor.simulation.formulations.inputs import input_at
 from vehiclemor.simulation.integrators.etdrk4 import quadrature_weights
 from vehiclemor.simulation.integrators.step_grid import nearest_index
 from vehiclemor.simulation.integrators.structures import RHS_CALLS, STEP_KERNEL, Work

@@ -4,7 +4,7 @@ What is not here is as in `ros34pw2`.
 """
 
 from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
-from vehiclemor.simulation.formulations.inputs import input_at
+from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.integrators.step_grid import index_above
 from vehiclemor.simulation.integrators.structures import (
     LINEAR_SOLVES,

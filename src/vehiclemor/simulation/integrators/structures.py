@@ -60,7 +60,7 @@ class Place(NamedTuple):
 
 
 class Subspaces(NamedTuple):
-    """One affine subspace for each window, see `ProjectionWindows`."""
+    """One affine subspace for each window, see `ControlPeriods`."""
 
     means: Matrix
     trial: Cube
@@ -171,7 +171,7 @@ class Output(NamedTuple):
         By place, see above.
     given
         Inputs (samples, inputs) at the samples.
-    inputs, moments
+    inputs, point_times
         Inputs (samples, inputs) at the points, and their times (samples,).
     places
         By sample (samples, 2): row of its point, or of the first of its step's, and which part of
@@ -185,7 +185,7 @@ class Output(NamedTuple):
     counts: IntVector
     given: Matrix
     inputs: Matrix
-    moments: Vector
+    point_times: Vector
     places: Matrix
     direct_until: Float
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError, VehiclemorError
+from vehiclemor.exceptions import FileError, GeometryError, InputError, PlugInError, VehiclemorError
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from vehiclemor.errors import FileError
+from vehiclemor.exceptions import FileError
 from vehiclemor.files import write_text
 from vehiclemor.registry import choice
 from vehiclemor.resources import data_folder, data_names

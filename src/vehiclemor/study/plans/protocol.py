@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from vehiclemor.errors import FileError, GeometryError, InputError, PlugInError
+from vehiclemor.exceptions import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.registry import choice
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build

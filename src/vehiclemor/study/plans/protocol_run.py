@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.errors import FileError
+from vehiclemor.exceptions import FileError
 from vehiclemor.provenance import layout_digest
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing

@@ -5,10 +5,10 @@ from dataclasses import replace
 from functools import cache, lru_cache
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component, names, unknown
-from vehiclemor.simulation.maneuver_checks import checked_maneuver
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.protocol import CONTENDER, Protocol, load_protocol, protocol_names
 from vehiclemor.study.scenario import Scenario, check

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods.full_order import FullOrderSystem
 from vehiclemor.reduction.methods.guarded import METHOD, FallbackModel
@@ -33,7 +33,7 @@ class LeavesAt:
 
     def simulate(self, *_):
         full = whole()
-        late = full.time >= self.until
+        late = full.times >= self.until
         wrong = {
             name: np.where(late[:, None], np.nan, getattr(full, name))
             for name in ("coordinates", "speeds", "outputs")
@@ -60,7 +60,7 @@ def guarded(fast):
 @given(until=st.floats(0.0, 5.0))
 def test_the_safe_model_does_the_run_wherever_the_fast_one_leaves(until):
     run, full = guarded(LeavesAt(until)).simulate(STEER, "dropped"), whole()
-    np.testing.assert_array_equal(run.time, full.time)
+    np.testing.assert_array_equal(run.times, full.times)
     np.testing.assert_array_equal(run.outputs, full.outputs)
     assert (run.status, run.message) == ("ok", "")
     assert run.remark.startswith("from t = 0 s on by full_order: the steering is beyond")

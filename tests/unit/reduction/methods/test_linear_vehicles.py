@@ -7,7 +7,7 @@ import pytest
 
 import vehiclemor as vm
 from tests.reducing import fitted
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import (
     lane_change,
     rack_lane_change,
@@ -118,7 +118,7 @@ def test_without_steering_the_car_drives_straight_at_its_own_speed(shape, method
     trajectory = reduced.simulate(maneuver, start)
     outputs = dict(zip(model.outputs, trajectory.outputs.T, strict=True))
     assert np.abs(outputs["lateral_position"]).max() < 1e-8
-    assert outputs["longitudinal_position"][-1] == pytest.approx(22.0 * trajectory.time[-1])
+    assert outputs["longitudinal_position"][-1] == pytest.approx(22.0 * trajectory.times[-1])
     assert reduced.spectral_abscissa == 0.0
     assert reduced.offline.evaluations == 2 * (len(shape.kept) + len(model.inputs))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reducing import fitted
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 
 START = "equilibrium"
@@ -118,11 +118,11 @@ def test_leaving_the_training_is_said_with_time_and_place(model, both, sign, col
     outside = np.abs(run.inputs[:, column]) > 1.01 * [0.12, 0.036][column]
     first = int(np.flatnonzero(outside)[0])
     assert run.status == "untrusted"
-    assert run.trust.until == run.time[first]
+    assert run.trust.until == run.times[first]
     assert run.trust.indicator == pytest.approx(1.25 / 1.01, rel=1e-4)
     name = "z" if column == 0 else "s0"
     place = f"{name} {run.inputs[first, column]:.5g} m"
-    for part in (f"t = {run.time[first]:.4g} s", place, "z -0.1212 to 0.1212 m"):
+    for part in (f"t = {run.times[first]:.4g} s", place, "z -0.1212 to 0.1212 m"):
         assert part in run.message
     errors = np.abs(run.coordinates - full.coordinates).max(axis=1)
     assert errors[~outside].max() < 1e-6

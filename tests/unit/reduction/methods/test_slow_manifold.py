@@ -90,7 +90,7 @@ def test_rates_of_the_shape_do_not_know_place_and_heading(car):
     # The same by the full equations at another heading: chain rule of the rotation.
     moved = shape.states(shapes, np.tile([100.0, -7.0, 2.0], (len(shapes), 1)))
     step = 1e-6
-    there = car.derivatives_at(moved, u)
+    there = car.rhs_at(moved, u)
     ahead = shape.of(moved + step * there)
     np.testing.assert_allclose((ahead - shapes) / step, rates, rtol=1e-4, atol=1e-3)
     x, y, heading = car.planar
@@ -107,7 +107,7 @@ def test_slow_coordinates_obey_their_linear_equation_where_steering_is_small(car
     run = car.simulate(LANE_CHANGES[car.name].perturbed(1.0, 1e-3))
     found = modes.coordinates(shape.of(run.states) - shape.reference, run.inputs)
     z, speed = found[:, :-1], found[:, -1]
-    rate = np.gradient(z, run.time, axis=0)
+    rate = np.gradient(z, run.times, axis=0)
     linear = z @ modes.rates.T + np.outer(run.inputs[:, 0], modes.input_matrix)
     # Differences over 0.02 s are good to a few per cent of the fastest mode.
     inner = slice(60, 170)
@@ -167,7 +167,7 @@ def test_beyond_their_training_range_the_arguments_of_nonlinear_terms_are_held(r
     k = reduced.features.states - 1
     z = np.random.default_rng(2).normal(size=(50, k + 1)) * 1e3
     z[:, k] = 5.0
-    columns = feature_columns(reduced.lifted_features, z, np.zeros((50, 1)), reduced.parameters)
+    columns = feature_columns(reduced.decoded_features, z, np.zeros((50, 1)), reduced.parameters)
     largest = np.abs(columns).max(axis=0)
     # The linear ones go on.
     assert np.count_nonzero(largest <= 1.0 + 1e-9) > 5
@@ -184,7 +184,7 @@ def test_how_a_dropped_car_lands_is_learnt(vehicle, reduced):
     # The speed of no training run.
     start = start_at(20.5, "dropped")
     full = vehicle.simulate(straight_ahead, start)
-    late = full.time > 0.15
+    late = full.times > 0.15
     names = ("longitudinal_position", "pitch", "vertical_speed")
 
     def off(model):
@@ -301,7 +301,7 @@ def test_steering_to_the_other_side_gives_the_mirror_image():
 def test_without_steering_it_goes_straight_on_at_its_speed(speed):
     run, _ = simulated(1.0, 0.0, speed)
     assert np.abs(of(run, "lateral_position")).max() < 1e-6
-    np.testing.assert_allclose(of(run, "longitudinal_position"), speed * run.time, rtol=1e-5)
+    np.testing.assert_allclose(of(run, "longitudinal_position"), speed * run.times, rtol=1e-5)
 
 
 def test_exact_tires_predict_a_run_between_the_training_runs():
@@ -316,6 +316,6 @@ def test_it_tells_when_its_tires_slide():
     run = with_tires().simulate(case.maneuver, start_of(high_fidelity(), case))
     assert run.status != "ok"
     assert run.trust.indicator > 1.0
-    assert 1.0 < run.trust.until < run.time[-1]
+    assert 1.0 < run.trust.until < run.times[-1]
     watched = [what for _, what in with_tires().features.watched]
     assert all(any(wheel in what for what in watched) for wheel in WHEELS)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tests.oracles import vehicle_lagrange as oracle
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change, step_steer
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, _weight
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
+from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.workspaces import Solver
 
 N = 14
@@ -36,7 +36,7 @@ def in_windows(form, edges, mean=0.0, mixing=None):
     lifts, drops = np.zeros((windows, size, 2 * N)), np.zeros((windows, size, 2 * N))
     lifts[:, :, :size], drops[:, :, :size] = basis, np.linalg.inv(basis).T
     ranks = np.full(windows, 2 * N, dtype=np.int64)
-    return ProjectionWindows(
+    return ControlPeriods(
         form, np.array(edges), np.full((windows, 2 * N), mean), lifts, drops, ranks
     )
 
@@ -69,7 +69,7 @@ def test_only_the_subspace_counts_not_its_basis(model):
         mixing = np.linalg.qr(generator.normal(size=(rank, rank)))[0] * 2.0
         lifts[k, :rank] = mixing @ lifts[k, :rank]
         drops[k, :rank] = np.linalg.inv(mixing).T @ drops[k, :rank]
-    mixed = ProjectionWindows(COORDINATES, spaces.edges, spaces.means, lifts, drops, spaces.ranks)
+    mixed = ControlPeriods(COORDINATES, spaces.edges, spaces.means, lifts, drops, spaces.ranks)
     state = model.start("dropped")
     runs = [
         model.integrate(lane_change, state, s, Solver("dopri5", 1e-10, TIMES))
@@ -113,7 +113,7 @@ def test_energy_weight_is_the_kinetic_energy(model):
         still[N:] = 0.0
         kinetic = oracle.energy(x, oracle.PARAMETERS) - oracle.energy(still, oracle.PARAMETERS)
         assert x[N:] @ weight[N:, N:] @ x[N:] == pytest.approx(2.0 * kinetic, rel=1e-9)
-        rates = model.derivative(x, [0.0])[:N]
+        rates = model.rhs(x, [0.0])[:N]
         assert rates @ weight[:N, :N] @ rates * period**2 == pytest.approx(2.0 * kinetic, rel=1e-9)
 
 

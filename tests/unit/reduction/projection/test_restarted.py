@@ -9,7 +9,7 @@ import vehiclemor as vm
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.registry import component
-from vehiclemor.simulation.projection_windows import ProjectionWindows
+from vehiclemor.simulation.control_periods import ControlPeriods
 
 CAR = "independent_suspension_vehicle"
 
@@ -40,7 +40,7 @@ def test_with_all_directions_it_is_the_full_model(car, maneuver):
     eye = np.tile(np.eye(states), (windows, 1, 1))
     means = np.random.default_rng(1).normal(size=(windows, states))
     ranks, edges = np.full(windows, states), np.linspace(0.0, 4.0, windows + 1)
-    spaces = ProjectionWindows("state", edges, means, eye, eye, ranks)
+    spaces = ControlPeriods("state", edges, means, eye, eye, ranks)
     full = car.simulate(maneuver)
     for restart in ("full_model", "projected"):
         reduced = DynamicProjection(car, spaces, OfflineCost(), "dopri5", 1e-9, restart=restart)
@@ -69,8 +69,8 @@ def test_steps_begin_at_the_state_that_they_are_given(car, maneuver):
     run, full = rom.reduced.simulate(maneuver, "equilibrium"), car.simulate(maneuver)
     state = full.states[75]
     for sample in range(75, 100):
-        u, ends = maneuver.at(run.time[[sample, sample + 1]])
-        state = rom.step(state, u, 0.02, run.time[sample], ends)
+        u, ends = maneuver.at(run.times[[sample, sample + 1]])
+        state = rom.step(state, u, 0.02, run.times[sample], ends)
         # Straight lines between the samples stand for the steering.
         np.testing.assert_allclose(state, run.states[sample + 1], rtol=1e-3, atol=1e-3)
 

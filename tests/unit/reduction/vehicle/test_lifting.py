@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reducing import CARS
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.vehicle.features import feature_columns
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN
 from vehiclemor.simulation.build import build
@@ -17,12 +17,12 @@ def lifted(reduced, maneuver, start):
     path = reduced.path(maneuver, start)
     k, shape, decay = reduced.features.states, reduced.shape, reduced.transient
     inputs = maneuver.at(maneuver.times)
-    features = reduced.lifted_features
+    features = reduced.decoded_features
     assert len(features.terms) < len(reduced.features.terms)
     columns = feature_columns(features, path[:, :k], inputs, reduced.parameters)
     deviation = shape.of(reduced.model.start(start)[None])[0] - shape.reference
     motion = np.exp(np.outer(maneuver.times, decay.rates)) * (decay.left @ deviation) @ decay.right
-    shapes = shape.reference + columns @ reduced.lifting + motion.real
+    shapes = shape.reference + columns @ reduced.decoding + motion.real
     return shape.states(shapes, path[:, [k + 1, k + 2, k]])
 
 
@@ -34,7 +34,7 @@ def test_the_compiled_lifting_is_the_formula(reduced, start):
     excited = known(reduced, start).excited
     # At the samples themselves there is only rounding.
     path = reduced.path(maneuver, start)
-    direct, _ = reduced.lift.states(maneuver.times, path, run.inputs, excited)
+    direct, _ = reduced.decoder.states(maneuver.times, path, run.inputs, excited)
     n = states.shape[1]
     scale = np.abs(states).max(axis=0) + 1e-3
     np.testing.assert_allclose(direct[:, :n] / scale, states / scale, atol=1e-9)

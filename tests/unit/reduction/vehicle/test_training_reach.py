@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tests.reducing import CARS
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.vehicle.lifting_loops import LEVELS
+from vehiclemor.reduction.vehicle.decoding_loops import LEVELS
 from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, durations
 
@@ -22,7 +22,7 @@ def reduced(reduced):
 
 def test_durations_of_the_compiled_loop_are_those_of_numpy(reduced):
     model, maneuver = reduced.model, CARS[reduced.model.name]
-    times, lift = maneuver.times, reduced.lift
+    times, lift = maneuver.times, reduced.decoder
     path, inputs = reduced.path(maneuver, "equilibrium"), maneuver.at(times)
     columns, size = reduced.features.lateral, 2 * len(model.coordinates)
     rng = np.random.default_rng(5)
@@ -30,7 +30,7 @@ def test_durations_of_the_compiled_loop_are_those_of_numpy(reduced):
     beyond = durations(times, sizes)
     for lasted in (beyond[-1] * 0.7 + 1e-3, *rng.uniform(0.5, 60.0, (4, 2 * columns, LEVELS))):
         known = replace(reduced, reach=replace(reduced.reach, lasted=lasted))
-        _, trust = known.lift.states(times, path, inputs, NOTHING_EXCITED)
+        _, trust = known.decoder.states(times, path, inputs, NOTHING_EXCITED)
         part = (beyond[-1] / lasted).max()
         assert trust.indicator == pytest.approx(max(part, sizes.max()), rel=1e-9)
         if part > 1.0 and not (sizes > 1.0).any():

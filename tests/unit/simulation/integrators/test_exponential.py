@@ -11,12 +11,12 @@ from scipy.linalg import block_diag, expm
 
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import maneuver
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.integrators.exponential_functions import (
     exponential_tables,
     phi_functions,
 )
 from vehiclemor.simulation.integrators.exponential_modes import modal_tables, modes
-from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver
 
 SOLVER = "exponential_adams"

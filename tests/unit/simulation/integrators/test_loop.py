@@ -18,12 +18,12 @@ from tests.unit.standard_problems import (
     driven,
     maneuver,
 )
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, frozen
-from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import Solver
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -185,13 +185,13 @@ def test_the_calls_that_are_counted_are_the_calls_that_are_allowed(model, monkey
 # Windows
 
 
-def windows(edges, mean, rows) -> ProjectionWindows:
+def windows(edges, mean, rows) -> ControlPeriods:
     """A subspace (mean, basis by rows) for each window, projected at right angles."""
     bases = np.zeros((len(rows), 4, 4))
     for k, basis in enumerate(rows):
         bases[k, : len(basis)] = basis
     ranks = np.array([len(basis) for basis in rows])
-    return ProjectionWindows("state", np.array(edges), np.array(mean), bases, bases, ranks)
+    return ControlPeriods("state", np.array(edges), np.array(mean), bases, bases, ranks)
 
 
 REDUCED = [name for name in INTEGRATORS if not frozen(name)]

@@ -11,8 +11,8 @@ from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Prepared, address_of_array
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.vehicle.features import FeatureListing, feature_system
+from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, frozen
-from vehiclemor.simulation.projection_windows import ProjectionWindows, whole_space
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.workspaces import Solver
 
@@ -56,7 +56,7 @@ def steered(inputs: int) -> Maneuver:
     return Maneuver("m", "", signal, tuple("abc"[:inputs]), 2.0, 21, lambda _: (1.3,))
 
 
-def two_windows(formulation: str, n: int, rank: int) -> ProjectionWindows:
+def two_windows(formulation: str, n: int, rank: int) -> ControlPeriods:
     """Subspaces of the largest and of the smallest dimension."""
     rng, half = np.random.default_rng(n), n // 2
     rows = half if formulation == "coordinates" else n
@@ -65,7 +65,7 @@ def two_windows(formulation: str, n: int, rank: int) -> ProjectionWindows:
         basis[:rank, :rows] = np.linalg.qr(rng.normal(size=(rows, rows)))[0][:rank]
     ranks = np.array([rank, 1]) * (2 if formulation == "coordinates" else 1)
     edges = np.array([0.0, 0.9, 2.0])
-    return ProjectionWindows(formulation, edges, np.zeros((2, n)), trial, trial.copy(), ranks)
+    return ControlPeriods(formulation, edges, np.zeros((2, n)), trial, trial.copy(), ranks)
 
 
 def guarded(call: Prepared, name: str, dimensions: int, dtype: type) -> np.ndarray:
@@ -77,7 +77,7 @@ def guarded(call: Prepared, name: str, dimensions: int, dtype: type) -> np.ndarr
     return whole
 
 
-def check(system: System, inputs: int, windows: ProjectionWindows, solver: str) -> None:
+def check(system: System, inputs: int, windows: ControlPeriods, solver: str) -> None:
     space = system.workspace(steered(inputs), windows, Solver(solver, 1e-5))
     space.start[:] = np.linspace(1.0, 2.0, len(system.reference))
     arrays = [

@@ -9,8 +9,8 @@ from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.vehicle.features import FeatureListing, feature_system
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.integrators import catalogue
-from vehiclemor.simulation.projection_windows import whole_space
 from vehiclemor.simulation.system import Solver, System
 
 SOLVERS = [name for name, own in catalogue.INTEGRATORS.items() if own.stepped]

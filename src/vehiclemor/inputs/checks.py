@@ -5,12 +5,12 @@ from functools import lru_cache
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import extent_of
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
-from vehiclemor.simulation.input_polynomials import extent_of
 
 
 def checked_maneuver(maneuver: str | Maneuver, definition: ModelDefinition) -> Maneuver:

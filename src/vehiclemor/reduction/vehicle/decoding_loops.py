@@ -1,4 +1,4 @@
-"""What the lifting of a reduced vehicle does along time, compiled."""
+"""What the decoding of a reduced vehicle does along time, compiled."""
 
 import math
 from typing import NamedTuple
@@ -76,7 +76,7 @@ class Known(NamedTuple):
     sideways: Float
 
 
-def lifted(
+def decoded(
     path: Matrix,
     inputs: Matrix,
     kernel: IntVector,

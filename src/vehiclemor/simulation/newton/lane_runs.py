@@ -6,9 +6,9 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.simulation.newton_loops import SAMPLE, Solution
+from vehiclemor.simulation.newton.newton_loops import SAMPLE, Solution
 from vehiclemor.simulation.run_timer import timed
-from vehiclemor.simulation.workspaces import Spare
+from vehiclemor.simulation.workspaces import Pool
 
 
 class LaneRun(NamedTuple):
@@ -44,7 +44,7 @@ class LaneRuns:
         self, loop: Loop, mechanism: Ready, kernels: Ready, sizes: tuple[int, int, int]
     ) -> None:
         self._loop, self._mechanism, self._kernels = loop, mechanism, kernels
-        self._sizes, self._spare = sizes, Spare[LaneRun]()
+        self._sizes, self._pool = sizes, Pool[LaneRun]()
 
     def solved(
         self, samples: Ready, iteration: Ready
@@ -54,13 +54,13 @@ class LaneRuns:
         There are as many samples as lanes at least.
         """
         kind, (n, _, m) = (samples, iteration), self._sizes
-        run = self._spare.taken(kind, lambda: self._packed(samples, iteration))
+        run = self._pool.taken(kind, lambda: self._packed(samples, iteration))
         # One table is written faster than two.
         table = np.empty((len(samples.bundle.inputs), n + m))
         run.call.words[run.table] = address_of_array(table)
         status, seconds = timed(run.call)
         counts = run.counts.tolist()
-        self._spare.give_back(kind, run)
+        self._pool.give_back(kind, run)
         return None if status else (table, counts, seconds)
 
     def _packed(self, samples: Ready, iteration: Ready) -> LaneRun:

@@ -18,7 +18,7 @@ from vehiclemor.codegen.loop_types import (
     vector,
 )
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.simulation.newton_loops import (
+from vehiclemor.simulation.newton.newton_loops import (
     CERTAIN,
     CONTRACTION,
     CONVERGED,

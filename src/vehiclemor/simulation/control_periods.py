@@ -15,7 +15,7 @@ MOST_SPANS = 64
 
 
 @dataclass(frozen=True)
-class ProjectionWindows(ShortRepr):
+class ControlPeriods(ShortRepr):
     """Formulation of a system with one affine subspace for each window.
 
     Attributes
@@ -97,10 +97,10 @@ def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float
 
 
 @lru_cache(maxsize=64)
-def whole_space(dim: int) -> ProjectionWindows:
+def whole_space(dim: int) -> ControlPeriods:
     """The whole space of a system with `dim` states, in one window."""
     nothing = np.zeros((1, 1, 1))
-    return ProjectionWindows(
+    return ControlPeriods(
         "full",
         np.array([0.0, np.inf]),
         np.zeros((1, 1)),

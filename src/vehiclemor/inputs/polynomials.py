@@ -12,15 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vehiclemor.arguments import loop_array
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
-from vehiclemor.errors import InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.inputs.signal import Signal
-from vehiclemor.simulation.checks import loop_array
 
 ACCURACY = 1e-11
-SIGNAL_LOOPS = "simulation.integrators.structures", "simulation.formulations.inputs"
+SIGNAL_LOOPS = ("inputs.polynomial_loops",)
 MOST_PIECES = 1 << 15
 DEGREE = 5
 # Maneuvers whose inputs are kept: more than the drawn runs of a protocol, over which all rows go.
@@ -56,7 +56,7 @@ class Extent(NamedTuple):
         Smallest and largest value of each input (inputs,).
     largest
         Sizes (3, inputs): largest magnitudes of the inputs and of what of them is above 2 Hz,
-        root of the integral of the square of what is above 8 Hz, see `formulations.inputs.extent`.
+        root of the integral of the square of what is above 8 Hz, see `polynomial_loops.extent`.
     since
         Times (inputs,) in s at which limits are passed first; infinite if they are not.
     """
@@ -73,7 +73,7 @@ def extent_of(maneuver: Maneuver, limits: np.ndarray | None = None) -> Extent:
     Parameters
     ----------
     limits
-        As `formulations.inputs.extent` takes them (4, inputs), for `since`.
+        As `polynomial_loops.extent` takes them (4, inputs), for `since`.
     """
     if limits is not None:
         return _extent(signal_of(maneuver), limits)

@@ -14,8 +14,8 @@ from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, lifting_kernel
-from vehiclemor.reduction.vehicle.lifting_loops import BESIDES, Known
+from vehiclemor.reduction.vehicle.decoding_loops import BESIDES, Known
+from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, decoding_kernel
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.kernel_derivatives import INPUTS, STATE, partial
@@ -66,8 +66,8 @@ class Transient:
 NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
 
 
-class LiftingSpace(NamedTuple):
-    """Arrays of one lifting at a time, and the loops that write them.
+class DecodingSpace(NamedTuple):
+    """Arrays of one decoding at a time, and the loops that write them.
 
     `calls` are the loops, and the words in which the number of rows stands.
     """
@@ -82,7 +82,7 @@ class LiftingSpace(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Lifting(ShortRepr):
+class Decoding(ShortRepr):
     """How full states follow from reduced ones, see `ReducedVehicle`.
 
     Coefficients (terms, n) are of the shape's deviation from its reference, straight running.
@@ -108,7 +108,7 @@ class Lifting(ShortRepr):
         shared = [self.coefficients, self.reference[None]]
         rows = np.vstack([*shared, pairs] if modes else shared)
         rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
-        kernel = lifting_kernel(self.features, self.layout, len(self.parameters), modes)
+        kernel = decoding_kernel(self.features, self.layout, len(self.parameters), modes)
         return kernel, np.concatenate([self.parameters, rows.ravel()])
 
     def _kernels(self, modes: int) -> tuple[Kernels, np.ndarray]:
@@ -163,7 +163,7 @@ class Lifting(ShortRepr):
         return states, trust
 
     @cached_property
-    def _single(self) -> list[tuple[LiftingSpace, tuple[np.ndarray, ...]]]:
+    def _single(self) -> list[tuple[DecodingSpace, tuple[np.ndarray, ...]]]:
         return []
 
     def of_run(
@@ -171,20 +171,20 @@ class Lifting(ShortRepr):
     ) -> tuple[np.ndarray, Trust | None]:
         """The same of a run and its inputs at the samples; of its rows only `run.rows` count.
 
-        Of `start` see `lifting_loops.Known`.
+        Of `start` see `decoding_loops.Known`.
         """
-        held = run.kept.get("lifted")
+        held = run.kept.get("decoded")
         if held is None or held.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
             held = self.space((times, run.whole, inputs), excited.copy(), run.rows)
-            run.kept["lifted"] = held
+            run.kept["decoded"] = held
         held.excited[:] = excited
         held.start[:] = start
         return self._lifted(held, run.rows)
 
     def space(
         self, recorded: tuple[np.ndarray, ...], excited: np.ndarray, rows: int
-    ) -> LiftingSpace:
+    ) -> DecodingSpace:
         """Arrays of the loops and these, packed once."""
         (times, path, inputs), calls = recorded, []
         modes, watched = excited.shape[1], self.features.watched
@@ -203,16 +203,16 @@ class Lifting(ShortRepr):
         start = np.array([0.0, 0.0, 0.0, 0.0, np.inf])
         lasted = self.reach.lasted
         known = Known(times, lasted, np.empty_like(lasted), start, self.reach.sideways)
-        lifted = _loops()["lifted"].prepared(
+        decoded = _loops()["decoded"].prepared(
             path, inputs, address, constants, states, known, largest, first
         )
-        calls.append((lifted, ("path", "inputs", "states", "known.times")))
+        calls.append((decoded, ("path", "inputs", "states", "known.times")))
         counted = tuple(
             (call, tuple(call.address(name) + 1 for name in names)) for call, names in calls
         )
-        return LiftingSpace(excited, times, states, largest, first, start, counted)
+        return DecodingSpace(excited, times, states, largest, first, start, counted)
 
-    def _lifted(self, space: LiftingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
+    def _lifted(self, space: DecodingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
         for call, places in space.calls:
             for place in places:
                 call.words[place] = rows
@@ -249,4 +249,4 @@ def decayed(excited: np.ndarray) -> float:
 
 
 def _loops() -> Mapping[str, Loop]:
-    return loops((*PATH_LOOPS, "reduction.vehicle.lifting_loops"), ("with_decay", "lifted"))
+    return loops((*PATH_LOOPS, "reduction.vehicle.decoding_loops"), ("with_decay", "decoded"))
