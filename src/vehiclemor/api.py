@@ -227,7 +227,7 @@ def simulate(
         If the input is wrong or asks for a position that can't be reached.  A reduced model that
         diverges is a result: its status says so.
     """
-    import vehiclemor.report.result_selection  # noqa: F401  (results draw themselves)
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
@@ -319,7 +319,7 @@ def run_study(
         cell of its studies on the dimension `cell`, without histories; the studies' own datasets
         are in the folder `studies`.
     """
-    import vehiclemor.report.result_selection  # noqa: F401  (results draw themselves)
+    import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.progress import listening
     from vehiclemor.study.plans.results import flattened
     from vehiclemor.study.run import run_studies
@@ -434,7 +434,8 @@ def plot(
     """
     import xarray as xr
 
-    from vehiclemor.report.result_selection import ResultAccessor, stored_result
+    from vehiclemor.report.accessor import ResultAccessor
+    from vehiclemor.report.result_selection import stored_result
     from vehiclemor.simulation.trajectory import Trajectory
 
     if isinstance(result, str | Path):

@@ -75,6 +75,17 @@ def drawn(results, unseen_travels):
     return figures
 
 
+def test_axes_have_units_and_no_label_is_longer_than_its_axis(drawn):
+    for name, figure in drawn.items():
+        for axis in figure.axes if FIGURES[name].drawing != "schematic" else ():
+            label = axis.yaxis.label
+            if label.get_text():
+                assert any(unit in label.get_text() for unit in ("(", "/", "energy")), name
+                assert label.get_window_extent().height <= axis.bbox.height, name
+            if axis.get_xlabel():
+                assert axis.xaxis.label.get_window_extent().width <= 1.1 * axis.bbox.width, name
+
+
 def test_lines_differ_in_grey_too(drawn):
     for name, figure in drawn.items():
         for axis in figure.axes if FIGURES[name].drawing != "schematic" else ():

@@ -60,8 +60,10 @@ def test_training_is_asked_for_in_the_same_words_everywhere(given):
 SAME = {
     "by name": ("sine_travel", OWN, True),
     "a signal of another name": (sampled(OWN, name="a"), sampled(OWN, name="b"), True),
-    "one of several": ([OTHER, OWN], OWN, True),
-    "other samples": (sampled(OWN), sampled(OWN, scale=1.0 + 1e-6), False),
+    "one of several": ([OTHER, OWN], sampled(OWN), True),
+    "its beginning": (OWN, sampled(OWN, 501), True),
+    "that of which it is the beginning": (sampled(OWN, 501), OWN, False),
+    "other samples": (OWN, sampled(OWN, scale=1.0 + 1e-6), False),
     "another amplitude": (OWN, OWN.perturbed(1.0, 0.9), False),
 }
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
@@ -19,7 +18,7 @@ from vehiclemor.study.plans.study_file import FACTORS
 from vehiclemor.study.store import combined_path, result_path
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    import xarray as xr
 
 KINDS = ("histories", "paths", "errors")
 # Values of a dimension that an error lists.
@@ -76,20 +75,3 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
         if len(values) > 1:
             parts.append(f"{dimension} {value}")
     return dataset, ", ".join(parts)
-
-
-@xr.register_dataset_accessor("vehiclemor")
-class ResultAccessor:
-    """What a result of this package can do beyond xarray."""
-
-    def __init__(self, dataset: xr.Dataset) -> None:
-        self._dataset = dataset
-
-    def plot(self, kind: str = "histories", out: str | Path | None = None, **at: object) -> Figure:
-        """Draw the result; see `vehiclemor.plot`."""
-        from vehiclemor.arguments import file_path
-        from vehiclemor.report.figures.result_plot import plot_result
-        from vehiclemor.report.result_selection import drawn
-
-        dataset, _ = drawn(self._dataset, kind, at)
-        return plot_result(dataset, None if out is None else file_path("out", out), kind)

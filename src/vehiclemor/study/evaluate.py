@@ -28,6 +28,7 @@ from vehiclemor.study.result import Outcome, result_dataset
 from vehiclemor.study.scenario import (
     Overrides,
     Scenario,
+    in_training,
     model_of_run,
     speed_of,
     start_of,
@@ -105,7 +106,7 @@ def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> 
         experiment.keep != "errors"
         and method.learns_from != "inputs"
         and not isinstance(outcomes[0], Failure)
-        and test[0].run_key in {run.run_key for run in experiment.training}
+        and in_training(model, experiment.training, test[0])
     )
     return result_dataset(own, experiment, outcomes, fit.reduced, seen)
 

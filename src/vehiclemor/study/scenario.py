@@ -22,6 +22,10 @@ from vehiclemor.simulation.trajectory import Start
 
 # Parameter name (of a component of a point such as `tie_rod_inner.z`) and value in SI units.
 Overrides = tuple[tuple[str, float | tuple[float, ...]], ...]
+# Difference of inputs, as part of the largest, that rounding explains: of a table with its samples.
+ROUNDING = 1e-9
+# Times at which inputs are first looked at.
+FEW = 16
 
 
 def overrides(table: Mapping[str, float | Sequence[float]]) -> Overrides:
@@ -194,6 +198,27 @@ def speed_of(model: Model, scenario: Scenario) -> float:
 def training_run(model: Model, scenario: Scenario) -> TrainingRun:
     """The scenario as a run that a method may learn from."""
     return TrainingRun(model_of_run(model, scenario), scenario.maneuver, start_of(model, scenario))
+
+
+def in_training(model: Model, training: Sequence[Scenario], test: Scenario) -> bool:
+    """Whether a run is among those of a training, or the beginning of one, whatever its name."""
+    return any(run == test or _alike(model, run, test) for run in training)
+
+
+def _alike(model: Model, run: Scenario, test: Scenario) -> bool:
+    """Whether a run has the same model, start and inputs as another as long as that lasts."""
+    last = test.maneuver.duration
+    if run.maneuver.duration < last:
+        return False
+    known, tested = run.maneuver.times, test.maneuver.times
+    # Most differ at a few times already.
+    for times in (tested[:: max(len(tested) // FEW, 1)], tested, known[known <= last]):
+        learnt, used = (s.maneuver.for_inputs(model.inputs).at(times) for s in (run, test))
+        if np.abs(learnt - used).max() > ROUNDING * np.abs(used).max():
+            return False
+    one, other = model_of_run(model, run), model_of_run(model, test)
+    begun, wanted = one.start(start_of(model, run)), other.start(start_of(model, test))
+    return np.array_equal(one.constants, other.constants) and np.array_equal(begun, wanted)
 
 
 def check(model: Model, scenario: Scenario) -> None:

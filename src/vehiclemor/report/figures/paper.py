@@ -152,8 +152,8 @@ def figure_spectrum(*, models: Mapping[str, str]) -> Figure:
             values = found[variable].sel(preset=preset).transpose("mode", "window")
             values = values.where(values > 0.1 * rounding).dropna("mode", how="all")
             look: Style = {"marker": "o", "markersize": 3, **styles([method])[method]}
-            modes, label = values["mode"], f"{text}: median, all periods"
-            axis.plot(modes, values.median("window"), label=label, **look)
+            modes, legend = values["mode"], f"{text}: median, all periods"
+            axis.plot(modes, values.median("window"), label=legend, **look)
             band: Style = {"color": look["color"], "alpha": 0.15, "linewidth": 0.0}
             axis.fill_between(modes, values.min("window"), values.max("window"), **band)
         axis.set_yscale("log")
