@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vehiclemor.api import describe as describe
-    from vehiclemor.api import errors as errors
     from vehiclemor.api import maneuvers as maneuvers
     from vehiclemor.api import methods as methods
     from vehiclemor.api import model as model
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from vehiclemor.inputs.maneuver import maneuver as maneuver
     from vehiclemor.inputs.signal import Signal as Signal
     from vehiclemor.inputs.signal import many_signals as many_signals
+    from vehiclemor.metrics import errors as errors
     from vehiclemor.reduction.reduced_model import load as load
     from vehiclemor.reduction.reduced_model import rom as rom
     from vehiclemor.report.comparison import compare as compare
@@ -37,13 +37,14 @@ __version__ = "0.1.0"
 # Name -> module that defines it.
 _DEFINED_IN = {
     **dict.fromkeys(
-        ("describe", "errors", "maneuvers", "methods", "model", "models", "plot", "reduce"),
+        ("describe", "maneuvers", "methods", "model", "models", "plot", "reduce"),
         "vehiclemor.api",
     ),
     **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
     "Signal": "vehiclemor.inputs.signal",
     "VehiclemorError": "vehiclemor.exceptions",
     "convert": "vehiclemor.report.study_formats",
+    "errors": "vehiclemor.metrics",
     "export": "vehiclemor.exporting.export",
     "compare": "vehiclemor.report.comparison",
     "figures": "vehiclemor.report.figures.catalogue",

@@ -211,21 +211,19 @@ def simulate(
     rtol
         Tolerance of the solver; for a kinematic model the largest step of the last iteration.
     errors
-        Whether to compare with the full-order solution; without it nothing is solved but by the
-        method, and there are no errors and floors.
+        Whether to compare with the full-order solution; else only the method runs.
     **settings
         Settings of the method, such as `rank=3`.
 
     Returns
     -------
     xarray.Dataset
-        Histories, errors, floors, counts, seconds and status, with units.
+        Histories, errors, projection errors, counts, seconds and status, with units.
 
     Raises
     ------
     VehiclemorError
-        If the input is wrong or asks for a position that can't be reached.  A reduced model that
-        diverges is a result: its status says so.
+        If the input is wrong or can't be reached.  A model that diverges is a result.
     """
     import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.simulation.build import kept_build
@@ -246,10 +244,9 @@ def simulate(
     trained = training_of(ready, method, training, test, _pairs(training_set))
     experiment = make_experiment(ready, method, chosen, trained, (test,))
     dataset = evaluate(experiment, ready, errors=errors)
-    status = str(dataset["status"].item())
-    if status in ("unreachable", "rejected"):
-        error = UnreachableError if status == "unreachable" else InputError
-        raise error(str(dataset["message"].item()))
+    errors_of = {"unreachable": UnreachableError, "rejected": InputError}
+    if (status := str(dataset["status"].item())) in errors_of:
+        raise errors_of[status](str(dataset["message"].item()))
     return dataset
 
 
@@ -354,52 +351,6 @@ def status(
     return status_of(str(file_path("study", study)), file_path("results", results), seed)
 
 
-def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
-    """Errors of a run against the full-order run of the same input, for each output of the run.
-
-    Parameters
-    ----------
-    run, full
-        At the same output times; `full` has the outputs of `run`.
-
-    Returns
-    -------
-    xarray.Dataset
-        `rms_error` and `max_error` by output, in its unit.
-
-    Raises
-    ------
-    InputError
-        If the runs have other output times, or an output is missing.
-    """
-    import xarray as xr
-
-    from vehiclemor.metrics import max_abs, rms
-
-    _require_runs(run, full)
-    wanted = full if full.names == run.names else full.chosen(run.names)
-    difference = run.outputs - wanted.outputs
-    labels = run.chosen(run.names).dataset().drop_dims(["time", "input"])
-    return xr.Dataset(
-        {
-            "rms_error": ("output", rms(difference), {"long_name": "root mean square error"}),
-            "max_error": ("output", max_abs(difference), {"long_name": "largest error"}),
-        },
-        labels.coords,
-    )
-
-
-def _require_runs(run: Any, full: Any) -> None:
-    """Raise `InputError` if these are no two runs with the same output times."""
-    from vehiclemor.simulation.trajectory import Trajectory
-
-    for name, given in (("run", run), ("full", full)):
-        if not isinstance(given, Trajectory):
-            raise InputError(f"{name} is {quoted(given)}, not a run as `simulate` gives it")
-    if not np.array_equal(run.times, full.times):
-        raise InputError("the runs have other output times: simulate both with the same input")
-
-
 def plot(
     result: xr.Dataset | Trajectory | str | Path,
     *beside: Trajectory | str,
@@ -434,26 +385,15 @@ def plot(
     """
     import xarray as xr
 
-    from vehiclemor.report.accessor import ResultAccessor
+    from vehiclemor.report.accessor import ResultAccessor, dataset_of
     from vehiclemor.report.result_selection import stored_result
     from vehiclemor.simulation.trajectory import Trajectory
 
     if isinstance(result, str | Path):
         result = stored_result(str(result), file_path("results", results))
     elif isinstance(result, Trajectory):
-        result = _pictured(result, *(full for full in beside if not isinstance(full, str)))
+        result = dataset_of(result, *(full for full in beside if not isinstance(full, str)))
     if not isinstance(result, xr.Dataset):
         raise InputError(f"result is {quoted(result)}; it must be a run, a dataset, file or study")
     kind = next((str(given) for given in beside if isinstance(given, str)), kind)
     return ResultAccessor(result).plot(kind, out, **at)
-
-
-def _pictured(run: Trajectory, full: Trajectory | None = None) -> xr.Dataset:
-    """A run as a dataset, with the outputs of the full-order run."""
-    dataset = run.dataset()
-    if full is None:
-        return dataset
-    _require_runs(run, full)
-    reference = full if full.names == run.names else full.chosen(run.names)
-    of_full = {"reference_outputs": (("time", "output"), reference.outputs)}
-    return dataset.assign(of_full).assign(errors(run, full).data_vars)

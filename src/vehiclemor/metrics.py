@@ -1,6 +1,17 @@
 """Error measures of a trajectory against the full-order solution of the same input."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
+
+from vehiclemor.arguments import quoted
+from vehiclemor.exceptions import InputError
+from vehiclemor.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def rms(error: np.ndarray) -> np.ndarray:
@@ -16,3 +27,44 @@ def max_abs(error: np.ndarray) -> np.ndarray:
 def signal_range(signal: np.ndarray) -> np.ndarray:
     """Largest minus smallest value over the samples: (samples, k) -> (k,)."""
     return signal.max(axis=0) - signal.min(axis=0)
+
+
+def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
+    """Errors of a run against the full-order run of the same input, for each output of the run.
+
+    Parameters
+    ----------
+    run, full
+        At the same output times; `full` has the outputs of `run`.
+
+    Returns
+    -------
+    xarray.Dataset
+        `rms_error` and `max_error` by output, in its unit.
+
+    Raises
+    ------
+    InputError
+        If the runs have other output times, or an output is missing.
+    """
+    import xarray as xr
+
+    _require_runs(run, full)
+    difference = run.outputs - full.chosen(run.names).outputs
+    labels = run.chosen(run.names).dataset().drop_dims(["time", "input"])
+    return xr.Dataset(
+        {
+            "rms_error": ("output", rms(difference), {"long_name": "root mean square error"}),
+            "max_error": ("output", max_abs(difference), {"long_name": "largest error"}),
+        },
+        labels.coords,
+    )
+
+
+def _require_runs(run: Any, full: Any) -> None:
+    """Raise `InputError` if these are no two runs with the same output times."""
+    for name, given in (("run", run), ("full", full)):
+        if not isinstance(given, Trajectory):
+            raise InputError(f"{name} is {quoted(given)}, not a run as `simulate` gives it")
+    if not np.array_equal(run.times, full.times):
+        raise InputError("the runs have other output times: simulate both with the same input")

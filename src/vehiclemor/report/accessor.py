@@ -7,8 +7,12 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from vehiclemor.metrics import errors
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from vehiclemor.simulation.trajectory import Trajectory
 
 
 @xr.register_dataset_accessor("vehiclemor")
@@ -26,3 +30,13 @@ class ResultAccessor:
 
         dataset, _ = drawn(self._dataset, kind, at)
         return plot_result(dataset, None if out is None else file_path("out", out), kind)
+
+
+def dataset_of(run: Trajectory, full: Trajectory | None = None) -> xr.Dataset:
+    """A run as a dataset, with the outputs of the full-order run."""
+    dataset = run.dataset()
+    if full is None:
+        return dataset
+    found = errors(run, full)
+    of_full = {"reference_outputs": (("time", "output"), full.chosen(run.names).outputs)}
+    return dataset.assign(of_full).assign(found.data_vars)

@@ -94,9 +94,8 @@ def simulate_many(
     -------
     xarray.Dataset
         `values` (run, time, output) and, by run, `status`, `message`, `remark`, `indicator` and
-        `until` (of its trust), `seconds` and solver counts.  A run that has
-        failed, or that the model refuses, tells so in its status, and is not a number from there
-        on.
+        `until` (of its trust), `seconds` and solver counts.  A run that has failed, or that the
+        model refuses, tells so in its status, and is not a number from there on.
 
     Raises
     ------
@@ -120,31 +119,37 @@ def simulate_many(
         raise InputError(f"the result would take {size:.1f} GB of memory: choose outputs=, times=")
     values = np.empty(shape)
 
-    def report(run: int) -> tuple:
+    def written(run: int) -> tuple:
         """What else there is of a run, whose values are written."""
         done = attempt(lambda: _whole_run(model_of(run), signals[run], begins[run], names))
-        if isinstance(done, Failure):
-            values[run] = np.nan
-            nothing = [0] * len(full.counts)
-            return done.status, done.message, "", np.nan, 0.0, 0.0, *nothing
-        values[run] = done.outputs[rows[run]]
-        trust = done.trust or Trust(np.nan)
-        own = done.status, done.message, done.remark, trust.indicator, trust.until, done.seconds
-        return *own, *done.counts.values()
+        values[run] = np.nan if isinstance(done, Failure) else done.outputs[rows[run]]
+        return _report(done, full)
 
     def reports(first: int) -> list[tuple]:
-        return [report(run) for run in range(first, min(first + CHUNK, runs))]
+        return [written(run) for run in range(first, min(first + CHUNK, runs))]
 
     with one_thread(), ThreadPoolExecutor(threads, "vehiclemor") as pool:
         found = list(itertools.chain(*pool.map(reports, range(0, runs, CHUNK))))
+    return _dataset(full, list(names), kept, values, found).assign_attrs(_about(given, full, runs))
+
+
+def _about(given: Any, full: Model, runs: int) -> dict[str, Any]:
+    """Attributes of the result: of which model with which settings it is."""
     default = {"solver": REFERENCE_SOLVER, "tolerance": REFERENCE_TOLERANCE}
     if full.kind == "ae":
         default = {"solver": "newton", "tolerance": NEWTON_TOLERANCE}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
     title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}
-    return _dataset(full, list(names), kept, values, found).assign_attrs(
-        attributes(title, full.kernel_hash, **of, settings=repr(dict(settings)))
-    )
+    return attributes(title, full.kernel_hash, **of, settings=repr(dict(settings)))
+
+
+def _report(done: Trajectory | Failure, model: Model) -> tuple:
+    """What else there is of a run: what `REPORTED` names, and solver counts."""
+    if isinstance(done, Failure):
+        return done.status, done.message, "", np.nan, 0.0, 0.0, *[0] * len(model.counts)
+    trust = done.trust or Trust(np.nan)
+    own = done.status, done.message, done.remark, trust.indicator, trust.until, done.seconds
+    return *own, *done.counts.values()
 
 
 def _whole_run(model: Any, signal: Maneuver, start: Start, names: tuple[str, ...]) -> Trajectory:
