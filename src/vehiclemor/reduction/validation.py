@@ -109,7 +109,7 @@ def checked_run(model: Model, maneuver: Maneuver, start: Start, reduced: Any) ->
     if not isinstance(run, Trajectory):
         raise PlugInError(f"{whose} {quoted(run)}, no Trajectory")
     columns = {name: (len(getattr(model, name)),) for name in ("coordinates", "speeds", "outputs")}
-    for name, size in {"time": (), **columns}.items():
+    for name, size in {"times": (), **columns}.items():
         shape = (maneuver.samples, *size)
         found = np.asarray(getattr(run, name))
         if found.shape != shape or found.dtype != float:
