@@ -13,7 +13,7 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
-HISTORIES = ("time", "inputs", "states", "coordinates", "speeds", "outputs", "counts")
+HISTORIES = ("times", "inputs", "states", "coordinates", "speeds", "outputs", "counts")
 # Parameter with the speed (m/s) at which a vehicle starts.
 SPEED = "initial_speed"
 # Parameters that say how a run starts, not which model it is of.

@@ -37,7 +37,7 @@ STILL = 1e-6
 # Longest time (s) for which a run is looked at.
 LONGEST = 1.0
 # Histories of a trajectory.
-PATHS = ("time", "inputs", "coordinates", "speeds", "outputs")
+PATHS = ("times", "inputs", "coordinates", "speeds", "outputs")
 # Relative singular values of the starts' deviations below this are rounding.
 RANK = 1e-7
 
