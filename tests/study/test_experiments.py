@@ -204,7 +204,7 @@ def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(veh
     alone = kept_fit(vehicle, experiment(vehicle, "slow_manifold", terms=2, steps=0))
     both = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
     assert len(fits) == 1
-    assert both.ahead.tolerance == 5e-3
+    assert both.fast.tolerance == 5e-3
     assert both.fast.coefficients is alone.coefficients
     assert both.offline.seconds == pytest.approx(alone.offline.seconds)
     # What a user fits is fitted for itself, and is the same.

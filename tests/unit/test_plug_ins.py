@@ -160,7 +160,7 @@ def faulty(plug_in):
         ("del Reduced.offline", "has no offline"),
         ("altered(outputs=lambda o: o[1:])", "outputs (1000, 6)"),
         ("altered(outputs=lambda o: o + 0j)", "outputs (1001, 6) of complex128"),
-        ("altered(time=lambda t: t[:5])", "time (5,)"),
+        ("altered(times=lambda t: t[:5])", "times (5,)"),
         ("altered(status=lambda s: 'fine')", "status 'fine'"),
         ("altered(seconds=lambda s: 'x')", "seconds 'x'"),
         ("altered(counts=lambda c: None)", "counts None"),

@@ -45,7 +45,7 @@ def test_objects_of_a_simulation_show_themselves_in_one_line(name):
     assert name in repr(model)
     assert model.coordinates[0] in repr(model)
     assert name in repr(rom)
-    assert f"time=ndarray({maneuver.samples},)" in repr(full)
+    assert f"times=ndarray({maneuver.samples},)" in repr(full)
     assert "status='ok'" in repr(full)
     for further in (model.parameters, model.equations):
         assert len(repr(further)) < 2 * LONGEST

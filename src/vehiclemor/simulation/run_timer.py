@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -25,19 +26,19 @@ def timed(run: Callable[[], Result]) -> tuple[Result, float]:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Pin the linear algebra of NumPy and SciPy to one thread of this process.
+    """Pin the linear algebra that is loaded, of NumPy and SciPy, to one thread of this process.
 
     How many threads add up a sum decides how it is rounded: results are then the same to the bit,
     whatever the number of cores, jobs or limits set outside.
     """
-    with _libraries().limit(limits=1, user_api="blas"):
+    # SciPy brings a library of its own.
+    with _libraries("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
         yield
 
 
 @cache
-def _libraries() -> ThreadpoolController:
-    # SciPy brings a library of its own, which is limited only once it is loaded.
-    import scipy.linalg  # noqa: F401
+def _libraries(scipy: bool) -> ThreadpoolController:
+    del scipy
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()

@@ -6,6 +6,7 @@ address, which send their results to the driver.  They compile what their cache 
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import signal
@@ -240,12 +241,17 @@ def cluster(scheduler: str) -> Iterator[Engine]:
         raise InputError("scheduler: needs dask: pip install 'vehiclemor[cluster]'") from None
     # What matters is said in one line; dask would add a traceback for each lost connection.
     with silence_logging_cmgr(logging.CRITICAL):
+        client: Any = None
         try:
             # Its types are those of awaited calls too.
-            client: Any = Client(scheduler, timeout=REACH, set_as_default=False)
+            client = Client(scheduler, timeout=REACH, set_as_default=False)
         except (OSError, TypeError, ValueError) as error:
             reason = " ".join(str(error).split())
-            raise InputError(f"scheduler {scheduler}: can't be reached ({reason})") from None
+        if client is None:
+            # What is half made closes itself when it is collected: now, as within the next call
+            # of dask it would wait for a lock that this call holds.
+            gc.collect()
+            raise InputError(f"scheduler {scheduler}: can't be reached ({reason})")
         with client:
             number = sum(client.nthreads().values())
             work = f"{number} places for runs" if number else "no worker yet, runs wait"

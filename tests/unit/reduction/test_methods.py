@@ -135,7 +135,7 @@ def test_run_is_exact_at_any_times(model, nominal, full):
 def test_a_run_has_the_histories_of_its_trajectory(model, nominal):
     [run] = training_runs(model, nominal)
     recorded = run.recorded()
-    for name in ("time", "inputs", "states", "outputs"):
+    for name in ("times", "inputs", "states", "outputs"):
         np.testing.assert_array_equal(getattr(run, name), getattr(recorded, name))
     assert run.outputs is run.outputs
     with pytest.raises(AttributeError, match="rank"):

@@ -18,7 +18,7 @@ def each_model(request):
     return build(request.param)
 
 
-@pytest.mark.parametrize("function", ["outputs_at", "residual_at", "derivatives_at"])
+@pytest.mark.parametrize("function", ["outputs_at", "residual_at", "rhs_at"])
 def test_paths_of_another_shape_or_not_finite_are_refused(each_model, function):
     call = getattr(each_model, function, None)
     if call is None:

@@ -25,7 +25,7 @@ from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 NAME, SAFE = "guarded", "full_order"
 # What of the fast model a user steps and asks.
-STEPPED = ("states", "begin", "step", "rates", "derivatives", "decode", "trust")
+STEPPED = ("states", "begin", "step", "rates", "sensitivities", "decode", "trust")
 
 
 class GuardedSettings(OnlineSettings):

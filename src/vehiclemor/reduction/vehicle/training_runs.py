@@ -27,6 +27,7 @@ from vehiclemor.reduction.vehicle.training_reach import (
     durations,
     known_starts,
 )
+from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Time (s) after which a car has landed; modes that have decayed by then, to exp(-DECAYED), are
@@ -71,7 +72,9 @@ def with_transients(
             continue
         start = shape.of(run.states[:1])[0] - shape.reference
         seen = (shape.of(run.states[still]) - shape.reference) @ seeing.T
-        moves = np.vstack([expm(rates * time) for time in run.times[still]])
+        # The library of SciPy is loaded only now.
+        with one_thread():
+            moves = np.vstack([expm(rates * time) for time in run.times[still]])
         starts.append(start)
         changes.append(np.linalg.lstsq(moves, seen.ravel())[0] - seeing @ start)
     change = (np.linalg.pinv(np.array(starts), rcond=RANK) @ np.array(changes)).T

@@ -44,7 +44,7 @@ class LeavesAt:
 
 @cache
 def whole():
-    return model().simulate(STEER, "dropped", tolerance=TOLERANCE)
+    return model().simulate(STEER, "dropped", solver="dopri5", tolerance=TOLERANCE)
 
 
 def model():

@@ -14,7 +14,7 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.features import feature_columns
 from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.reduction.vehicle.slow_features import FeatureText, add_fiala
+from vehiclemor.reduction.vehicle.slow_features import SlowFeatures, add_fiala
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
 from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets_of
 from vehiclemor.simulation.build import build
@@ -291,11 +291,13 @@ def test_the_tires_are_those_of_the_vehicle():
     run = car.simulate(case.maneuver, start_of(car, case))
     parameters = {name: float(car.parameters[name]) for name in FIALA}
     for wheel in WHEELS:
-        text = FeatureText(1, 0, 0)
-        add_fiala(text, wheel, ("z0", "z1"), parameters, 1000.0)
-        terms = [f"1000.0 * F_{wheel}", f"1000.0 * M_{wheel}"]
+        made = SlowFeatures(1, 0, 0)
+        force, turning, _ = add_fiala(made, wheel, made.z[0], made.z[1], (parameters, 1000.0))
+        made.line("force", 1000.0 * force)
+        made.line("turning", 1000.0 * turning)
+        terms = [("force",), ("turning",)]
         slips = np.column_stack([np.tan(of(run, f"slip_angle_{wheel}")), of(run, f"Fz_{wheel}")])
-        columns = text.columns(terms, slips, np.zeros((len(slips), 0)))
+        columns = made.columns(terms, slips, np.zeros((len(slips), 0)))
         moment = parameters["tire_width"] * columns[:, 1]
         for given, name in ((columns[:, 0], "Fy"), (moment, "Mz")):
             truth = of(run, f"{name}_{wheel}")
