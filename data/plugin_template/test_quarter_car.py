@@ -19,7 +19,7 @@ def test_methods_keep_their_contract_on_the_model():
 def test_what_the_tire_gives_moves_both_masses():
     car = vm.model("quarter_car")
     run = car.simulate(ROAD, "dropped")
-    rates = np.array([car.derivative(*point) for point in zip(run.states, run.inputs, strict=True)])
+    rates = np.array([car.rhs(*point) for point in zip(run.states, run.inputs, strict=True)])
     masses = [float(car.parameters[name]) for name in ("sprung_mass", "unsprung_mass")]
     force = run.outputs[:, car.outputs.index("tire_force")]
     np.testing.assert_allclose(rates[:, 2:] @ masses, force, rtol=0, atol=1e-9)

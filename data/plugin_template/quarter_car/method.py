@@ -55,9 +55,9 @@ class Modal:
 def fit(model, training, settings):
     """Reduce a model; `training` holds runs (time, inputs, states, outputs) to learn from."""
     began, x, none = process_time(), model.start(), np.zeros(len(model.inputs))
-    a, rate = model.system.jacobian(x, none), model.derivative(x, none)
+    a, rate = model.system.jacobian(x, none), model.rhs(x, none)
     steps = 1e-6 * np.eye(len(none))
-    b = np.array([model.derivative(x, s) - model.derivative(x, -s) for s in steps]).T / 2e-6
+    b = np.array([model.rhs(x, s) - model.rhs(x, -s) for s in steps]).T / 2e-6
     spaces = (schur(m, sort=lambda re, im: np.hypot(re, im) <= settings.fastest) for m in (a, a.T))
     right, left = (vectors[:, :kept] for _, vectors, kept in spaces)
     left = np.linalg.solve(left.T @ right, left.T)
