@@ -1,4 +1,4 @@
-"""Retired names and phrases stay out of source, help and pages; the table in CHANGELOG is exempt."""
+"""Retired names and phrases stay out of source, help and pages; CHANGELOG is exempt."""
 
 import re
 
@@ -11,7 +11,12 @@ FOLDERS = ("src", "examples", "data/plugin_template", "data/studies", "paper/tas
 # Help on the command line is made of docstrings.
 FILES = [
     *TEXTS,
-    *(path for folder in FOLDERS for end in ("py", "toml") for path in (ROOT / folder).rglob(f"*.{end}")),
+    *(
+        path
+        for name in FOLDERS
+        for end in ("py", "toml")
+        for path in (ROOT / name).rglob(f"*.{end}")
+    ),
 ]
 # Words of the project that the field has others for; spaces may be line breaks.
 PHRASES = (
