@@ -313,7 +313,7 @@ def run_study(
     -------
     xarray.Dataset
         Combined dataset on the dimensions of the study's grid.  For a collection, one row for each
-        cell of its studies on the dimension `cell`, without histories; the studies' own datasets
+        run of its studies on the dimension `cell`, without histories; the studies' own datasets
         are in the folder `studies`.
     """
     import vehiclemor.report.accessor  # noqa: F401  (results draw themselves)

@@ -1,3 +1,3 @@
-"""Command line: the same functions as the Python interface, one file a command."""
+"""The command line: one file for runs, one for studies; the same words as in Python."""
 
 from vehiclemor.cli.app import main as main

@@ -1,4 +1,4 @@
-"""What is registered, what a name declares, and a package of one's own to begin with."""
+"""What is registered, what a name declares, and a package of your own to begin with."""
 
 import json
 import re

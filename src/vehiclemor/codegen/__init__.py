@@ -1,1 +1,1 @@
-"""From symbolic programs to cached, compiled kernels."""
+"""Machine code for the equations of models, and their derivatives: generated, compiled, cached."""

@@ -1,1 +1,1 @@
-"""Models as text and packages for other tools, printed from the one program."""
+"""Models for other tools: C, functional mock-up units (FMU), CasADi, JAX, SymPy."""

@@ -1,1 +1,1 @@
-"""Inputs of models over time: maneuvers, and signals through samples."""
+"""What drives a model: maneuvers such as a lane change, and signals through samples."""

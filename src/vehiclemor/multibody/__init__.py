@@ -1,1 +1,1 @@
-"""Vehicle models, each derived symbolically in a file of its own."""
+"""Vehicle models: a suspension, a car with 14 degrees of freedom, a car with constraints."""

@@ -1,1 +1,1 @@
-"""Reduction methods, one in each file, behind the interface of `interface.py`."""
+"""Reduced models: how methods make them, how they are run, stepped, trusted and saved."""

@@ -1,1 +1,1 @@
-"""Comparison with the published numbers, tables and figures."""
+"""What is shown: tables, figures, and the comparison with the published numbers."""

@@ -172,7 +172,7 @@ def timing_of(model: str, folder: Path) -> xr.Dataset:
 def cost_table(model: str, folder: Path) -> pd.DataFrame:
     """Cost of every timing case of a model on its nominal maneuver, from every start.
 
-    Speed-ups are against the paper's kind of baseline, and against the strongest full-order solver;
+    Speed-ups are against the paper's kind of baseline, and against the fastest full-order solver;
     `break_even` is the number of runs after which a reduced model has paid for its training
     (missing where it never does).
     """

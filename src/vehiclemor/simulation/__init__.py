@@ -1,1 +1,1 @@
-"""Full-order simulation: compiled solvers, models ready to run, trajectories."""
+"""Runs of models: integrators in time, Newton's method for mechanisms, batches of runs."""

@@ -45,7 +45,7 @@ class StepSpace(NamedTuple):
     times
         Arrays that end with the length of the step.
     window
-        Index (1,) of the projection window.
+        Index (1,) of the control period.
     coefficients
         Of the inputs (1, inputs, 6).
     means

@@ -1,1 +1,1 @@
-"""Studies: grids of runs declared as data, executed, stored and combined."""
+"""Studies: many runs declared in a file, computed, stored and combined into one dataset."""

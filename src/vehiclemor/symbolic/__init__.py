@@ -1,1 +1,1 @@
-"""Symbolic layer: a single-assignment tape over SymPy scalars and vector geometry on it."""
+"""Mechanics with symbols: from bodies, joints and forces to equations of motion (SymPy)."""

@@ -1,1 +1,1 @@
-"""What vehicles share: chassis, wheels, tires."""
+"""Parts that vehicle models share: chassis, wheels, tires."""

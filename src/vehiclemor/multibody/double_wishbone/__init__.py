@@ -1,1 +1,1 @@
-"""The double-wishbone suspension."""
+"""The double-wishbone suspension: wheel travel and rack move its joints."""

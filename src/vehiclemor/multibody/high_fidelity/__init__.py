@@ -1,1 +1,1 @@
-"""The high-fidelity vehicle and its other forms."""
+"""The high-fidelity vehicle: double wishbones, trailing arms, constraints, Fiala tires."""

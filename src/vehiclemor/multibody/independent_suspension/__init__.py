@@ -1,1 +1,1 @@
-"""The 14-DOF vehicle."""
+"""The vehicle with 14 degrees of freedom: independent suspension, Magic Formula tires."""

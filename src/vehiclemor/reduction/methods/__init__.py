@@ -1,1 +1,1 @@
-"""Registered reduction methods, one in each file; none knows another."""
+"""Reduction methods, one in each file; none knows another."""

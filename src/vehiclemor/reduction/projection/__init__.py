@@ -1,1 +1,1 @@
-"""Subspaces by time window and in them the equations of a model."""
+"""Bases of control periods, and the equations of a model projected on them (POD)."""

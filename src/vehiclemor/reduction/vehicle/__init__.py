@@ -1,1 +1,1 @@
-"""What reduced vehicles are made of."""
+"""Parts of reduced vehicles: slow modes, features of the tires, training runs, decoding."""

@@ -1,1 +1,1 @@
-"""Figures of the paper, drawn from stored results."""
+"""Figures: those of the paper, and of any study, run or comparison."""

@@ -1,4 +1,4 @@
-"""What the integrators see of a system: the full state, or its projection on a subspace.
+"""Equations as integrators see them: of the full state, or projected on a subspace.
 
 Each formulation gives `rhs`, `reconstruct`, `project` and `error_norm`, compiled with the one time
 loop.

@@ -46,7 +46,7 @@ def project(problem, t, x, y, counts):
 def error_norm(problem, error, y, tolerance):
     """Largest error of a state as a multiple of its tolerance; NaN if y is.
 
-    The error is lifted first, so that a tolerance means the same in every formulation.
+    The error is reconstructed first, so that a tolerance means the same in every formulation.
     """
     mean, trial, scale = problem.mean, problem.trial, problem.equations.error_scale
     largest = 0.0

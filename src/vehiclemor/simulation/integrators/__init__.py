@@ -1,1 +1,1 @@
-"""One time loop, and integrators that give it a step, one in each file."""
+"""Integrators, one in each file, and the one time loop that calls their steps."""

@@ -43,7 +43,7 @@ class Spans(NamedTuple):
     edges
         Times (spans + 1,) in s.
     segments, windows
-        Segment of the signal and projection window of each span.
+        Segment of the signal and control period of each span.
     """
 
     edges: Vector
@@ -52,7 +52,7 @@ class Spans(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A point of a run: time in s, segment of the signal, projection window."""
+    """A point of a run: time in s, segment of the signal, control period."""
 
     time: Float
     segment: Int

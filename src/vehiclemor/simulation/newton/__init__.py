@@ -1,1 +1,1 @@
-"""Newton iterations of kinematic models along a path: sample by sample, or eight at once."""
+"""Newton's method for mechanisms along an input: sample by sample, or eight at once."""

@@ -1,1 +1,1 @@
-"""Plans of experiments: grids of one model, and protocols with training, validation and test."""
+"""Study files: grids of one model, and protocols with training, validation and test."""
