@@ -64,7 +64,8 @@ def test_a_study_is_run_and_selected_by_labels(tmp_path):
     study = tmp_path / "mine.toml"
     study.write_text(
         'title = "Yaw"\nmodel = "double_wishbone"\n[grid]\nfrequency_factor = [1.0, 1.2]\n'
-        'amplitude_factor = [1.0]\n[[methods]]\nmethod = "pod"\nlabel = "POD, r = 3"\n[methods.settings]\n'
+        'amplitude_factor = [1.0]\n[[methods]]\nmethod = "pod"\n'
+        'label = "POD, r = 3"\n[methods.settings]\n'
         "rank = 3\n"
     )
     result = vm.run_study(study, results=tmp_path)

@@ -1,7 +1,7 @@
 """Scores against bounds, and the choice of settings from validation results alone.
 
 Sampled runs on which the full order itself is sensitive are found by rule and reported apart: where
-two tolerances of the full order disagree by more than a bound, where the vehicle spins, tips over
+two integrators of the full order disagree by more than a bound, where the vehicle spins, tips over
 or has a wheel in the air, no error against one of them tells anything of a reduced model.
 """
 
@@ -137,7 +137,7 @@ def _reason(protocol: Protocol, run: xr.Dataset, score: float) -> str:
     if not np.isfinite(score):
         return f"full order: {run['message'].item()}"
     if score > 1.0:
-        return f"two tolerances of the full order differ by {score:.2g} times a bound"
+        return f"two integrators of the full order differ by {score:.2g} times a bound"
     for output, limit in protocol.definition.sensitive.items():
         value = float(run["largest_output"].sel(output=output))
         if value > limit:

@@ -67,8 +67,9 @@ def run_protocol(
         name: [workers.result(of_row[number]) for of_row in experiments]
         for number, name in enumerate(sets)
     }
-    # The full order at its default tolerance, a thousand times that of the references.
-    settings = complete_settings(model, "full_order")
+    # The full order by another integrator than that of the references.
+    preset = "recommended" if model.kind == "ae" else "paper"
+    settings = complete_settings(model, "full_order", preset=preset)
     seconds = {
         name: make_experiment(model, "full_order", settings, (), sets[name], "errors")
         for name in DRAWN
