@@ -14,6 +14,7 @@ from vehiclemor.resources import data_folder
 
 MECHANISM = "double_wishbone"
 STRONGEST = {"method": "full_order", "preset": "strongest"}
+PAPER = {"method": "full_order", "preset": "paper"}
 NO_STEERING = {"training": "nominal", "amplitude": 0.0}
 # Model -> label -> arguments of a simulation.
 RUNS = {
@@ -27,14 +28,14 @@ RUNS = {
         "replay": {"method": "replay"},
     },
     "independent_suspension_vehicle": {
-        "full order": {"method": "full_order"},
+        "full order": PAPER,
         "full order, strongest": STRONGEST,
         "pod r=3": {"method": "pod"},
         "pod state r=3": {"method": "pod", "formulation": "state"},
         "pod r=3, no steering": {"method": "pod", **NO_STEERING},
     },
     "high_fidelity_vehicle": {
-        "full order": {"method": "full_order"},
+        "full order": PAPER,
         "full order, strongest": STRONGEST,
         "pod r=1": {"method": "pod"},
         "pod coordinates r=3": {"method": "pod", "rank": 3, "formulation": "coordinates"},
