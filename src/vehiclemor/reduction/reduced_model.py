@@ -236,7 +236,7 @@ class ReducedOrderModel(ShortRepr):
         states, u, single = self._samples(state, inputs)
         full = self._stepped.decode(states, u)
         if not single:
-            return self.model.along("outputs", full, u)
+            return self.model.values_at("outputs", full, u)
         found = np.empty(len(self.model.outputs))
         self.model.kernels.call("outputs", full[0], u[0], self.model.constants, found)
         return found

@@ -108,7 +108,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         if not names:
             sensitivity = Sensitivity(PLACES[str(by)])
         elif np.array_equal(self.system.constants, self.model.constants):
-            sensitivity = Sensitivity(CONSTANTS, self.model.constants_along(names))
+            sensitivity = Sensitivity(CONSTANTS, self.model.constant_derivatives(names))
         else:
             raise InputError(
                 f"the reduced equations of {self.model.name} don't know {', '.join(names)}: "

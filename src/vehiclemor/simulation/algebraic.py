@@ -103,7 +103,7 @@ class AlgebraicModel(Model):
 
     def residual_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Residuals (samples, n) along a path of coordinates and inputs."""
-        return self.along("residual", coordinates, inputs, finite=True)
+        return self.values_at("residual", coordinates, inputs, finite=True)
 
     def joints_at(self, q: Any) -> dict[str, np.ndarray]:
         """Positions (3,) in m of the moving joints, for drawing."""
@@ -324,7 +324,7 @@ class AlgebraicModel(Model):
             inputs=inputs,
             coordinates=path,
             speeds=path[:, :0],
-            outputs=self.along("outputs", path, inputs) if outputs is None else outputs,
+            outputs=self.values_at("outputs", path, inputs) if outputs is None else outputs,
             counts=dict(zip(ALGEBRAIC_COUNTS, counts, strict=False)),
             seconds=seconds,
             status=status,

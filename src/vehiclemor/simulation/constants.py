@@ -67,7 +67,7 @@ def components(definition: ModelDefinition, name: str) -> range:
     return range(first, first + declared[name].size)
 
 
-def constants_along(
+def constant_derivatives(
     definition: ModelDefinition, flat: np.ndarray, equations: Derivation, numbers: Sequence[int]
 ) -> np.ndarray:
     """Derivatives (numbers, constants) of the hoisted constants by components of the parameters.

@@ -108,7 +108,7 @@ class DynamicModel(Model):
 
     def rhs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """State derivatives (samples, 2 n) along a path of states and inputs."""
-        return self.along("derivative", states, inputs, finite=True)
+        return self.values_at("derivative", states, inputs, finite=True)
 
     def jacobian(
         self, state: Any, u: Any, with_respect_to: By = "state", of: str = "rhs"

@@ -27,7 +27,7 @@ def partial(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int) 
     return _sensitivity(kernels, name, arrays, size, place).jacobian(arrays)
 
 
-def along(
+def directional(
     kernels: Kernels, name: str, arrays: Arrays, size: int, place: int, directions: np.ndarray
 ) -> np.ndarray:
     """Derivatives (k, size) of a kernel's result along directions (k, n) of one argument."""

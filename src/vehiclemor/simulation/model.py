@@ -19,16 +19,16 @@ from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
-from vehiclemor.simulation.constants import components, constants_along
+from vehiclemor.simulation.constants import components, constant_derivatives
 from vehiclemor.simulation.kernel_derivatives import (
     CONSTANTS,
     PLACES,
     By,
-    along,
+    directional,
     parameter_names,
     partial,
 )
-from vehiclemor.simulation.paths import along as along_path
+from vehiclemor.simulation.paths import at_samples
 from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Names, Start, Trajectory
 
 NEEDED_FOR = {
@@ -165,9 +165,9 @@ class Model(ShortRepr):
 
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
-        return self.along("outputs", states, inputs, finite=True)
+        return self.values_at("outputs", states, inputs, finite=True)
 
-    def along(
+    def values_at(
         self, function: str, states: np.ndarray, inputs: np.ndarray, finite: bool = False
     ) -> np.ndarray:
         """Results (samples, size) of a function of the equations along a path.
@@ -179,7 +179,7 @@ class Model(ShortRepr):
         """
         self.require(function)
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
-        return along_path(self.kernels, function, self.constants, (states, inputs), sizes, finite)
+        return at_samples(self.kernels, function, self.constants, (states, inputs), sizes, finite)
 
     @abstractmethod
     def jacobian(self, state: Any, u: Any, with_respect_to: By = "state") -> np.ndarray:
@@ -240,8 +240,8 @@ class Model(ShortRepr):
         state, u = self._state(state, "q" if self.kind == "ae" else "x"), self._inputs(u)
         arrays = state, u, self.constants
         if names:
-            directions = self.constants_along(names)
-            found = along(self.kernels, function, arrays, size, CONSTANTS, directions).T
+            directions = self.constant_derivatives(names)
+            found = directional(self.kernels, function, arrays, size, CONSTANTS, directions).T
         else:
             assert isinstance(by, str)
             found = partial(self.kernels, function, arrays, size, PLACES[by])
@@ -249,16 +249,18 @@ class Model(ShortRepr):
             raise InputError(f"the derivatives of {self.name} are not finite at this state")
         return found
 
-    def constants_along(self, names: Sequence[str]) -> np.ndarray:
+    def constant_derivatives(self, names: Sequence[str]) -> np.ndarray:
         """Derivatives (components, constants) of the constants by parameters; they are kept."""
         for name in names:
-            if name not in self._along:
+            if name not in self._constant_derivatives:
                 numbers, flat = components(self.definition, name), self.parameters.flat()
-                self._along[name] = constants_along(self.definition, flat, self.equations, numbers)
-        return np.concatenate([self._along[name] for name in names])
+                self._constant_derivatives[name] = constant_derivatives(
+                    self.definition, flat, self.equations, numbers
+                )
+        return np.concatenate([self._constant_derivatives[name] for name in names])
 
     @cached_property
-    def _along(self) -> dict[str, np.ndarray]:
+    def _constant_derivatives(self) -> dict[str, np.ndarray]:
         return {}
 
     def _state(self, state: Any, name: str) -> np.ndarray:

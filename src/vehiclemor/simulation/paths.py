@@ -15,7 +15,7 @@ from vehiclemor.simulation.checks import checked_path
 PATH_LOOPS = ("simulation.integrators.structures", "simulation.path_loops")
 
 
-def along(
+def at_samples(
     kernels: Kernels,
     name: str,
     constants: np.ndarray,

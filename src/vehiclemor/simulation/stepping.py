@@ -19,7 +19,7 @@ from vehiclemor.codegen.loops import ready
 from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.simulation.integrators.structures import Output, Spans
-from vehiclemor.simulation.kernel_derivatives import CONSTANTS, STATE, along, partial
+from vehiclemor.simulation.kernel_derivatives import CONSTANTS, STATE, directional, partial
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Solver, Workspace
@@ -261,14 +261,14 @@ class _Kernels(NamedTuple):
 
     def value(self, name: str, x: np.ndarray, size: int) -> np.ndarray:
         """Result (size,) of a kernel."""
-        return self.system.along(name, x[None], self.inputs[None], size)[0]
+        return self.system.values_at(name, x[None], self.inputs[None], size)[0]
 
     def own(self, name: str, x: np.ndarray, size: int) -> np.ndarray:
         """Sensitivities (size, columns) at a state that doesn't vary but by itself."""
         assert self.by is not None
         arrays = x, self.inputs, self.system.constants
         if self.by.argument == CONSTANTS:
-            return along(self.system.kernels, name, arrays, size, *self.by).T
+            return directional(self.system.kernels, name, arrays, size, *self.by).T
         return partial(self.system.kernels, name, arrays, size, self.by.argument)
 
     def of(self, name: str, x: np.ndarray, dx: np.ndarray, size: int) -> Varied:
@@ -277,5 +277,5 @@ class _Kernels(NamedTuple):
         if self.by is None:
             return value, np.zeros((size, 0))
         arrays, seeds = (x, self.inputs, self.system.constants), np.ascontiguousarray(dx.T)
-        found = along(self.system.kernels, name, arrays, size, STATE, seeds).T
+        found = directional(self.system.kernels, name, arrays, size, STATE, seeds).T
         return value, found if self.by.argument == STATE else found + self.own(name, x, size)

@@ -30,7 +30,7 @@ from vehiclemor.simulation.integrators.structures import (
     Method,
     Output,
 )
-from vehiclemor.simulation.paths import address_of, along, path_loops
+from vehiclemor.simulation.paths import address_of, at_samples, path_loops
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Pool, Run, Solver, Workspace
@@ -120,10 +120,10 @@ class System(ShortRepr):
         loop(loop_array(x), loop_array(u), equations, self.active, work, result)
         return result
 
-    def along(self, kernel: str, path: np.ndarray, inputs: np.ndarray, size: int) -> np.ndarray:
+    def values_at(self, kernel: str, path: np.ndarray, inputs: np.ndarray, size: int) -> np.ndarray:
         """Results (samples, size) of a kernel along a path of states and inputs."""
         sizes = len(self.reference), self.inputs, size
-        return along(self.kernels, kernel, self.constants, (path, inputs), sizes)
+        return at_samples(self.kernels, kernel, self.constants, (path, inputs), sizes)
 
     @cached_property
     def frozen_jacobian(self) -> np.ndarray:
@@ -137,7 +137,7 @@ class System(ShortRepr):
         if not len(self.turning):
             return jacobian
         heading, pairs = self.turning[0], self.turning[1:].reshape(-1, 2)
-        (rates,) = self.along("derivative", x[None], np.zeros((1, self.inputs)), len(x))
+        (rates,) = self.values_at("derivative", x[None], np.zeros((1, self.inputs)), len(x))
         for a, b in pairs:
             jacobian[:, heading] += x[a] * jacobian[:, b] - x[b] * jacobian[:, a]
         for a, b in pairs:

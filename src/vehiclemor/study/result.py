@@ -182,7 +182,7 @@ def _of_one_run(model: Model, outcome: Outcome) -> dict[str, object]:
         none = np.full(len(model.outputs), np.nan)
         found["floor_rms_error"] = none if outcome.projection is None else outcome.projection
     if model.kind == "ae":
-        residuals = model.along("residual", run.coordinates, run.inputs)
+        residuals = model.values_at("residual", run.coordinates, run.inputs)
         found["largest_residual"] = float(np.abs(residuals).max())
     return found
 

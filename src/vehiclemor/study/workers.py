@@ -242,6 +242,7 @@ def cluster(scheduler: str) -> Iterator[Engine]:
     # What matters is said in one line; dask would add a traceback for each lost connection.
     with silence_logging_cmgr(logging.CRITICAL):
         client: Any = None
+        reason = ""
         try:
             # Its types are those of awaited calls too.
             client = Client(scheduler, timeout=REACH, set_as_default=False)

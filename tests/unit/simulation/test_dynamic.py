@@ -124,7 +124,7 @@ def test_a_kernel_that_is_not_there_is_never_called(standard):
     with pytest.raises(InputError, match="no speeds"):
         system.called("coordinates", "")
     with pytest.raises(InputError, match="no outputs"):
-        system.along("outputs", np.zeros((1, 4)), np.zeros((1, 3)), 8)
+        system.values_at("outputs", np.zeros((1, 4)), np.zeros((1, 3)), 8)
 
 
 # Runs that begin in mid-maneuver: cut at any time and continued, a run is the uncut one

@@ -92,7 +92,7 @@ class AlgebraicProjection(ReducedMechanism):
         """Largest number of reduced coordinates in any window."""
         return max(basis.rank for basis in self.bases)
 
-    def solved_along(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
+    def solved_at(self, times: np.ndarray, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
         """Solve the reduced equations at some times, beginning at a state (n,)."""
         model = self.model
         n, windows = len(model.coordinates), len(self.bases)
@@ -121,11 +121,11 @@ class AlgebraicProjection(ReducedMechanism):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """Solve the reduced equations at the maneuver's output times."""
         times, inputs, _ = self.model.sampled(maneuver)
-        return self.solved_along(times, inputs, self.model.start(start))
+        return self.solved_at(times, inputs, self.model.start(start))
 
     def solved(self, time: float, inputs: np.ndarray, state: np.ndarray) -> Trajectory:
         """Solution at one time, in the window that it is in."""
-        return self.solved_along(np.array([time]), inputs, state)
+        return self.solved_at(np.array([time]), inputs, state)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""

@@ -32,7 +32,7 @@ from vehiclemor.codegen.operations import (
     pruned,
 )
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.simulation.paths import along
+from vehiclemor.simulation.paths import at_samples
 from vehiclemor.simulation.system import System
 from vehiclemor.sizes import apart, require
 
@@ -256,7 +256,7 @@ def feature_columns(
 ) -> np.ndarray:
     """Features (samples, terms) of reduced coordinates (samples, states) and inputs."""
     sizes = features.states, features.inputs, len(features.terms)
-    return along(_column_kernels(features), "columns", parameters, (z, u), sizes)
+    return at_samples(_column_kernels(features), "columns", parameters, (z, u), sizes)
 
 
 @cache

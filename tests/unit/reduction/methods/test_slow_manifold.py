@@ -121,7 +121,7 @@ def test_kernels_are_the_features_that_are_fitted(reduced):
     rng, k = np.random.default_rng(1), reduced.features.states
     y = rng.normal(size=(20, k + 3)) * reduced.error_scale / 3.0
     u = rng.normal(size=(20, 1)) * 0.03
-    found = reduced.system.along("derivative", y, u, k + 3)
+    found = reduced.system.values_at("derivative", y, u, k + 3)
     values = (
         feature_columns(reduced.features, y[:, :k], u, reduced.parameters) @ reduced.coefficients
     )
