@@ -45,7 +45,7 @@ def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the runs have other output times, or an output is missing.
+        If the runs have other inputs or output times, or an output is missing.
     """
     import xarray as xr
 
@@ -68,3 +68,5 @@ def _require_runs(run: Any, full: Any) -> None:
             raise InputError(f"{name} is {quoted(given)}, not a run as `simulate` gives it")
     if not np.array_equal(run.times, full.times):
         raise InputError("the runs have other output times: simulate both with the same input")
+    if not np.allclose(run.inputs, full.inputs, rtol=1e-6, atol=1e-9 * np.abs(full.inputs).max()):
+        raise InputError("the runs have other inputs: simulate both with the same")

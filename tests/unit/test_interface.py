@@ -87,9 +87,48 @@ def test_a_study_is_run_and_selected_by_labels(tmp_path):
         (lambda run: vm.errors(run, 3), "full"),
         (lambda run: vm.errors(run, run.chosen(times=[0.0])), "times"),
         (lambda run: vm.errors(run, run.chosen("yaw")), "longitudinal_position"),
+        (lambda run: run.chosen(["yaw", "yaw"]), "twice"),
+        (lambda run: vm.errors(run, run.model.simulate(vm.maneuver("straight_ahead"))), "inputs"),
+        (lambda run: run.model.bare(["rhs"]), "rhs"),
     ],
 )
 def test_what_a_run_does_not_have_is_one_line(car, call, word):
     run = car.simulate(vm.maneuver("lane_change"), solver="ros34pw2", tolerance=1e-3)
     with pytest.raises(vm.VehiclemorError, match=word):
         call(run)
+
+
+@pytest.mark.parametrize("method", [None, "pod", "full_order", "fixed_basis", "replay"])
+def test_an_output_that_there_is_not_is_one_line(car, method):
+    turn = vm.maneuver("lane_change")
+    model = car if method is None else vm.reduce(car, method, training="lane_change")
+    with pytest.raises(vm.VehiclemorError, match=r"'lateral_postion'.*lateral_position") as error:
+        model.simulate(turn, outputs=["lateral_postion"])
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("method", [None, "pod", "replay", "slow_manifold"])
+def test_what_is_written_into_a_run_changes_no_other(car, method):
+    turn = vm.maneuver("lane_change")
+    maneuvers = [turn, vm.maneuver("lane_change", amplitude=-1.2), vm.maneuver("straight_ahead")]
+    model = car if method is None else vm.reduce(car, method, training=maneuvers)
+    before, times = model.simulate(turn), turn.times.copy()
+    kept = before.outputs.copy(), before.states.copy()
+    for run in (before, before.chosen(["yaw"]), model.simulate(turn)):
+        for array in (run.times, run.inputs, run.coordinates, run.speeds, run.outputs):
+            try:
+                array[...] = 3.0
+            except ValueError:
+                # It can't be written.
+                continue
+    after = model.simulate(turn)
+    np.testing.assert_array_equal(after.times, times)
+    np.testing.assert_array_equal(after.outputs, kept[0])
+    np.testing.assert_array_equal(after.states, kept[1])
+
+
+def test_times_that_are_given_are_copied(car):
+    times = np.linspace(0.0, 5.0, 11)
+    run = car.simulate(vm.maneuver("lane_change"), times=times)
+    times += 1.0
+    assert run.times[0] == 0.0

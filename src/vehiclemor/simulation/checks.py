@@ -90,6 +90,8 @@ def output_times(
 ) -> np.ndarray:
     """Output times (samples,) in s; the maneuver's from `begin` on where none are given.
 
+    They are a copy that can't be written: many runs share it.
+
     Parameters
     ----------
     repeats
@@ -104,7 +106,7 @@ def output_times(
         within("begin", number("begin", begin), (0.0, maneuver.duration), " s")
     if given is None:
         times = maneuver.times
-        return times[times >= begin] if begin else times
+        return _shared(times[times >= begin])
     try:
         times = loop_array(given)
     except (TypeError, ValueError):
@@ -119,6 +121,11 @@ def output_times(
         raise InputError(
             f"output times must lie within the run, {begin:g} to {maneuver.duration:g} s"
         )
+    return _shared(times.copy())
+
+
+def _shared(times: np.ndarray) -> np.ndarray:
+    times.flags.writeable = False
     return times
 
 

@@ -197,7 +197,7 @@ class Model(ShortRepr):
     def require(self, *functions: str) -> None:
         """Raise `InputError` if the model's equations lack one of these functions."""
         for name in functions:
-            if name not in self.equations.shapes:
+            if (name := str(name)) not in self.equations.shapes:
                 needed = NEEDED_FOR.get(name, f"it has {', '.join(self.equations.shapes)}")
                 raise InputError(f"{self.name} has no {name}: {needed}")
 
@@ -223,7 +223,7 @@ class Model(ShortRepr):
         function
             `rhs`, `outputs`, or another of the equations.
         """
-        function = {"rhs": "derivative"}.get(function, function)
+        function = "derivative" if function == "rhs" else function
         self.require(function)
         return self.kernels.bare(function, self.constants)
 

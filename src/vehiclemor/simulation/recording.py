@@ -8,6 +8,7 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Ready, address_of_array, cache_lines, ready
 from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import limits_of
 from vehiclemor.simulation.integrators.structures import Outputs
 from vehiclemor.simulation.model import Model
@@ -91,6 +92,7 @@ class Recorder:
             states, copied = model.definition.states, self._copied
             kernel, columns = [], []
             for name in names:
+                choice("output", name, (*model.outputs, *states))
                 number = model.outputs.index(name) if name in model.outputs else -1
                 column = states.index(name) if number < 0 else copied[number]
                 if column < 0:

@@ -75,7 +75,7 @@ class Trust:
         return f"from t = {self.until:.4g} s on {self.reason}" if self.reason else ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory(ShortRepr):
     """Result of one simulation.
 
@@ -235,8 +235,13 @@ class Trajectory(ShortRepr):
 def output_names(outputs: Any) -> tuple[str, ...]:
     """Names of chosen outputs; `InputError` if they are none."""
     names = (outputs,) if isinstance(outputs, str) else outputs
-    if type(names) not in (tuple, list) or not names or not all(type(n) is str for n in names):
+    if isinstance(names, np.ndarray):
+        names = names.ravel().tolist()
+    if type(names) not in (tuple, list) or not names or not all(isinstance(n, str) for n in names):
         raise InputError(f"outputs is {quoted(outputs)}, not a list of names")
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"outputs: {quoted(twice)} stands twice")
     return tuple(names)
 
 

@@ -51,17 +51,16 @@ class ReplayModel(ShortRepr):
         inputs = maneuver.at(times)
         alike = [run for run in self.recorded if np.array_equal(run.times, times)]
         nearest = min(alike or self.recorded, key=lambda run: _distance(run, times, inputs))
-        if not alike:
-            nearest = replace(
-                nearest,
-                coordinates=_resampled(nearest.times, nearest.coordinates, times),
-                speeds=_resampled(nearest.times, nearest.speeds, times),
-            )
+        paths = nearest.coordinates, nearest.speeds
+        # Copies: the training run stays what it is.
+        q, v = (p.copy() if alike else _resampled(nearest.times, p, times) for p in paths)
         return replace(
             nearest,
             times=times,
             inputs=inputs,
-            outputs=self.model.outputs_at(nearest.states, inputs),
+            coordinates=q,
+            speeds=v,
+            outputs=self.model.outputs_at(np.hstack((q, v)), inputs),
             counts=dict.fromkeys(self.model.counts, 0),
             seconds=0.0,
         )
