@@ -21,11 +21,11 @@ Rank = Annotated[
     int,
     Field(
         ge=1,
-        description="number of basis vectors in each window; by default no more than coordinates",
+        description="number of basis vectors in each control period; by default no more than coordinates",
     ),
     AT_MOST_COORDINATES,
 ]
-Snapshots = Annotated[int, Field(ge=2, description="snapshots in each window and training run")]
+Snapshots = Annotated[int, Field(ge=2, description="snapshots in each control period and training run")]
 RankTolerance = Annotated[
     float,
     Field(
