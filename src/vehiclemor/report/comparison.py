@@ -82,21 +82,23 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
     results = dict(run_studies(PAPER, folder, jobs))
     results |= {timing: timing_of(model, folder) for model, timing in TIMING.items()}
     results = {name: of_published_start(dataset) for name, dataset in results.items()}
-    numbers, claims = compared(), load_published().claims.values()
-    rows = [row for n in numbers for row in rows_of(n, number_criterion(n), results)]
-    for claim in claims:
-        if claim.kind != "setup":
-            rows += rows_of(claim, claim_criterion(claim), results)
+    numbers, claims = compared(), load_published().claim
+    judged_by = [(number, number_criterion(number)) for number in numbers]
+    judged_by += [(claim, claim_criterion(claim)) for claim in claims if claim.kind != "setup"]
+    rows = [row for entry, criterion in judged_by for row in rows_of(entry, criterion, results)]
     place = {model: index for index, model in enumerate(dict.fromkeys(n.model for n in numbers))}
     return pd.DataFrame(sorted(rows, key=lambda row: place.get(row["model"], len(place))))
 
 
-def claim_criterion(claim: Claim) -> Criterion | None:
-    """The criterion of a claim, if there is one; a number that was measured once stands for one."""
-    if (old := claim.measured) is None:
-        return (CRITERIA | CLAIMS).get(claim.id)
-    finding = Finding(old.value, old.bound, old.value <= old.bound, old.measure, old.seen)
-    return Criterion(lambda *_: finding, variants={"": old.variant}, of_replay=False)
+def claim_criterion(claim: Claim) -> Criterion:
+    """The criterion of a claim; without one it is what was measured once, or nothing."""
+    if found := (CRITERIA | CLAIMS).get(claim.id):
+        return found
+    finding, variant = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-"), ""
+    if old := claim.measured:
+        finding = Finding(old.value, old.bound, old.value <= old.bound, old.measure, old.seen)
+        variant = old.variant
+    return Criterion(lambda *_: finding, variants={"": variant}, of_replay=False)
 
 
 def of_published_start(dataset: xr.Dataset) -> xr.Dataset:
@@ -105,17 +107,14 @@ def of_published_start(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.sel(start=PUBLISHED_START) if several else dataset
 
 
-def rows_of(entry: Number | Claim, criterion: Criterion | None, results: Results) -> Iterator[Row]:
-    """A row for each variant of the method; one without a number for what can't be measured."""
+def rows_of(entry: Number | Claim, criterion: Criterion, results: Results) -> Iterator[Row]:
+    """A row for each variant of the method."""
     head: Row = {"id": entry.id, "model": entry.model or ALL_MODELS}
     if isinstance(entry, Number):
         head["item"] = f"{entry.item} (figure {entry.figure})" if entry.figure else entry.item
     else:
         head["item"] = f"figure {entry.figure}: " * bool(entry.figure) + entry.statement
     head["published"] = entry.value if isinstance(entry, Number) else math.nan
-    if criterion is None:
-        nothing = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-")
-        criterion = Criterion(lambda *_: nothing, variants={"": ""}, of_replay=False)
     replay = criterion(results, "replay").reproduced if criterion.of_replay else math.nan
     for label, variant in criterion.variants.items():
         finding = criterion(results, label)

@@ -22,10 +22,7 @@ ENGINES = {"zarr": "zarr", "parquet": "pyarrow"}
 
 
 def convert(
-    study: str | Path,
-    to: Format,
-    out: str | Path | None = None,
-    results: str | Path = "results",
+    study: str | Path, to: Format, out: str | Path | None = None, results: str | Path = "results"
 ) -> Path:
     """Write the stored result of a study in another format.
 
