@@ -15,7 +15,7 @@ from vehiclemor.registry import component, names, unknown
 from vehiclemor.report.criteria import CRITERIA
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.findings import Criterion, Finding, Results, judged
-from vehiclemor.report.frames import grid_rows
+from vehiclemor.report.frames import frame, grid_rows
 from vehiclemor.report.labels import of_kind, timing_cases
 from vehiclemor.report.printed_numbers import CLAIMS, TIMING, compared, number_criterion
 from vehiclemor.report.published import Claim, Number, load_published
@@ -175,38 +175,28 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
     `break_even` is the number of runs after which a reduced model has paid for its training
     (missing where it never does).
     """
-    data, kind = timing_of(model, folder), component("model", model).kind
-    rows = [
-        _cost_row(data.sel(start=start, case=case), list(of_kind(kind).counts))
-        for start in data["start"].values
-        for case in data["case"].values
-    ]
-    return pd.DataFrame(rows)
-
-
-def _cost_row(data: xr.Dataset, counts: list[str]) -> Row:
-    """One case from one start."""
-    own, offline = float(data["seconds"]), float(data["offline_seconds"])
-    spread = float(data["seconds_upper"] - data["seconds_lower"])
-    status = str(data["status"].item())
-    speed_ups = {name: float(data[name]) for name in ("speed_up", "speed_up_strongest")}
+    runs: Any = frame(timing_of(model, folder))
+    seconds, offline = runs["seconds"], runs["offline_seconds"]
+    spread = runs["seconds_upper"] - runs["seconds_lower"]
     # Time saved in a run; a run that has failed saves nothing.
-    saved = [own * (ratio - 1.0) if status == "ok" else 0.0 for ratio in speed_ups.values()]
-    even = [offline / s if s > 0.0 and offline > 0.0 else math.nan for s in saved]
-    return {
-        **{name: str(data[name].item()) for name in ("start", "case", "label")},
-        "status": status,
-        "rank": int(data["effective_rank"]),
-        "us_per_run": own * 1e6,
-        "ns_per_sample": float(data["seconds_per_sample"]) * 1e9,
-        **{name: int(data[name]) for name in counts},
-        "tolerance": float(data["tolerance"]),
-        "quartile_spread": spread / own if own > 0.0 else 0.0,
-        **speed_ups,
-        "loop_us": float(data["loop_seconds"]) * 1e6,
-        **{f"loop_{name}": float(data[f"loop_{name}"]) for name in speed_ups},
-        **{f"rms_{o}": float(data["rms_error"].sel(output=o)) for o in data["output"].values},
-        "offline_us": offline * 1e6,
+    speed_ups = ["speed_up", "speed_up_strongest"]
+    saved = [seconds * (runs[name] - 1.0).where(runs["status"] == "ok", 0.0) for name in speed_ups]
+    even = [(offline / s).where((s > 0.0) & (offline > 0.0)) for s in saved]
+    errors = [name for name in runs if name.startswith("rms_error.")]
+    renamed = {"effective_rank": "rank"} | {n: n.replace("rms_error.", "rms_") for n in errors}
+    counts = of_kind(component("model", model).kind).counts
+    derived = {
+        "us_per_run": 1e6 * seconds,
+        "ns_per_sample": 1e9 * runs["seconds_per_sample"],
+        "quartile_spread": (spread / seconds).where(seconds > 0.0, 0.0),
+        "loop_us": 1e6 * runs["loop_seconds"],
+        "offline_us": 1e6 * offline,
         "break_even": even[0],
         "break_even_strongest": even[1],
     }
+    columns = ["start", "case", "label", "status", "rank", "us_per_run", "ns_per_sample", *counts]
+    columns += ["tolerance", "quartile_spread", *speed_ups]
+    columns += ["loop_us", *(f"loop_{name}" for name in speed_ups)]
+    columns += [*(renamed[name] for name in errors)]
+    columns += ["offline_us", "break_even", "break_even_strongest"]
+    return runs.assign(**derived).rename(columns=renamed)[columns]
