@@ -96,11 +96,6 @@ def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
     return dataset.get("in_training", dataset["status"].isnull() & False)
 
 
-def marked(text: str, run: xr.Dataset) -> str:
-    """The text of a run in a legend, with a mark if its method was trained on it."""
-    return text + MARK * bool(trained_runs(run).all())
-
-
 def readable_unit(largest: float, unit: str) -> tuple[float, str]:
     """Factor and prefixed unit in which values up to `largest` have few digits."""
     if not unit.startswith(("m", "rad")) or not 0.0 < largest < 0.1:
