@@ -151,10 +151,7 @@ def figures(
 
 
 def report(
-    *studies: str,
-    out: Path = Path("report.html"),
-    results: Results = RESULTS,
-    jobs: Jobs = 1,
+    *studies: str, out: Path = Path("report.html"), results: Results = RESULTS, jobs: Jobs = 1
 ) -> None:
     """Write results as one HTML file: verdicts, tables, figures, settings and provenance.
 

@@ -15,7 +15,7 @@ from vehiclemor.registry import component, names, unknown
 from vehiclemor.report.criteria import CRITERIA
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.findings import Criterion, Finding, Results, judged
-from vehiclemor.report.frames import grid_rows
+from vehiclemor.report.frames import frame, grid_rows
 from vehiclemor.report.labels import of_kind, timing_cases
 from vehiclemor.report.printed_numbers import CLAIMS, TIMING, compared, number_criterion
 from vehiclemor.report.published import Claim, Number, load_published
@@ -82,21 +82,23 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
     results = dict(run_studies(PAPER, folder, jobs))
     results |= {timing: timing_of(model, folder) for model, timing in TIMING.items()}
     results = {name: of_published_start(dataset) for name, dataset in results.items()}
-    numbers, claims = compared(), load_published().claims.values()
-    rows = [row for n in numbers for row in rows_of(n, number_criterion(n), results)]
-    for claim in claims:
-        if claim.kind != "setup":
-            rows += rows_of(claim, claim_criterion(claim), results)
+    numbers, claims = compared(), load_published().claim
+    judged_by = [(number, number_criterion(number)) for number in numbers]
+    judged_by += [(claim, claim_criterion(claim)) for claim in claims if claim.kind != "setup"]
+    rows = [row for entry, criterion in judged_by for row in rows_of(entry, criterion, results)]
     place = {model: index for index, model in enumerate(dict.fromkeys(n.model for n in numbers))}
     return pd.DataFrame(sorted(rows, key=lambda row: place.get(row["model"], len(place))))
 
 
-def claim_criterion(claim: Claim) -> Criterion | None:
-    """The criterion of a claim, if there is one; a number that was measured once stands for one."""
-    if (old := claim.measured) is None:
-        return (CRITERIA | CLAIMS).get(claim.id)
-    finding = Finding(old.value, old.bound, old.value <= old.bound, old.measure, old.seen)
-    return Criterion(lambda *_: finding, variants={"": old.variant}, of_replay=False)
+def claim_criterion(claim: Claim) -> Criterion:
+    """The criterion of a claim; without one it is what was measured once, or nothing."""
+    if found := (CRITERIA | CLAIMS).get(claim.id):
+        return found
+    finding, variant = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-"), ""
+    if old := claim.measured:
+        finding = Finding(old.value, old.bound, old.value <= old.bound, old.measure, old.seen)
+        variant = old.variant
+    return Criterion(lambda *_: finding, variants={"": variant}, of_replay=False)
 
 
 def of_published_start(dataset: xr.Dataset) -> xr.Dataset:
@@ -105,17 +107,14 @@ def of_published_start(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.sel(start=PUBLISHED_START) if several else dataset
 
 
-def rows_of(entry: Number | Claim, criterion: Criterion | None, results: Results) -> Iterator[Row]:
-    """A row for each variant of the method; one without a number for what can't be measured."""
+def rows_of(entry: Number | Claim, criterion: Criterion, results: Results) -> Iterator[Row]:
+    """A row for each variant of the method."""
     head: Row = {"id": entry.id, "model": entry.model or ALL_MODELS}
     if isinstance(entry, Number):
         head["item"] = f"{entry.item} (figure {entry.figure})" if entry.figure else entry.item
     else:
         head["item"] = f"figure {entry.figure}: " * bool(entry.figure) + entry.statement
     head["published"] = entry.value if isinstance(entry, Number) else math.nan
-    if criterion is None:
-        nothing = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-")
-        criterion = Criterion(lambda *_: nothing, variants={"": ""}, of_replay=False)
     replay = criterion(results, "replay").reproduced if criterion.of_replay else math.nan
     for label, variant in criterion.variants.items():
         finding = criterion(results, label)
@@ -176,38 +175,28 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
     `break_even` is the number of runs after which a reduced model has paid for its training
     (missing where it never does).
     """
-    data, kind = timing_of(model, folder), component("model", model).kind
-    rows = [
-        _cost_row(data.sel(start=start, case=case), list(of_kind(kind).counts))
-        for start in data["start"].values
-        for case in data["case"].values
-    ]
-    return pd.DataFrame(rows)
-
-
-def _cost_row(data: xr.Dataset, counts: list[str]) -> Row:
-    """One case from one start."""
-    own, offline = float(data["seconds"]), float(data["offline_seconds"])
-    spread = float(data["seconds_upper"] - data["seconds_lower"])
-    status = str(data["status"].item())
-    speed_ups = {name: float(data[name]) for name in ("speed_up", "speed_up_strongest")}
+    runs: Any = frame(timing_of(model, folder))
+    seconds, offline = runs["seconds"], runs["offline_seconds"]
+    spread = runs["seconds_upper"] - runs["seconds_lower"]
     # Time saved in a run; a run that has failed saves nothing.
-    saved = [own * (ratio - 1.0) if status == "ok" else 0.0 for ratio in speed_ups.values()]
-    even = [offline / s if s > 0.0 and offline > 0.0 else math.nan for s in saved]
-    return {
-        **{name: str(data[name].item()) for name in ("start", "case", "label")},
-        "status": status,
-        "rank": int(data["effective_rank"]),
-        "us_per_run": own * 1e6,
-        "ns_per_sample": float(data["seconds_per_sample"]) * 1e9,
-        **{name: int(data[name]) for name in counts},
-        "tolerance": float(data["tolerance"]),
-        "quartile_spread": spread / own if own > 0.0 else 0.0,
-        **speed_ups,
-        "loop_us": float(data["loop_seconds"]) * 1e6,
-        **{f"loop_{name}": float(data[f"loop_{name}"]) for name in speed_ups},
-        **{f"rms_{o}": float(data["rms_error"].sel(output=o)) for o in data["output"].values},
-        "offline_us": offline * 1e6,
+    speed_ups = ["speed_up", "speed_up_strongest"]
+    saved = [seconds * (runs[name] - 1.0).where(runs["status"] == "ok", 0.0) for name in speed_ups]
+    even = [(offline / s).where((s > 0.0) & (offline > 0.0)) for s in saved]
+    errors = [name for name in runs if name.startswith("rms_error.")]
+    renamed = {"effective_rank": "rank"} | {n: n.replace("rms_error.", "rms_") for n in errors}
+    counts = of_kind(component("model", model).kind).counts
+    derived = {
+        "us_per_run": 1e6 * seconds,
+        "ns_per_sample": 1e9 * runs["seconds_per_sample"],
+        "quartile_spread": (spread / seconds).where(seconds > 0.0, 0.0),
+        "loop_us": 1e6 * runs["loop_seconds"],
+        "offline_us": 1e6 * offline,
         "break_even": even[0],
         "break_even_strongest": even[1],
     }
+    columns = ["start", "case", "label", "status", "rank", "us_per_run", "ns_per_sample", *counts]
+    columns += ["tolerance", "quartile_spread", *speed_ups]
+    columns += ["loop_us", *(f"loop_{name}" for name in speed_ups)]
+    columns += [*(renamed[name] for name in errors)]
+    columns += ["offline_us", "break_even", "break_even_strongest"]
+    return runs.assign(**derived).rename(columns=renamed)[columns]

@@ -114,9 +114,8 @@ def bounds(model: Model) -> dict[str, float]:
 
 def _study(name: str, kind: str, results: Path, further: dict[str, Any]) -> str:
     """Path of a study file of every method."""
-    title, entries = f"{name}: {kind} input, every method", _entries(build(name))
-    content = {"title": title, "model": name, "methods": entries, **further}
-    return _written(results, f"{name}-{kind}", content)
+    head = {"title": f"{name}: {kind} input, every method", "model": name}
+    return _written(results, f"{name}-{kind}", head | {"methods": _entries(build(name))} | further)
 
 
 def _written(results: Path, study: str, content: dict[str, Any]) -> str:

@@ -21,10 +21,7 @@ from vehiclemor.study.plans.study_file import SETS, StudyFile, values
 from vehiclemor.toml_files import read_toml
 
 Description = dict[str, Any]
-SCHEMAS: dict[str, type[BaseModel]] = {
-    "study-schema": StudyFile,
-    "parameter-schema": ParameterFile,
-}
+SCHEMAS: dict[str, type[BaseModel]] = {"study-schema": StudyFile, "parameter-schema": ParameterFile}
 TYPES = {"string": "text", "boolean": "true or false", "array": "list", "object": "table"}
 KINDS = {
     "ae": "algebraic equations Phi(q; u) = 0",
@@ -38,9 +35,7 @@ SHOWN = 40
 
 
 def description(
-    name: str,
-    parameters: Mapping[str, object] | None = None,
-    parameter_file: Path | None = None,
+    name: str, parameters: Mapping[str, object] | None = None, parameter_file: Path | None = None
 ) -> Description:
     """What a name stands for; lists of dictionaries are the rows of tables."""
     if not isinstance(name, str):

@@ -1,22 +1,18 @@
 """Results as frames: a row for each run, of grids and protocols alike, and tables made of them."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
 from vehiclemor.registry import component
 from vehiclemor.report.labels import trained_runs
-from vehiclemor.report.printing import ends_text
+from vehiclemor.report.printing import ends_text, shown
 from vehiclemor.simulation.trajectory import EVALUATIONS, FINISHED
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Kind of the rows of a grid in a comparison, and of what they have the median.
 ERRORS = "errors"
@@ -30,8 +26,6 @@ def frame(dataset: xr.Dataset, variables: Iterable[str] = ()) -> pd.DataFrame:
     wanted variables, all by default; one with further dimensions has a column for each of their
     values: `rms_error.toe`.
     """
-    import xarray as xr
-
     like, wanted = dataset["status"], set(variables)
     columns: dict[str, np.ndarray] = {}
     for name, rest in sorted(_further(dataset).items(), key=lambda e: e[0] not in dataset.coords):
@@ -86,9 +80,7 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     attributes = {key: str(dataset.attrs[key]) for key in ("study", "title", "model", "training")}
     head = {"kind": ERRORS, **attributes, "grid": _grid_text(dataset)}
     count = EVALUATIONS[component("model", head["model"]).kind]
-    extended = dataset.assign(
-        warned=warned_runs(dataset), trained=trained_runs(dataset), evaluations=dataset[count]
-    )
+    extended = dataset.assign(trained=trained_runs(dataset), evaluations=dataset[count])
     kept = ["rms_error", "floor_rms_error", "cell_key", "status", "message"]
     runs: Any = frame(extended, [*kept, *MEDIANS, "effective_rank", "warned", "trained"])
     rows: list[dict[str, Any]] = []
@@ -96,12 +88,12 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
         own = runs[(runs["start"] == start) & (runs["label"] == label)]
         # Points of the grid that a method does not depend on are one run.
         own = own.drop_duplicates("cell_key")
-        place = {**head, "start": str(start), "label": str(label), **_counts(own)}
+        place = head | {"start": str(start), "label": str(label)} | _counts(own)
         varied = [str(d) for d in dataset["status"].dims if len(set(own[d])) > 1]
         ended = own[own["status"].isin(FINISHED)]
         for output, unit in dataset["output_unit"].to_series().items():
-            errors = {"output": str(output), "unit": unit, **_errors(ended, str(output), varied)}
-            rows.append(place | errors)
+            about = {"output": str(output), "unit": unit}
+            rows.append(place | about | _errors(ended, str(output), varied))
     return rows
 
 
@@ -128,17 +120,13 @@ def _errors(ended: Any, output: str, varied: list[str]) -> dict[str, Any]:
     if errors.empty:
         return {"median": np.nan, "largest": np.nan, "largest_at": "", "floor": np.nan}
     worst, largest = ended.loc[errors.idxmax()], float(errors.max())
-    at = ", ".join(f"{d} {_value(worst[d])}" for d in varied)
+    places = [f"{d} {shown(worst[d], '.4g')}" for d in varied]
     return {
         "median": float(errors.median()),
         "largest": largest,
-        "largest_at": at if largest > 0.0 else "",
+        "largest_at": ", ".join(places) if largest > 0.0 else "",
         "floor": float(worst[f"floor_rms_error.{output}"]),
     }
-
-
-def _value(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _grid_text(dataset: xr.Dataset) -> str:
@@ -156,22 +144,12 @@ def _grid_text(dataset: xr.Dataset) -> str:
     return "; ".join(parts)
 
 
-def warned_runs(dataset: xr.Dataset) -> xr.DataArray:
-    """Which runs of a study aren't trusted: by the method (status), or as a protocol would judge.
-
-    A grid leaves the second to this mark, so that errors of such runs are still shown.
-    """
-    return dataset["warned"].astype(bool)
-
-
 def counted_ends(dataset: xr.Dataset) -> str:
     """How the runs of a study have ended; a run that stands at several points counts once."""
-    # A protocol's runs have no files of their own.
-    extended = dataset.assign(
-        warned=(dataset["status"] == "ok") & warned_runs(dataset), trained=trained_runs(dataset)
-    )
+    extended = dataset.assign(trained=trained_runs(dataset))
     runs: Any = frame(extended, ["status", "cell_key", "warned", "trained"])
+    # A protocol's runs have no files of their own.
     runs = runs.drop_duplicates("cell_key") if "cell_key" in runs else runs
-    trained = int(runs["trained"].sum())
+    trained, warned = int(runs["trained"].sum()), runs["warned"] & (runs["status"] == "ok")
     note = f"; {trained} trained on the tested run" if trained else ""
-    return ends_text(runs["status"], int(runs["warned"].sum())) + note
+    return ends_text(runs["status"], int(warned.sum())) + note

@@ -7,7 +7,7 @@ gets rows by its kind of equations.
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from pydantic import Field
 
@@ -52,34 +52,27 @@ class Column(NamedTuple):
 class LabelFile(FileSchema):
     """Schema of `data/figures/labels.toml`."""
 
-    outputs: dict[str, list[str]]
-    columns: dict[str, list[str | float]]
+    outputs: dict[str, Label]
+    columns: dict[str, Column]
 
 
 @cache
-def _declared() -> tuple[dict[str, Label], dict[str, Column]]:
-    """Labels of outputs, and how columns are printed."""
-    file = read_toml(data_folder() / "figures" / "labels.toml", LabelFile)
-    columns: Any = file.columns
-    return (
-        {name: Label(*entry) for name, entry in file.outputs.items()},
-        {name: Column(*entry) for name, entry in columns.items()},
-    )
+def _declared() -> LabelFile:
+    return read_toml(data_folder() / "figures" / "labels.toml", LabelFile)
 
 
 def column(name: str) -> Column:
     """How a column is printed; one without an entry has its name as heading."""
-    if found := _declared()[1].get(name):
-        return found
-    if name.startswith("rms_"):
+    known = _declared().columns
+    if name.startswith("rms_") and name not in known:
         return Column(f"{label_of(name.removeprefix('rms_')).short} error", ERROR)
-    return Column(name.replace("_", " "))
+    return known.get(name, Column(name.replace("_", " ")))
 
 
 def label_of(output: str) -> Label:
     """The label of an output; one that has no symbol has its name."""
     name = output.replace("_", " ")
-    return _declared()[0].get(output, Label(name, name, name))
+    return _declared().outputs.get(output, Label(name, name, name))
 
 
 def full_label(output: str, between: str = " ") -> str:
@@ -101,11 +94,6 @@ def method_text(label: str) -> str:
 def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
     """Which runs were in their own training; none of a result that does not tell."""
     return dataset.get("in_training", dataset["status"].isnull() & False)
-
-
-def marked(text: str, run: xr.Dataset) -> str:
-    """The text of a run in a legend, with a mark if its method was trained on it."""
-    return text + MARK * bool(trained_runs(run).all())
 
 
 def readable_unit(largest: float, unit: str) -> tuple[float, str]:

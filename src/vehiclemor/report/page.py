@@ -24,7 +24,7 @@ from vehiclemor.report.figures.paper import figure_pareto
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.runs import PATH
 from vehiclemor.report.figures.theme import METADATA, styled
-from vehiclemor.report.frames import counted_ends, frame, grid_rows, warned_runs
+from vehiclemor.report.frames import counted_ends, frame, grid_rows
 from vehiclemor.report.labels import TRAINED, Column, trained_runs, unit_of
 from vehiclemor.report.printing import Table
 from vehiclemor.report.result_selection import drawn
@@ -178,8 +178,7 @@ def error_table(dataset: xr.Dataset) -> pd.DataFrame:
     """Errors of every run of a study, with its status and file."""
     units = {output: unit_of(dataset, output) for output in shown_outputs(dataset)}
     heads = {f"rms_error.{o}": f"RMS error of {o} ({unit})" for o, unit in units.items()}
-    extended = dataset.assign(warned=warned_runs(dataset), trained=trained_runs(dataset))
-    runs: Any = frame(extended).rename(columns=heads)
+    runs: Any = frame(dataset.assign(trained=trained_runs(dataset))).rename(columns=heads)
     said = runs["message"] + runs["remark"].where(runs["warned"] & (runs["status"] == "ok"), "")
     marks = runs["trained"].map({True: f" ({TRAINED})", False: ""})
     status = runs["status"] + marks + said.map(lambda text: f": {text}" if text else "")

@@ -107,15 +107,10 @@ def time_saved(number: Number, results: Results, label: str) -> Finding:
 
 def case_of(number: Number, label: str) -> str:
     """Timing case of control-period POD with the number's states and nothing else set; or none."""
-    settings = {"rank": number.states or 3}
-    return next(
-        (
-            case.id
-            for case in timing_cases(component("model", number.model))
-            if (case.method, case.preset) == ("pod", PRESETS[label]) and case.settings == settings
-        ),
-        "",
-    )
+    wanted = "pod", PRESETS[label], {"rank": number.states or 3}
+    cases = timing_cases(component("model", number.model))
+    found = (case.id for case in cases if (case.method, case.preset, case.settings) == wanted)
+    return next(found, "")
 
 
 def _missed_errors(model: str, run: xr.Dataset) -> str:
@@ -123,11 +118,10 @@ def _missed_errors(model: str, run: xr.Dataset) -> str:
     status = run["status"].item()
     if status != "ok":
         return f"no time is saved by a run that has {status}"
-    found = {output: float(run["rms_error"].sel(output=output)) for output in rms_numbers(model)}
     missed = [
-        f"{output} {found[output]:.2g} of {number.value:.3g} {number.unit}"
+        f"{output} {error:.2g} of {number.value:.3g} {number.unit}"
         for output, number in rms_numbers(model).items()
-        if not found[output] <= number.value
+        if not (error := float(run["rms_error"].sel(output=output))) <= number.value
     ]
     return f"counts only with errors that are met: {', '.join(missed)}" if missed else ""
 
@@ -176,8 +170,6 @@ CLAIMS = {
         six_slower, (TIMING["double_wishbone"],), {"pod_literal": "literal"}, False
     ),
     "all_close_agreement_less_time": Criterion(
-        agree_and_save,
-        (*NOMINAL, *TIMING.values()),
-        of_replay=False,
+        agree_and_save, (*NOMINAL, *TIMING.values()), of_replay=False
     ),
 }

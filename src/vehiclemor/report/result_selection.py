@@ -1,4 +1,4 @@
-"""Which run of a stored result is meant: a file of one run, or a point of a study's grid."""
+"""Results: which run is meant, of a file or at a point of a study's grid; they draw themselves."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
-from vehiclemor.arguments import quoted
+from vehiclemor.arguments import file_path, quoted
 from vehiclemor.exceptions import InputError
+from vehiclemor.metrics import errors
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_names
@@ -18,7 +20,9 @@ from vehiclemor.study.plans.study_file import FACTORS
 from vehiclemor.study.store import combined_path, result_path
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from vehiclemor.simulation.trajectory import Trajectory
 
 KINDS = ("histories", "paths", "errors")
 # Values of a dimension that an error lists.
@@ -75,3 +79,28 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
         if len(values) > 1:
             parts.append(f"{dimension} {value}")
     return dataset, ", ".join(parts)
+
+
+@xr.register_dataset_accessor("vehiclemor")
+class ResultAccessor:
+    """What a result of this package can do beyond xarray."""
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    def plot(self, kind: str = "histories", out: str | Path | None = None, **at: object) -> Figure:
+        """Draw the result; see `vehiclemor.plot`."""
+        from vehiclemor.report.figures.result_plot import plot_result
+
+        dataset, _ = drawn(self._dataset, kind, at)
+        return plot_result(dataset, None if out is None else file_path("out", out), kind)
+
+
+def dataset_of(run: Trajectory, full: Trajectory | None = None) -> xr.Dataset:
+    """A run as a dataset, with the outputs of the full-order run."""
+    dataset = run.dataset()
+    if full is None:
+        return dataset
+    found = errors(run, full)
+    of_full = {"reference_outputs": (("time", "output"), full.chosen(run.names).outputs)}
+    return dataset.assign(of_full).assign(found.data_vars)

@@ -297,11 +297,10 @@ def _winner_parts(
     for row in bounds:
         kind = "largest" if row["measure"] == "max" else "RMS"
         row["output"] = f"{row['item'].replace('_', ' ')}, {kind}"
-    names = ("target", "limit", "measured", "word", "reason")
-    columns = {name: column(name) for name in names}
-    columns["target"] = Column(f"target for {winner['label']}")
-    errors = {name: column(name) for name in ("output", "bound", "worst", "most")}
-    errors["output"] = Column(f"errors of {winner['label']}, SI units")
+    columns = {"target": Column(f"target for {winner['label']}")}
+    columns |= {name: column(name) for name in ("limit", "measured", "word", "reason")}
+    errors = {"output": Column(f"errors of {winner['label']}, SI units")}
+    errors |= {name: column(name) for name in ("bound", "worst", "most")}
     errors["reason"] = Column("bound from")
     below = "*: bound of our own" if explain else ""
     return [Table(reached, columns, head, below=below), Table(bounds, errors)]

@@ -6,12 +6,11 @@ leaves out their sum over j > r.  Eigenvalues are those of the snapshots of one 
 its mean removed, as step 2 has it, and a share does not depend on how the integral is discretised.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.methods import pod
@@ -22,10 +21,6 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import smaller_rank
 from vehiclemor.simulation.build import build
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 PRESETS = ("literal", "recommended")
 
@@ -82,15 +77,11 @@ def _of_model(name: str) -> xr.Dataset:
 
 
 def _side_by_side(parts: Sequence[xr.Dataset], dimension: str) -> xr.Dataset:
-    import xarray as xr
-
     return xr.concat(parts, dimension, coords="different", compat="equals", join="outer")
 
 
 def _shares(values: np.ndarray) -> xr.Dataset:
     """Spectra of singular values (windows, modes); no share where nothing moves."""
-    import xarray as xr
-
     squares = values**2
     with np.errstate(invalid="ignore"):
         tails = np.cumsum(squares[:, ::-1], axis=1)[:, ::-1] / squares.sum(axis=1, keepdims=True)

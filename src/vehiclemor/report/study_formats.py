@@ -1,19 +1,14 @@
 """Combined datasets in other formats: Zarr as they are, Parquet and CSV as their frames."""
 
-from __future__ import annotations
-
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 from vehiclemor.arguments import file_path
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import write_folder, write_text, write_whole
 from vehiclemor.registry import choice
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Format = Literal["zarr", "parquet", "csv"]
 FORMATS: tuple[str, ...] = get_args(Format)
@@ -22,10 +17,7 @@ ENGINES = {"zarr": "zarr", "parquet": "pyarrow"}
 
 
 def convert(
-    study: str | Path,
-    to: Format,
-    out: str | Path | None = None,
-    results: str | Path = "results",
+    study: str | Path, to: Format, out: str | Path | None = None, results: str | Path = "results"
 ) -> Path:
     """Write the stored result of a study in another format.
 
@@ -67,8 +59,10 @@ def convert(
     if "status" not in dataset:
         raise InputError(f"{name}: not the result of a study")
     if to == "zarr":
-        _write_zarr(dataset, path)
-        return path
+        # Texts of any length, as those of other chunks may be longer.
+        texts = {n: v.astype(object) for n, v in dataset.variables.items() if v.dtype.kind == "U"}
+        written = dataset.assign(texts).drop_encoding()
+        return write_folder(path, partial(written.to_zarr, mode="w", consolidated=False))
     described = column_meanings(dataset).to_csv(index=False)
     # Those of another format of the same result are the same.
     if columns.exists() and columns.read_bytes() != described.encode():
@@ -77,10 +71,3 @@ def convert(
     rows = frame(dataset)
     write = rows.to_csv if to == "csv" else rows.to_parquet
     return write_whole(path, partial(write, index=False))
-
-
-def _write_zarr(dataset: xr.Dataset, path: Path) -> None:
-    # Texts of any length, as those of other chunks may be longer.
-    texts = {n: v.astype(object) for n, v in dataset.variables.items() if v.dtype.kind == "U"}
-    written = dataset.assign(texts).drop_encoding()
-    write_folder(path, lambda place: written.to_zarr(place, mode="w", consolidated=False))  # type: ignore[call-overload]

@@ -37,25 +37,10 @@ NUMBER = re.compile(r"-?\d[\d.e+-]*")
 def run_studies(
     study: str, folder: Path, jobs: int = 1, scheduler: str = "", seed: int | None = None
 ) -> dict[str, xr.Dataset]:
-    """Run a study, or all studies of a collection, and combine the results.
+    """Run a study, or all studies of a collection: name -> combined dataset, stored too.
 
-    Parameters
-    ----------
-    study
-        Name of a study or collection, or path of a TOML file.
-    folder
-        Results folder; runs that it holds already are not computed again.
-    jobs
-        Number of processes.
-    scheduler
-        Address of a dask scheduler whose workers compute.
-    seed
-        Of the sampled test runs of protocols, for an audit; by default that of their files.
-
-    Returns
-    -------
-    dict
-        Study name -> combined dataset, stored too, see `combined_path`.
+    Runs that the results `folder` holds already are not computed again.  The arguments are those of
+    `vehiclemor.run_study`; the file of a dataset is `combined_path`.
     """
     count("jobs", jobs, most=MOST_JOBS)
     if jobs > 1 and scheduler:

@@ -22,13 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
-from vehiclemor.files import (
-    make_folder,
-    not_written,
-    probe_folder,
-    remove_leftovers,
-    write_whole,
-)
+from vehiclemor.files import make_folder, not_written, probe_folder, remove_leftovers, write_whole
 from vehiclemor.netcdf_file import global_attributes, read_dataset, write_dataset
 from vehiclemor.short_repr import shortened
 

@@ -27,17 +27,9 @@ from vehiclemor.codegen.cache import cache_folder, once
 from vehiclemor.exceptions import InputError, MachineError, machine_reason, one_line
 from vehiclemor.progress import tell
 from vehiclemor.provenance import code_digest
+from vehiclemor.study import store
 from vehiclemor.study.evaluate import evaluate, model_of
 from vehiclemor.study.experiment import Experiment
-from vehiclemor.study.store import (
-    encoded,
-    finished_runs,
-    is_stored,
-    prepare_folder,
-    read_run,
-    run_path,
-    write_run,
-)
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -88,10 +80,10 @@ class Workers:
         """
         wanted = {e.key: e for group in groups for e in group}
         self.asked |= wanted.keys()
-        self.finished |= finished_runs(self.folder, wanted.keys() - self.finished)
+        self.finished |= store.finished_runs(self.folder, wanted.keys() - self.finished)
         if self._missing(groups):
             # A folder that can't be is named before anything is announced.
-            prepare_folder(self.folder)
+            store.prepare_folder(self.folder)
         tell(self.name, len(self.finished), len(self.asked))
         faults: list[str] = []
         for left in reversed(range(TRIES)):
@@ -109,7 +101,7 @@ class Workers:
 
     def result(self, experiment: Experiment) -> xr.Dataset:
         """Stored result of an experiment."""
-        return read_run(self.folder, experiment.key).dataset()
+        return store.read_run(self.folder, experiment.key).dataset()
 
     def _missing(self, groups: Groups) -> list[list[Experiment]]:
         """What is not finished, each once."""
@@ -135,7 +127,7 @@ class Workers:
         with closing(engine):
             for done in engine:
                 for key, content in done.sent.items():
-                    write_run(content, self.folder, key)
+                    store.write_run(content, self.folder, key)
                 self.finished.update(done.finished)
                 tell(self.name, len(self.finished), len(self.asked))
                 yield done.fault
@@ -146,7 +138,7 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
     finished, fault = [], ""
     for experiment in experiments:
         # Another driver may have stored it, or a worker that was killed before it could say so.
-        if not is_stored(folder, experiment.key):
+        if not store.is_stored(folder, experiment.key):
             try:
                 dataset = evaluate(experiment)
             except Exception as error:
@@ -154,7 +146,7 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
                 if not fault:
                     raise
                 continue
-            write_run(encoded(dataset, experiment.key), folder, experiment.key)
+            store.write_run(store.encoded(dataset, experiment.key), folder, experiment.key)
         finished.append(experiment.key)
     return Done(finished, fault)
 
@@ -299,7 +291,8 @@ def on_worker(experiments: Sequence[Experiment]) -> Done:
                     f"{e.method}; install the same versions of vehiclemor, sympy and plug-ins"
                 )
         done = evaluate_and_store(experiments, folder := Path(name))
-        return done._replace(sent={k: run_path(folder, k).read_bytes() for k in done.finished})
+        sent = {key: store.run_path(folder, key).read_bytes() for key in done.finished}
+        return done._replace(sent=sent)
 
 
 @once

@@ -15,11 +15,22 @@ from vehiclemor.files import make_folder, write_text
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
 from vehiclemor.report.figures import errors, paper, result_plot, runs, schematics, theme
+from vehiclemor.report.result_selection import drawn
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import studies_and_files
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.run import run_studies
 from vehiclemor.toml_files import FileSchema, read_toml
+
+
+def figure_result(results: theme.Results, *, kind: str) -> Figure:
+    """The picture of a study: at its nominal or first point, errors over the whole grid."""
+    (dataset,) = results.values()
+    shown, point = drawn(dataset, kind, {})
+    if point:
+        shown = shown.assign_attrs(title=f"{shown.attrs['title']}\nat {point}")
+    return result_plot.figure_of(shown, kind)
+
 
 # What `draw` of an entry names.
 DRAWINGS: dict[str, Callable[..., Figure]] = {
@@ -32,7 +43,7 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "unseen inputs": paper.figure_unseen,
     "equation order": paper.figure_equation_order,
     "pareto": paper.figure_pareto,
-    "result": result_plot.figure_result,
+    "result": figure_result,
 }
 # Figures that every model has, of all registered methods: study, what is drawn of it.
 OF_A_MODEL: Mapping[str, tuple[Callable[[str, Path], str], str]] = {

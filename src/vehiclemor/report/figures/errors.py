@@ -116,15 +116,11 @@ def _is_sample(dimension: str) -> bool:
     return dimension == "sample" or dimension.endswith("_seed")
 
 
-def _numbers(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
-    return [name for name in names if np.issubdtype(dataset[name].dtype, np.number)]
-
-
 def _varied(dataset: xr.Dataset) -> list[str]:
     """What the study varies beside the method, first the dimension that lines go over."""
     sizes = {str(d): dataset.sizes[d] for d in dataset["status"].dims if d != "label"}
     names = [name for name, size in sizes.items() if size > 1]
-    numbers = _numbers(dataset, names)
+    numbers = [name for name in names if np.issubdtype(dataset[name].dtype, np.number)]
 
     def order(name: str) -> tuple[bool, bool, bool, int]:
         return _is_sample(name), name in numbers, name in FACTORS, sizes[name]

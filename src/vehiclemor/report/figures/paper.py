@@ -35,10 +35,7 @@ SHORTEST, LONGEST = 1e-3, 60.0
 # Below it nobody measures, in m.
 MEASURABLE = 1e-4
 ANGLE = "second_euler_angle"
-VARIANTS = {
-    "pod_literal": "Galerkin",
-    "pod_literal_reversed_arms": "Galerkin, arm angles reversed",
-}
+VARIANTS = {"pod_literal": "Galerkin", "pod_literal_reversed_arms": "Galerkin, arm angles reversed"}
 # Variable -> label, and values that are nothing but rounding of the largest.
 SPECTRA = {
     "singular_value": ("singular value\n/ largest", 1e-16),

@@ -1,23 +1,19 @@
 """The picture of any result: histories, paths or errors of one run, or of a study."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import xarray as xr
+from matplotlib.figure import Figure
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 from vehiclemor.report.figures.errors import figure_errors
 from vehiclemor.report.figures.runs import figure_histories, figure_paths
-from vehiclemor.report.figures.theme import Results, save_figure, styled, tell_empty
+from vehiclemor.report.figures.theme import save_figure, styled, tell_empty
 from vehiclemor.report.labels import main_outputs, tabled_outputs
-from vehiclemor.report.result_selection import drawn
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.figure import Figure
 
 # At most so many outputs have panels.
 PANELS = 3
@@ -38,22 +34,14 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
     `path` (PDF, SVG or PNG), if there is one.
     """
     with styled():
-        figure = _drawn(dataset, kind)
+        figure = figure_of(dataset, kind)
         if path is not None:
             save_figure(figure, path)
     return figure
 
 
-def figure_result(results: Results, *, kind: str) -> Figure:
-    """The picture of a study: at its nominal or first point, errors over the whole grid."""
-    (dataset,) = results.values()
-    shown, point = drawn(dataset, kind, {})
-    if point:
-        shown = shown.assign_attrs(title=f"{shown.attrs['title']}\nat {point}")
-    return _drawn(shown, kind)
-
-
-def _drawn(dataset: xr.Dataset, kind: str) -> Figure:
+def figure_of(dataset: xr.Dataset, kind: str) -> Figure:
+    """The picture that `plot_result` draws, in the style that holds."""
     if "scenario_set" in dataset.coords:
         raise InputError("a protocol has no grid to draw over; vehiclemor figures --only draws it")
     if not dataset.sizes.get("output"):

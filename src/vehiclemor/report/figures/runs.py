@@ -67,7 +67,8 @@ def legend_of(dataset: xr.Dataset, methods: Mapping[str, str] | None = None) -> 
         ends = run["status"].to_series() if run["status"].ndim else {"": run["status"].item()}
         bad = {at: end for at, end in ends.items() if end != "ok"}
         failed = "; ".join(f"{end}, {at} start" if at else end for at, end in bad.items())
-        texts[label] = labels.marked(methods[label], run) + (f" ({failed})" if failed else "")
+        mark = labels.MARK * bool(labels.trained_runs(run).all())
+        texts[label] = methods[label] + mark + (f" ({failed})" if failed else "")
     return texts
 
 

@@ -1,6 +1,5 @@
 """Figures 1, 5 and 8: the paper's mechanisms in space, beside their graphs."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ class SchematicsFile(FileSchema):
 def figure_schematic(*, name: str) -> Figure:
     """A mechanism in space, to scale (a), and its graph (b)."""
     file = read_toml(data_folder() / "figures" / "schematics.toml", SchematicsFile)
-    drawing = file.drawings[name]
+    drawing: Drawing = file.drawings[name] | {"colors": file.colors}
     below, ratio = drawing["graph"]
     figure = Figure(figsize=(6.7, drawing["height"]))
     ratios = {"height_ratios" if below else "width_ratios": [1.0, ratio]}
@@ -45,9 +44,9 @@ def figure_schematic(*, name: str) -> Figure:
         for state in drawing["states"]
     ]
     for points, alpha in states:
-        _draw_bodies(space, drawing, points, plane, file.colors, alpha)
+        _draw_bodies(space, drawing, points, plane, alpha)
     _draw_outline(space, drawing, states[0][0], plane)
-    _draw_graph(graph, drawing, file.colors)
+    _draw_graph(graph, drawing)
     legend = dict(zip(*reversed(space.get_legend_handles_labels()), strict=True))
     figure.legend(legend.values(), legend, loc="outside lower center", ncols=4)
     return figure
@@ -62,14 +61,10 @@ def _plane(elevation: float, azimuth: float) -> np.ndarray:
 
 
 def _draw_bodies(
-    axis: Any,
-    drawing: Drawing,
-    points: Points,
-    plane: np.ndarray,
-    colors: Mapping[str, str],
-    alpha: float,
+    axis: Any, drawing: Drawing, points: Points, plane: np.ndarray, alpha: float
 ) -> None:
     """One side, or one position, of the mechanism."""
+    colors = drawing["colors"]
     for body, *names in drawing.get("lines", ()):
         corners = np.array([points[name] for name in names]) @ plane
         axis.plot(*corners.T, linewidth=1.0 + alpha, alpha=alpha, color=colors[body])
@@ -128,7 +123,7 @@ def _draw_outline(axis: Any, drawing: Drawing, points: Points, plane: np.ndarray
         axis.text(*((line.mean(axis=0) + size["beside"]) @ plane), text, color=GREY, **TEXT)
 
 
-def _draw_graph(axis: Any, drawing: Drawing, colors: Mapping[str, str]) -> None:
+def _draw_graph(axis: Any, drawing: Drawing) -> None:
     """Bodies in boxes, joints on the lines between them, closures dashed."""
     axis.set_axis_off()
     for start, end, text in drawing["edges"]:
@@ -137,7 +132,8 @@ def _draw_graph(axis: Any, drawing: Drawing, colors: Mapping[str, str]) -> None:
         axis.plot(*ends.T, line, color=GREY, linewidth=1.2, zorder=1)
         axis.text(*ends.mean(axis=0), text, bbox=HALO, zorder=2, **TEXT)
     for body, place in drawing["nodes"].items():
-        box = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": colors[body]}
+        edge = drawing["colors"][body]
+        box = {"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": edge}
         axis.text(*place, body.replace(" ", "\n"), bbox=box, zorder=3, **TEXT)
     for text, (x, y, width, height) in drawing.get("corners", {}).items():
         axis.add_patch(Rectangle((x, y), width, height, edgecolor=GREY, fill=False, linestyle=":"))

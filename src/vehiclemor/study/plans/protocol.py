@@ -19,15 +19,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
 from vehiclemor.study.plans.loading import study_path
-from vehiclemor.study.plans.study_file import (
-    DRAWN,
-    SETS,
-    Box,
-    Draw,
-    Group,
-    MethodEntry,
-    StudyFile,
-)
+from vehiclemor.study.plans.study_file import DRAWN, SETS, Box, Draw, Group, MethodEntry, StudyFile
 from vehiclemor.study.scenario import Scenario, check, own_speed
 from vehiclemor.toml_files import read_toml
 

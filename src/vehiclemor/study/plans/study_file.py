@@ -5,7 +5,7 @@ validation set and a test set, which are lists or sampled from boxes.
 """
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
@@ -30,6 +30,16 @@ OF_TESTS = (
     *("targets", "failure_rate", "flagged_misses", "straight"),
 )
 OF_ENTRIES = ("candidates", "role")
+
+
+def _list(description: str) -> Any:
+    """Field with a list, empty by default."""
+    return Field(default_factory=list, description=description)
+
+
+def _table(description: str) -> Any:
+    """Field with a table, empty by default."""
+    return Field(default_factory=dict, description=description)
 
 
 class Span(FileSchema):
@@ -92,15 +102,11 @@ class Group(FileSchema):
     """
 
     maneuver: str = Field(description="registered name")
-    start: list[str] = Field(
-        default_factory=list, description="initial conditions; the model's first by default"
-    )
-    points: list[list[float]] = Field(
-        default_factory=list, description="[frequency, amplitude] or [frequency, amplitude, speed]"
-    )
-    frequency: list[float] = Field(default_factory=list, description="factors, 1 by default")
-    amplitude: list[float] = Field(default_factory=list, description="factors, 1 by default")
-    speed: list[float] = Field(default_factory=list, description="m/s, the model's own by default")
+    start: list[str] = _list("initial conditions; the model's first by default")
+    points: list[list[float]] = _list("[frequency, amplitude] or [frequency, amplitude, speed]")
+    frequency: list[float] = _list("factors, 1 by default")
+    amplitude: list[float] = _list("factors, 1 by default")
+    speed: list[float] = _list("m/s, the model's own by default")
 
     @property
     def scenarios(self) -> int:
@@ -147,9 +153,7 @@ class Box(FileSchema):
     amplitude: Range = Field([1.0, 1.0], description="factors, from and to")
     both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
     speed: Range | None = Field(None, description="m/s, the model's own by default")
-    start: list[str] = Field(
-        default_factory=list, description="initial conditions, equally likely; the model's first"
-    )
+    start: list[str] = _list("initial conditions, equally likely; the model's first")
 
     @field_validator("frequency")
     @classmethod
@@ -192,9 +196,7 @@ class MethodEntry(FileSchema):
     method: str = Field(description="registered name")
     label: Line = Field("", description="name of its results; the method's by default")
     preset: str = Field("recommended", description="preset that its settings differ from")
-    settings: Settings = Field(
-        default_factory=dict, description="setting -> value; see vehiclemor show METHOD"
-    )
+    settings: Settings = _table("setting -> value; see vehiclemor show METHOD")
     training: Training = Field(
         "",
         description="as of the study, whose it is by default; of a training set the maneuvers that "
@@ -220,69 +222,49 @@ class StudyFile(FileSchema):
     """
 
     title: Line = Field(description="one line")
-    studies: list[str] = Field(
-        default_factory=list, description="of a collection: names of studies, or TOML files"
-    )
+    studies: list[str] = _list("of a collection: names of studies, or TOML files")
     model: str = Field("", description="registered name; needed for a grid")
-    parameters: dict[str, float | list[float]] = Field(
-        default_factory=dict,
-        description="parameter -> value in SI units where the study's are not the model's",
+    parameters: dict[str, float | list[float]] = _table(
+        "parameter -> value in SI units where the study's are not the model's"
     )
     maneuver: str = Field("", description="registered name; the model's own by default")
-    start: list[str] = Field(
-        default_factory=list, description="initial conditions; the model's first by default"
-    )
+    start: list[str] = _list("initial conditions; the model's first by default")
     training: Learned = Field(
         "matched",
         description="input that is trained on: matched (the tested one), nominal (the model's own "
         "maneuver), the name of a maneuver, protocol (the training of the model's protocol), set, "
         "or a list of these; with bounds: the runs that methods learn from",
     )
-    training_set: list[list[float]] = Field(
-        default_factory=list,
-        description="of training = set: pairs [frequency factor, amplitude factor]",
+    training_set: list[list[float]] = _list(
+        "of training = set: pairs [frequency factor, amplitude factor]"
     )
     keep: Literal["trajectories", "metrics"] = Field(
         "trajectories", description="histories and errors, or errors alone"
     )
-    grid: dict[str, Axis] = Field(
-        default_factory=dict,
-        description="dimension -> values; frequency_factor, amplitude_factor, parameters.NAME, "
-        "maneuver, start, training, or any setting",
+    grid: dict[str, Axis] = _table(
+        "dimension -> values; frequency_factor, amplitude_factor, parameters.NAME, "
+        "maneuver, start, training, or any setting"
     )
     sampling: Sampling | None = Field(
         None, description="points of a dimension `sample` beside those of the grid"
     )
-    methods: list[MethodEntry] = Field(
-        default_factory=list, description="each is run in every scenario"
-    )
-    bounds: dict[str, Bound] = Field(
-        default_factory=dict, description="of a test: output -> largest allowed error"
-    )
-    reported: list[str] = Field(
-        default_factory=list, description="outputs whose RMS errors are printed beside the bounded"
-    )
-    validation: list[Group] = Field(
-        default_factory=list, description="what candidates are chosen by"
-    )
-    test: list[Group] = Field(
-        default_factory=list, description="listed test runs; judged if none are drawn"
-    )
-    outside: list[Group] = Field(
-        default_factory=list, description="beyond what was trained: reported, not judged"
-    )
+    methods: list[MethodEntry] = _list("each is run in every scenario")
+    bounds: dict[str, Bound] = _table("of a test: output -> largest allowed error")
+    reported: list[str] = _list("outputs whose RMS errors are printed beside the bounded")
+    validation: list[Group] = _list("what candidates are chosen by")
+    test: list[Group] = _list("listed test runs; judged if none are drawn")
+    outside: list[Group] = _list("beyond what was trained: reported, not judged")
     version: int = Field(1, ge=1, description="of the drawn test set, part of its name")
     seed: int = Field(SEED, ge=0, le=MOST_SEED, description="of the drawn runs")
     drawn: Draw | None = Field(None, description="test set: drawn from boxes")
     drawn_outside: Draw | None = Field(
         None, description="the same beyond the boxes: whether models warn"
     )
-    sensitive: dict[str, Limit] = Field(
-        default_factory=dict,
-        description="output -> largest value of the full order's run in the first 10 s; beyond it "
-        "(spin, rollover) a drawn run is not judged",
+    sensitive: dict[str, Limit] = _table(
+        "output -> largest value of the full order's run in the first 10 s; beyond it "
+        "(spin, rollover) a drawn run is not judged"
     )
-    targets: list[SpeedTarget] = Field(default_factory=list, description="speed that is aimed at")
+    targets: list[SpeedTarget] = _list("speed that is aimed at")
     failure_rate: float | None = Field(
         None, gt=0.0, le=1.0, description="rate of misses that the runs must exclude at 95 %"
     )
