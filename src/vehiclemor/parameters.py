@@ -163,13 +163,7 @@ def load_parameters(
 def overridden(
     parameters: ParameterSet, expected: Mapping[str, Declared], overrides: Mapping[str, object]
 ) -> ParameterSet:
-    """Parameters of which some values are replaced.
-
-    Raises
-    ------
-    InputError
-        If an override names no parameter or has a wrong shape or value.
-    """
+    """Parameters with some values replaced; `InputError` if a name, shape or value is wrong."""
     if not isinstance(overrides, Mapping):
         raise InputError(f"parameters must be a mapping of values by name, not {quoted(overrides)}")
     model, entries = parameters.model, dict(parameters.entries)
@@ -195,10 +189,7 @@ def parameter_and_axis(
 ) -> tuple[str, int | None]:
     """A parameter, and the number of the component if it is one of a point, such as `joint.z`.
 
-    Raises
-    ------
-    InputError
-        If the model has no such parameter.
+    `InputError` if the model has no such parameter.
     """
     whole, _, axis = str(name).partition(".")
     declared = expected.get(name, expected.get(whole))

@@ -119,13 +119,7 @@ class Loop:
         return self.prepared(*arguments)()
 
     def prepared(self, *arguments: Any) -> Prepared:
-        """The loop with its arguments, which it keeps alive.
-
-        Raises
-        ------
-        TypeError
-            If an array has another type than the loop was compiled for.
-        """
+        """The loop with its arguments, which it keeps alive; `TypeError` if one does not fit."""
         name = self.name
         packed = b"".join(
             [
@@ -205,10 +199,7 @@ def loops(
         Name -> value of constants that the compiler shall know.
     """
     return _loops(
-        tuple(modules),
-        tuple(entries),
-        tuple((kernels or {}).items()),
-        tuple((sizes or {}).items()),
+        tuple(modules), tuple(entries), tuple((kernels or {}).items()), tuple((sizes or {}).items())
     )
 
 

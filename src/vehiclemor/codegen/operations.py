@@ -248,13 +248,7 @@ class Kernel:
         return [*seeds, "_result"] if seeds else [n for n in self.arguments if n != "_constants"]
 
     def check(self, *lengths: int) -> None:
-        """Raise `ValueError` if the kernel reads or writes more floats than its arguments have.
-
-        Parameters
-        ----------
-        lengths
-            Of the arguments in order, as far as they are known.
-        """
+        """Raise `ValueError` if it needs more floats than its first arguments have (`lengths`)."""
         for argument, size, length in zip(self.arguments, self.sizes, lengths, strict=False):
             if size > length:
                 raise ValueError(f"kernel {self.name}: {argument} has {length} floats, not {size}")
