@@ -34,10 +34,7 @@ class Recorder:
     def first_outside(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> list[int]:
         """The first sample at which each watched output is out of its limits; else all samples.
 
-        Parameters
-        ----------
-        inputs, states
-            At the points of the run (points or more, number).
+        Inputs and states are those at the points of the run (points or more, number).
         """
         held = run.kept.get("watched")
         if held is None or held[0] is not states:
@@ -80,10 +77,7 @@ class Recorder:
     ) -> tuple[Ready, int]:
         """Outputs, coordinates or speeds as loops over so many points take them.
 
-        Returns
-        -------
-        tuple
-            The outputs, and how many of them a kernel makes: the others are states.
+        The number tells how many of them a kernel makes: the others are states.
         """
         lanes = LANES if rows >= LANES else 1
         if (names, lanes) not in self._packed:

@@ -11,7 +11,6 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.codegen.operations import Kernel
-from vehiclemor.exceptions import InputError
 from vehiclemor.progress import first_use
 from vehiclemor.registry import choice
 from vehiclemor.simulation.formulations import FORMULATIONS
@@ -216,12 +215,6 @@ def frozen(name: str) -> bool:
     return integrator(name).operators is not None
 
 
-def check_formulation(name: str, full: bool) -> None:
-    """Raise `InputError` if an integrator can't run a reduced system."""
-    if frozen(name) and not full:
-        raise InputError(f"{name} freezes the full model's Jacobian: not for a reduced model")
-
-
 @lru_cache(maxsize=64)
 def control_of(name: str, tolerance: float, longest: float) -> Ready:
     """Limits and step-size control of a run."""
@@ -246,13 +239,7 @@ def rhs_loop(formulation: str) -> Loop:
 
 
 def time_loop(chosen: Integrator, formulation: str, whole_steps: bool = False) -> Loop:
-    """The compiled time loop of an integrator and a formulation.
-
-    Parameters
-    ----------
-    whole_steps
-        Whether a kernel takes them.
-    """
+    """The compiled time loop of an integrator and a formulation; a kernel may take whole steps."""
     own = chosen.stepped.modules if whole_steps and chosen.stepped else chosen.modules
     modules = (
         *_problem_modules(formulation),

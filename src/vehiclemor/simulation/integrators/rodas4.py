@@ -17,6 +17,7 @@ from vehiclemor.simulation.integrators.structures import (
     LINEAR_SOLVES,
     RHS_CALLS,
     Work,
+    rows_of,
 )
 
 GAMMA = 0.25
@@ -28,27 +29,14 @@ INLINED = ("accept", "longest_step", "step")
 
 def work_space(buffer, first, integers, dim, inputs):
     """Scratch space from place `first` of the buffer on."""
-    rows = matrix(buffer, first, S + 12, dim)
+    ends = matrix(buffer, first, 6, dim)
+    stages = matrix(buffer, first + 6 * dim, S + 3, dim)
+    curve = matrix(buffer, first + (S + 9) * dim, 3, dim)
     place = first + (S + 12) * dim
+    squares = matrix(buffer, place, dim, dim), matrix(buffer, place + dim * dim, dim, dim)
     none = vector(buffer, first, 0)
-    return Work(
-        rows[0],
-        rows[1],
-        rows[2],
-        rows[3],
-        rows[4],
-        rows[5],
-        matrix(buffer, first + 6 * dim, S + 3, dim),
-        matrix(buffer, first + (S + 9) * dim, 3, dim),
-        matrix(buffer, place, dim, dim),
-        matrix(buffer, place + dim * dim, dim, dim),
-        integers[4 : 4 + dim],
-        integers[:4],
-        none,
-        none,
-        none,
-        none,
-    )
+    whole = integers[4 : 4 + dim], integers[:4]
+    return Work(*rows_of(ends), stages, curve, *squares, *whole, none, none, none, none)
 
 
 def begin(problem, t, method, work):

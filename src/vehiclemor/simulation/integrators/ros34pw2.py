@@ -11,7 +11,7 @@ columns of (I - gamma h J)^-1.
 from vehiclemor.codegen.loop_types import matrix, vector
 from vehiclemor.simulation.formulations.full import rhs
 from vehiclemor.simulation.integrators.step_grid import heading_of, index_above, rotate
-from vehiclemor.simulation.integrators.structures import LINEAR_SOLVES, RHS_CALLS, Work
+from vehiclemor.simulation.integrators.structures import LINEAR_SOLVES, RHS_CALLS, Work, rows_of
 
 GAMMA = 4.3586652150845900e-01
 ALPHA, M, E = 8, 9, 10
@@ -21,26 +21,11 @@ INLINED = ("accept", "longest_step", "step")
 
 def work_space(buffer, first, integers, dim, inputs):
     """Scratch space from place `first` of the buffer on."""
-    rows = matrix(buffer, first, 7, dim)
-    none = vector(buffer, first, 0)
-    return Work(
-        rows[0],
-        rows[1],
-        rows[2],
-        rows[3],
-        rows[4],
-        rows[5],
-        matrix(buffer, first + 6 * dim, 5, dim),
-        matrix(buffer, first + 11 * dim, 3, dim),
-        rows,
-        rows,
-        integers,
-        integers,
-        none,
-        none,
-        none,
-        none,
-    )
+    ends, none = matrix(buffer, first, 6, dim), vector(buffer, first, 0)
+    stages = matrix(buffer, first + 6 * dim, 5, dim)
+    curve = matrix(buffer, first + 11 * dim, 3, dim)
+    whole = integers, integers
+    return Work(*rows_of(ends), stages, curve, ends, ends, *whole, none, none, none, none)
 
 
 def begin(problem, t, method, work):

@@ -282,3 +282,8 @@ class Work(NamedTuple):
     given: Vector
     values: Vector
     result: Vector
+
+
+def rows_of(states):
+    """The first vectors of `Work`, from the state to the middle, as rows of a matrix."""
+    return states[0], states[1], states[2], states[3], states[4], states[5]

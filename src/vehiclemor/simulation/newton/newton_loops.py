@@ -232,13 +232,10 @@ def newton(q, u, mechanism, iteration, work):
 
 
 def moved(q, u, place, target, mechanism, iteration, work):
-    """Move one input of a solved position to a target in steps that stay on the branch.
+    """Move one input of a solved position to a target in steps that stay on the branch: iterations.
 
-    Returns
-    -------
-    int
-        Iterations, negative where not even the shortest step goes further, since the branch or a
-        stop is near: q and u are then those of the last position.
+    They are negative where not even the shortest step goes further, since the branch or a stop is
+    near: q and u are then those of the last position.
     """
     length, iterations = iteration.largest_increment, 0
     while u[place] != target:
@@ -273,10 +270,7 @@ def within(q, stops):
 def approach(q, u, target, mechanism, iteration, work):
     """From the design position to the inputs of a target, one after the other, the height last.
 
-    Returns
-    -------
-    int
-        Iterations, negative where the branch ends before.
+    Gives iterations, negative where the branch ends before.
     """
     for i in range(N):
         q[i] = mechanism.start[i]
@@ -292,11 +286,7 @@ def approach(q, u, target, mechanism, iteration, work):
 
 
 def newton_path(
-    mechanism: Mechanism,
-    inputs: Matrix,
-    iteration: Iteration,
-    solution: Solution,
-    buffer: Vector,
+    mechanism: Mechanism, inputs: Matrix, iteration: Iteration, solution: Solution, buffer: Vector
 ) -> Int:
     """Newton's method with a fresh Jacobian in every iteration, started at the previous sample.
 
@@ -332,11 +322,7 @@ def newton_path(
 
 
 def travel_limit(
-    mechanism: Mechanism,
-    target: Vector,
-    iteration: Iteration,
-    reached: Vector,
-    buffer: Vector,
+    mechanism: Mechanism, target: Vector, iteration: Iteration, reached: Vector, buffer: Vector
 ) -> Int:
     """How far the branch goes to a target, one input after the other, the height last.
 
