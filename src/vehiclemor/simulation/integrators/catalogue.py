@@ -14,9 +14,13 @@ from vehiclemor.codegen.operations import Kernel
 from vehiclemor.progress import first_use
 from vehiclemor.registry import choice
 from vehiclemor.simulation.formulations import FORMULATIONS
-from vehiclemor.simulation.integrators import exponential_functions, exponential_modes, tableaus
+from vehiclemor.simulation.integrators import (
+    exponential_functions,
+    exponential_modes,
+    rodas4,
+    ros34pw2,
+)
 from vehiclemor.simulation.integrators.loop import scratch_end
-from vehiclemor.simulation.integrators.ros34pw2 import GAMMA
 from vehiclemor.simulation.integrators.step_kernels import Frame, exponential_step, w_step
 from vehiclemor.simulation.integrators.structures import Control
 
@@ -31,15 +35,7 @@ NOTHING = np.zeros((1, 1, 1))
 
 
 class Stored(NamedTuple):
-    """What is stored of a frozen Jacobian.
-
-    Attributes
-    ----------
-    operators
-        For every step size: (step sizes, rows, columns).
-    shared
-        For all of them: (rows, columns).
-    """
+    """What is stored of a frozen Jacobian: matrices by step size, and one for all step sizes."""
 
     operators: np.ndarray
     shared: np.ndarray = NOTHING[0]
@@ -48,14 +44,8 @@ class Stored(NamedTuple):
 class Stepped(NamedTuple):
     """Whole steps as one kernel.
 
-    Attributes
-    ----------
-    kernel
-        Makes the kernel from the frame and the number of inputs.
-    tables
-        Makes transposed operators (step sizes, tables, n, n) of a diagonal block.
-    modules
-        Modules of the loop's functions.
+    It is made from the frame and the number of inputs, its tables are transposed operators (step
+    sizes, tables, n, n) of a diagonal block, and the loop's functions stand in the modules.
     """
 
     kernel: Callable[[Frame, int], Kernel]
@@ -110,7 +100,7 @@ def inverses(jacobian: np.ndarray, active: np.ndarray) -> Stored:
 
 def transposed_inverses(jacobian: np.ndarray) -> np.ndarray:
     """Transposed (step sizes, 1, n, n) of (I - gamma h J)^-1."""
-    matrices = np.eye(len(jacobian)) - GAMMA * STEP_GRID[:, None, None] * jacobian
+    matrices = np.eye(len(jacobian)) - ros34pw2.GAMMA * STEP_GRID[:, None, None] * jacobian
     return np.ascontiguousarray(np.linalg.inv(matrices).swapaxes(1, 2)[:, None])
 
 
@@ -145,7 +135,7 @@ INTEGRATORS = {
         4,
         Control(1.0 / 4.0, 1.0 / 4.0),
         ("cubic", "dense_solves", "rodas4"),
-        tableaus.rodas4(),
+        rodas4.tableau(),
         squares=2,
     ),
     "ros34pw2": Integrator(
@@ -153,7 +143,7 @@ INTEGRATORS = {
         3,
         Control(1.0 / 3.0, 1.0 / 3.0),
         ("step_grid", "cubic", "ros34pw2"),
-        tableaus.ros34pw2(),
+        ros34pw2.tableau(),
         inverses,
         stepped=Stepped(
             w_step, transposed_inverses, ("step_grid", "cubic", "ros34pw2", "stepped_ros34pw2")

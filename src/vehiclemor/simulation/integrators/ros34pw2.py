@@ -8,6 +8,8 @@ Rows of the tableau: a (4), gamma c (4), then alpha, m and e; operators are the 
 columns of (I - gamma h J)^-1.
 """
 
+import numpy as np
+
 from vehiclemor.codegen.loop_types import matrix, vector
 from vehiclemor.simulation.formulations.full import rhs
 from vehiclemor.simulation.integrators.step_grid import heading_of, index_above, rotate
@@ -17,6 +19,30 @@ GAMMA = 4.3586652150845900e-01
 ALPHA, M, E = 8, 9, 10
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
 INLINED = ("accept", "longest_step", "step")
+
+
+def tableau() -> np.ndarray:
+    """Coefficients (11, 4), see above.
+
+    The time derivative is left out: order 3 holds for any matrix, its column of f_t included.
+    """
+    alpha = np.zeros((4, 4))
+    alpha[1, 0] = 8.7173304301691801e-01
+    alpha[2, :2] = [8.4457060015369423e-01, -1.1299064236484185e-01]
+    alpha[3, 2] = 1.0
+    g = GAMMA * np.eye(4)
+    g[1, 0] = -8.7173304301691801e-01
+    g[2, :2] = [-9.0338057013044082e-01, 5.4180672388095326e-02]
+    g[3, :3] = [2.4212380706095346e-01, -1.2232505839045147e00, 5.4526025533510214e-01]
+    b = np.array([2.4212380706095346e-01, -1.2232505839045147e00, 1.5452602553351020e00, GAMMA])
+    embedded = np.array(
+        [3.7810903145819369e-01, -9.6042292212423178e-02, 0.5, 2.1793326075422950e-01]
+    )
+    inverse = np.linalg.inv(g)
+    a = np.tril(alpha @ inverse, -1)
+    c = np.tril(np.eye(4) / GAMMA - inverse, -1)
+    m, e = b @ inverse, (b - embedded) @ inverse
+    return np.vstack([a, GAMMA * c, alpha.sum(axis=1), m, e])
 
 
 def work_space(buffer, first, integers, dim, inputs):
