@@ -275,12 +275,8 @@ def _opposite(change: Combination) -> Combination:
 class Sensitivity(ShortRepr):
     """Products of a kernel's Jacobian, by one of its arguments, with directions.
 
-    Attributes
-    ----------
-    kernel
-        The directional derivative.
-    size, width
-        Numbers of floats of the result and of the argument.
+    The kernel is the directional derivative; size and width are numbers of floats of the result and
+    of the argument.
     """
 
     kernel: Kernel
@@ -345,5 +341,5 @@ def _function(kernel: Kernel, lanes: int) -> Callable[..., None]:
 
 @once
 def sensitivity(kernel: Kernel, argument: str, size: int, width: int) -> Sensitivity:
-    """Of a kernel's result of so many floats to an argument of so many (`width`), such as `_x`."""
+    """Of a kernel's result of `size` floats to an argument of `width`, such as `_x`."""
     return Sensitivity(derivative(kernel, (argument,)), size, width)

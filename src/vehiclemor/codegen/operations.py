@@ -177,16 +177,9 @@ def function(kind: str, *values: Value) -> Value:
 class Kernel:
     """A kernel, and what it wants of its arrays.
 
-    Attributes
-    ----------
-    name, arguments
-        Of the kernel.
-    sizes
-        Smallest number of floats of each argument.
-    columns
-        Length of the rows of its result; 0 if that is a vector.
-    listed
-        The operations and numbers of those with names, as JSON: few programs ask for them.
+    Sizes are the smallest numbers of floats of its arguments, columns the length of the rows of its
+    result, 0 if that is a vector.  Operations and numbers of those with names are listed as JSON:
+    few programs ask for them.
     """
 
     name: str

@@ -70,13 +70,9 @@ def _signal_loops() -> dict[str, Loop]:
 class Extent(NamedTuple):
     """How far inputs go in whole signals, between output times too.
 
-    Attributes
-    ----------
-    low, high
-        Smallest and largest value of each input (inputs,).
-    largest
-        Sizes (3, inputs): largest magnitudes of the inputs and of what of them is above 2 Hz,
-        root of the integral of the square of what is above 8 Hz, see `polynomial_loops.extent`.
+    Smallest and largest value of each input (inputs,); sizes (3, inputs): largest magnitudes of the
+    inputs and of what of them is above 2 Hz, root of the integral of the square of what is above 8
+    Hz, see `polynomial_loops.extent`.
     """
 
     low: np.ndarray

@@ -76,7 +76,10 @@ class ControlPeriods(ShortRepr):
 
 
 def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float = 0.0) -> Spans:
-    """Spans from `begin` to `end` without a window edge or a break point of the inputs inside."""
+    """Spans from `begin` to `end` without a window edge or a break point of the inputs inside.
+
+    Break points are ends of the smooth segments of the inputs, from 0 to the end of the maneuver.
+    """
     cuts = np.unique(np.concatenate([breaks, edges, [begin, end]]))
     cuts = cuts[(cuts >= begin) & (cuts <= end)]
     # Times that differ by rounding are one.

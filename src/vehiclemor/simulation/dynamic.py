@@ -257,18 +257,9 @@ class DynamicModel(Model):
     ) -> Trajectory:
         """Trajectory of a run whose path has been brought to the model's states.
 
-        Parameters
-        ----------
-        maneuver
-            Which it was; none of a path of any origin.
-        inputs
-            At the output times (samples, inputs).
-        states
-            Where the run is recorded: 2 n columns, and what may follow them.
-        trust
-            What a reduced model tells of the run.
-        outputs
-            Outputs, coordinates or speeds that alone are kept; else all can be read.
+        Inputs are those at the output times (samples, inputs); states stand where the run is
+        recorded, 2 n columns and what may follow them.  Trust is what a reduced model tells of the
+        run.  Where outputs are named, these alone are kept; else all can be read.
         """
         remark = "" if maneuver is None else cut_short(maneuver)
         recorder, times, n = self._recorder, run.times, 2 * len(self.coordinates)

@@ -18,13 +18,7 @@ NO_RANGES = np.empty((0, 2))
 
 
 class Recorder:
-    """Makes outputs of runs of a model, and watches those that have limits.
-
-    Attributes
-    ----------
-    limited
-        Outputs with a range of validity, see `checks.limits_of`; loads are watched behind them.
-    """
+    """Makes outputs of runs of a model; watches those that are `limited`, and loads behind them."""
 
     def __init__(self, model: Model) -> None:
         self.model = model

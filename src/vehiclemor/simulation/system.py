@@ -206,17 +206,9 @@ class System(ShortRepr):
         solver: Solver,
         direct_until: float = np.inf,
     ) -> Run:
-        """Integrate from a state (n,) over a maneuver.
+        """Integrate from a state (n,) over a maneuver; `InputError` if a value or name is wrong.
 
-        Parameters
-        ----------
-        direct_until
-            Time in s from which on the run may be recorded at points, see `structures.Output`.
-
-        Raises
-        ------
-        InputError
-            If a value is out of bounds or a name is unknown.
+        From `direct_until` s on the run may be recorded at points, see `structures.Output`.
         """
         name, tolerance, times, longest, begin = solver
         check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)

@@ -72,15 +72,7 @@ class Solver(NamedTuple):
 
 
 class DrivenBy(NamedTuple):
-    """What of a maneuver goes into a run.
-
-    Attributes
-    ----------
-    signal, spans
-        Piecewise polynomials, and the parts of the run.
-    inputs
-        At the output times (samples, inputs).
-    """
+    """What of a maneuver goes into a run: signal, parts of the run, inputs at the output times."""
 
     signal: Ready
     spans: Ready

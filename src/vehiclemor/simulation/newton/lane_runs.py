@@ -22,14 +22,9 @@ class LaneRun(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LaneRuns:
-    """Runs of one mechanism.
+    """Runs of one mechanism by `lane_loops.lane_path`, whose arguments have the same names.
 
-    Attributes
-    ----------
-    loop
-        `lane_path` of `lane_loops`; mechanism and kernels are its arguments of these names.
-    sizes
-        Numbers of coordinates, inputs and outputs.
+    Sizes are numbers of coordinates, inputs and outputs.
     """
 
     loop: Loop

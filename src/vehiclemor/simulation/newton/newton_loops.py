@@ -30,16 +30,9 @@ N, INPUTS = 0, 0
 class Iteration(NamedTuple):
     """When an iteration ends.
 
-    Attributes
-    ----------
-    tolerance
-        Largest component of the last step.
-    limit
-        Most iterations for a sample.
-    largest_increment
-        Increment of an input above which its step is cut into substeps.
-    shortest_step
-        Step of an input at which the way to a position is given up.
+    The largest component of the last step is below the tolerance, after so many iterations for a
+    sample at most.  A step of the input is cut into substeps above the largest increment; below the
+    shortest step the way to a position is given up.
     """
 
     tolerance: Float
@@ -51,16 +44,9 @@ class Iteration(NamedTuple):
 class Mechanism(NamedTuple):
     """What is solved.
 
-    Attributes
-    ----------
-    start
-        Coordinates (N,) at the design position, where the inputs are zero.
-    stops
-        Largest magnitude (N,) of each coordinate.
-    constants
-        Of the kernels.
-    orientation
-        Sign of the Jacobian's determinant at the design position: it changes at a fold.
+    It starts at coordinates (N,) of the design position, where the inputs are zero.  Stops are the
+    largest magnitudes (N,) of coordinates, constants those of the kernels.  The orientation is the
+    sign of the Jacobian's determinant at the design position: it changes at a fold.
     """
 
     start: Vector
@@ -84,15 +70,7 @@ class Work(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Where a solution is recorded.
-
-    Attributes
-    ----------
-    path
-        Coordinates (samples, n).
-    counts
-        By place, see above (5,).
-    """
+    """Where a solution is recorded: coordinates (samples, n), counts by place (5,), see above."""
 
     path: Matrix
     counts: IntVector
