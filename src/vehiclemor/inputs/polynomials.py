@@ -37,9 +37,10 @@ def kept(make: Callable[[Maneuver], Made]) -> Callable[[Maneuver], Made]:
     def found(maneuver: Maneuver) -> Made:
         if not isinstance(maneuver, Signal):
             return of_maneuver(maneuver)
-        if make not in maneuver.kept:
-            maneuver.kept[make] = make(maneuver)
-        return maneuver.kept[make]
+        held = maneuver.kept.get(make)
+        if held is None:
+            held = maneuver.kept[make] = make(maneuver)
+        return held
 
     return found
 
