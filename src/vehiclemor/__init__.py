@@ -34,26 +34,6 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.batches import simulate_many as simulate_many
 
 __version__ = "0.1.0"
-# Name -> module that defines it.
-_DEFINED_IN = {
-    **dict.fromkeys(
-        ("describe", "maneuvers", "methods", "model", "models", "plot", "reduce"),
-        "vehiclemor.api",
-    ),
-    **dict.fromkeys(("run_study", "simulate", "status", "studies"), "vehiclemor.api"),
-    "Signal": "vehiclemor.inputs.signal",
-    "VehiclemorError": "vehiclemor.exceptions",
-    "convert": "vehiclemor.report.study_formats",
-    "errors": "vehiclemor.metrics",
-    "export": "vehiclemor.exporting.export",
-    "compare": "vehiclemor.report.comparison",
-    "figures": "vehiclemor.report.figures.catalogue",
-    "maneuver": "vehiclemor.inputs.maneuver",
-    "many_signals": "vehiclemor.inputs.signal",
-    "write_report": "vehiclemor.report.page",
-    **dict.fromkeys(("load", "rom"), "vehiclemor.reduction.reduced_model"),
-    "simulate_many": "vehiclemor.simulation.batches",
-}
 __all__ = [
     "Signal",
     "VehiclemorError",
@@ -80,6 +60,21 @@ __all__ = [
     "studies",
     "write_report",
 ]
+# Name -> module that defines it.
+_DEFINED_IN = {
+    **dict.fromkeys(__all__, "vehiclemor.api"),
+    **dict.fromkeys(("Signal", "many_signals"), "vehiclemor.inputs.signal"),
+    **dict.fromkeys(("load", "rom"), "vehiclemor.reduction.reduced_model"),
+    "VehiclemorError": "vehiclemor.exceptions",
+    "compare": "vehiclemor.report.comparison",
+    "convert": "vehiclemor.report.study_formats",
+    "errors": "vehiclemor.metrics",
+    "export": "vehiclemor.exporting.export",
+    "figures": "vehiclemor.report.figures.catalogue",
+    "maneuver": "vehiclemor.inputs.maneuver",
+    "simulate_many": "vehiclemor.simulation.batches",
+    "write_report": "vehiclemor.report.page",
+}
 
 
 def __getattr__(name: str) -> Any:

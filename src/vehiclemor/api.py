@@ -29,25 +29,25 @@ RESULTS = Path("results")
 
 def models() -> dict[str, str]:
     """Registered models: name -> one line."""
-    return _summaries("model", "summary")
+    return _summaries("model")
 
 
 def methods() -> dict[str, str]:
     """Registered reduction methods: name -> one line."""
-    return _summaries("method", "summary")
+    return _summaries("method")
 
 
 def maneuvers() -> dict[str, str]:
     """Registered maneuvers: name -> one line."""
-    return _summaries("maneuver", "summary")
+    return _summaries("maneuver")
 
 
-def _summaries(kind: str, attribute: str) -> dict[str, str]:
+def _summaries(kind: str) -> dict[str, str]:
     """One line for each component; a broken plug-in is listed with what is wrong with it."""
     lines = {}
     for name in names(kind):
         try:
-            lines[name] = str(getattr(component(kind, name), attribute))
+            lines[name] = str(component(kind, name).summary)
         except VehiclemorError as error:
             lines[name] = f"broken: {error}"
     return lines
@@ -251,10 +251,7 @@ def simulate(
 
 
 def _scenario(
-    model: Model,
-    maneuver: str | Maneuver | None,
-    start: Start | None,
-    factors: tuple[float, float],
+    model: Model, maneuver: str | Maneuver | None, start: Start | None, factors: tuple[float, float]
 ) -> Scenario:
     """What is simulated, checked."""
     from vehiclemor.inputs.checks import checked_maneuver

@@ -24,13 +24,7 @@ def line_of_text(name: str, value: object) -> str:
 
 
 def real_array(value: Any) -> np.ndarray:
-    """Floats of a number or of nested lists of numbers.
-
-    Raises
-    ------
-    TypeError
-        If anything is no real number: text, a date, a masked, complex or logical value.
-    """
+    """Floats of a number or nested lists of numbers; `TypeError` of text, dates and the like."""
     array = None if np.ma.is_masked(value) else np.asarray(value)
     if array is None or array.dtype.kind not in "iuf":
         raise TypeError(f"{quoted(value)} is not a number or a list of numbers")
@@ -38,13 +32,7 @@ def real_array(value: Any) -> np.ndarray:
 
 
 def number(name: str, value: object) -> float:
-    """A finite real number.
-
-    Raises
-    ------
-    InputError
-        If it is anything else.
-    """
+    """A finite real number, or `InputError`."""
     try:
         array = real_array(value)
     except (TypeError, ValueError):
@@ -69,13 +57,7 @@ MOST_JOBS = 1024
 
 
 def count(name: str, value: object, least: int = 1, most: int | None = None) -> int:
-    """A whole number within bounds.
-
-    Raises
-    ------
-    InputError
-        If it is anything else.
-    """
+    """A whole number within bounds, or `InputError`."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or int(value) < least or (most and int(value) > most):  # type: ignore[arg-type]
         bounds = f"at least {least}" + (f", at most {most}" if most else "")
@@ -84,13 +66,7 @@ def count(name: str, value: object, least: int = 1, most: int | None = None) -> 
 
 
 def file_path(name: str, value: object) -> Path:
-    """Path of a file or folder.
-
-    Raises
-    ------
-    InputError
-        If it is no path, or an empty one.
-    """
+    """Path of a file or folder; `InputError` if it is none, or an empty one."""
     # Control characters, "\0" among them, would break an error into several lines.
     if not isinstance(value, str | os.PathLike) or min(str(value), default="\0") < " ":
         raise InputError(f"{name}: {quoted(value)} is not a path")

@@ -16,13 +16,7 @@ TEMPORARY, OLD = ".partial-", 3600.0
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it.
-
-    Raises
-    ------
-    FileError
-        If it is a file, or can't be made.
-    """
+    """Make a folder and those above it; `FileError` if it is a file, or can't be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
@@ -50,21 +44,9 @@ def not_written(path: Path, error: Exception) -> FileError | MachineError:
 def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None = None) -> Path:
     """Let `write` fill a temporary file in a folder, by default that of `path`; then move it there.
 
-    A reader sees the old content or the new one, never a part.
-
-    Parameters
-    ----------
-    write
-        Called with the temporary path, which ends like `path`.
-    folder
-        On the same disk.
-
-    Raises
-    ------
-    FileError
-        If the folder can't be written.
-    MachineError
-        If the disk is full or fails.
+    The temporary path ends like `path`, on the same disk: a reader sees the old content or the new
+    one, never a part.  `FileError` if the folder can't be written, `MachineError` if the disk
+    fails.
     """
     temporary = temporary_path((folder or path.parent) / path.name)
     try:

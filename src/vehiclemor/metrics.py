@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -49,7 +49,13 @@ def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
     """
     import xarray as xr
 
-    _require_runs(run, full)
+    for name, given in (("run", run), ("full", full)):
+        if not isinstance(given, Trajectory):
+            raise InputError(f"{name} is {quoted(given)}, not a run as `simulate` gives it")
+    if not np.array_equal(run.times, full.times):
+        raise InputError("the runs have other output times: simulate both with the same input")
+    if not np.allclose(run.inputs, full.inputs, rtol=1e-6, atol=1e-9 * np.abs(full.inputs).max()):
+        raise InputError("the runs have other inputs: simulate both with the same")
     difference = run.outputs - full.chosen(run.names).outputs
     labels = run.chosen(run.names).dataset().drop_dims(["time", "input"])
     return xr.Dataset(
@@ -59,14 +65,3 @@ def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
         },
         labels.coords,
     )
-
-
-def _require_runs(run: Any, full: Any) -> None:
-    """Raise `InputError` if these are no two runs with the same output times."""
-    for name, given in (("run", run), ("full", full)):
-        if not isinstance(given, Trajectory):
-            raise InputError(f"{name} is {quoted(given)}, not a run as `simulate` gives it")
-    if not np.array_equal(run.times, full.times):
-        raise InputError("the runs have other output times: simulate both with the same input")
-    if not np.allclose(run.inputs, full.inputs, rtol=1e-6, atol=1e-9 * np.abs(full.inputs).max()):
-        raise InputError("the runs have other inputs: simulate both with the same")

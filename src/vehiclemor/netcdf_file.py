@@ -61,10 +61,7 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
 def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
     """A result file of this package, whose global `attribute` has the `expected` value.
 
-    Raises
-    ------
-    FileError
-        If the file is missing; `CorruptError` if it is corrupt, or not the expected one.
+    `FileError` if it is missing; `CorruptError` if it is corrupt, or not the expected one.
     """
     import xarray as xr
     from xarray.backends import NetCDF4DataStore

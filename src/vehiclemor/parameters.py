@@ -116,26 +116,11 @@ def load_parameters(
     path: Path | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> ParameterSet:
-    """Load and validate the parameters of a model.
+    """Load and validate the parameters of a model, by default its own public data.
 
-    Parameters
-    ----------
-    model
-        Name of the model.
-    expected
-        Parameter name -> unit, size and bounds that the model needs.
-    path
-        Parameter file; the model's own public data by default.
-    overrides
-        Parameter name -> value in SI units that replaces the file's; `name.z` is one component of a
-        point.
-
-    Raises
-    ------
-    FileError
-        If the file is unreadable, for another model, incomplete, or has a wrong unit or value.
-    InputError
-        If an override names no parameter or has a wrong shape or value.
+    `expected` are declarations by name; overrides are values in SI units by name, where `name.z` is
+    one component of a point.  `FileError` if the file is unreadable, for another model, incomplete,
+    or has a wrong unit or value; `InputError` if an override names no parameter or does not fit.
     """
     path = path or parameter_path(model)
     content = read_toml(path, ParameterFile)
@@ -163,13 +148,7 @@ def load_parameters(
 def overridden(
     parameters: ParameterSet, expected: Mapping[str, Declared], overrides: Mapping[str, object]
 ) -> ParameterSet:
-    """Parameters of which some values are replaced.
-
-    Raises
-    ------
-    InputError
-        If an override names no parameter or has a wrong shape or value.
-    """
+    """Parameters with some values replaced; `InputError` if a name, shape or value is wrong."""
     if not isinstance(overrides, Mapping):
         raise InputError(f"parameters must be a mapping of values by name, not {quoted(overrides)}")
     model, entries = parameters.model, dict(parameters.entries)
@@ -195,10 +174,7 @@ def parameter_and_axis(
 ) -> tuple[str, int | None]:
     """A parameter, and the number of the component if it is one of a point, such as `joint.z`.
 
-    Raises
-    ------
-    InputError
-        If the model has no such parameter.
+    `InputError` if the model has no such parameter.
     """
     whole, _, axis = str(name).partition(".")
     declared = expected.get(name, expected.get(whole))

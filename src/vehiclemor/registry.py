@@ -31,13 +31,9 @@ def names(kind: str) -> list[str]:
 
 
 def component(kind: str, name: str) -> Any:
-    """The registered component.
+    """The registered component; `InputError`, with the nearest names, if none has the name.
 
-    Raises
-    ------
-    InputError
-        If no component of that kind has the name (the nearest names are listed), or if it is a
-        plug-in that can't be imported, or is something else (`PlugInError`).
+    `PlugInError` if it is a plug-in that can't be imported, or is something else.
     """
     entries = _entries(kind)
     choice(kind, name, entries)

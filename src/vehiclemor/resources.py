@@ -8,13 +8,7 @@ from vehiclemor.exceptions import FileError
 
 @cache
 def data_folder() -> Path:
-    """Folder with `parameters`, `published`, `studies`, `protocols` and `reference`.
-
-    Raises
-    ------
-    FileError
-        If neither the installed package nor a checkout around it has the folder.
-    """
+    """Folder with `parameters`, `studies`, `protocols` and all other data; or `FileError`."""
     package = Path(__file__).resolve().parent
     for folder in (package / "data", package.parents[1] / "data"):
         if (folder / "parameters").is_dir():

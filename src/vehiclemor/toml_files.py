@@ -27,13 +27,7 @@ class FileSchema(BaseModel):
 
 
 def read_toml(path: Path, schema: type[Schema]) -> Schema:
-    """Read and validate a TOML file.
-
-    Raises
-    ------
-    FileError
-        If the file is missing, unreadable, no TOML, or does not fit the schema.
-    """
+    """Read and validate a TOML file; `FileError` if it is missing, unreadable or does not fit."""
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except RecursionError:

@@ -118,14 +118,8 @@ def digest_of(parts: Sequence[str]) -> str:
 def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     """Content of a file of the cache; made and written if it is missing, damaged or not ours.
 
-    One process makes it, while others that want it wait.
-
-    Parameters
-    ----------
-    name
-        Path in the cache; it holds the hash of all that determines the content.
-    make
-        Gives the content.
+    One process makes it, while others that want it wait.  Its name, a path in the cache, holds the
+    hash of all that determines the content.
     """
     folders = _folders_of(name)
     for folder in folders:

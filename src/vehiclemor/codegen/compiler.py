@@ -110,16 +110,9 @@ def compiled_loops(
     """Object code of the entries of modules of loops.
 
     Each entry becomes a C function of one pointer to 64-bit words: the arguments in order, an array
-    as its address and its shape, see `loops.words`.
-
-    Parameters
-    ----------
-    modules
-        Their functions know one another by name; a later one takes the place of an earlier.
-    entries
-        Functions that Python calls, with declared types.
-    given
-        Further names that the functions use: sizes, and kernels to be inlined.
+    as its address and its shape, see `loops.words`.  Functions know one another by name, those of a
+    later module take the place of earlier ones; `given` are further names, of sizes and inlined
+    kernels.
     """
     functions = linked(modules, given)
     outer, libraries = ir.Module("loops"), []

@@ -30,13 +30,7 @@ BESIDE = ("constants", "tangent_parts", "tangent")
 
 @dataclass(frozen=True)
 class Derivation(ShortRepr):
-    """What is left of a model's program: its kernels.
-
-    Attributes
-    ----------
-    sources
-        Name -> kernel; `constants` makes the hoisted constants from the parameters.
-    """
+    """What is left of a program: kernels by name; `constants` gives those of the parameters."""
 
     sources: dict[str, Kernel]
 

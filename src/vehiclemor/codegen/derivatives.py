@@ -81,18 +81,10 @@ Combination = Mapping[Value, Coefficient]
 
 
 def derivative(kernel: Kernel, arguments: Sequence[str]) -> Kernel:
-    """The directional derivative of a kernel; kept on disk.
+    """The derivative of a kernel along directions of some arguments, such as `_x`; kept on disk.
 
-    Parameters
-    ----------
-    arguments
-        Names of the arguments that have seeds, such as `_x`.  The derivative takes the kernel's own
-        arguments, then the seeds in this order, then the result, of the same shape as the kernel's.
-
-    Raises
-    ------
-    ValueError
-        If the kernel has what has no derivative.
+    It takes the kernel's arguments, then their seeds in this order, then the result, of the same
+    shape.  `ValueError` if the kernel has what has no derivative.
     """
 
     def make() -> bytes:
@@ -283,12 +275,8 @@ def _opposite(change: Combination) -> Combination:
 class Sensitivity(ShortRepr):
     """Products of a kernel's Jacobian, by one of its arguments, with directions.
 
-    Attributes
-    ----------
-    kernel
-        The directional derivative.
-    size, width
-        Numbers of floats of the result and of the argument.
+    The kernel is the directional derivative; size and width are numbers of floats of the result and
+    of the argument.
     """
 
     kernel: Kernel
@@ -310,13 +298,7 @@ class Sensitivity(ShortRepr):
         return units
 
     def columns(self, arrays: Sequence[np.ndarray], directions: np.ndarray) -> np.ndarray:
-        """Products with directions (k, width), as rows (k, size).
-
-        Parameters
-        ----------
-        arrays
-            The kernel's own arguments in order, as `Kernels.call` wants them, without the result.
-        """
+        """Products with directions (k, width), as rows (k, size), at the kernel's own arguments."""
         seeds = np.zeros((_rows(len(directions)), self.width))
         seeds[: len(directions)] = directions
         return self._products(arrays, seeds)[: len(directions)]
@@ -359,11 +341,5 @@ def _function(kernel: Kernel, lanes: int) -> Callable[..., None]:
 
 @once
 def sensitivity(kernel: Kernel, argument: str, size: int, width: int) -> Sensitivity:
-    """Of a kernel to one of its arguments, such as `_x`.
-
-    Parameters
-    ----------
-    size, width
-        Numbers of floats of the kernel's result and of the argument.
-    """
+    """Of a kernel's result of `size` floats to an argument of `width`, such as `_x`."""
     return Sensitivity(derivative(kernel, (argument,)), size, width)

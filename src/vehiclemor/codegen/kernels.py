@@ -58,12 +58,8 @@ class Kernels:
     def address(self, name: str, lanes: int = 1, results: tuple[int, ...] = ()) -> int:
         """Address of a kernel's machine code, for loops; 0 where there is no such kernel.
 
-        Parameters
-        ----------
-        lanes
-            Samples that it takes at once, see `llvm_kernels.kernel_module`.
-        results
-            Places of the results that it computes, in their new order; all where none are named.
+        It takes `lanes` samples at once, see `llvm_kernels.kernel_module`, and computes the results
+        of these places, in this order; all where none are named.
         """
         if name not in self.sources:
             return 0
@@ -76,18 +72,7 @@ class Kernels:
         return BareKernel(address, constants, function, constants.ctypes.data, code)
 
     def call(self, name: str, *arrays: np.ndarray) -> None:
-        """Run a kernel.
-
-        Parameters
-        ----------
-        arrays
-            Arguments in order, the result last: C-contiguous floats.
-
-        Raises
-        ------
-        TypeError
-            If an array is too short or of another kind.
-        """
+        """Run a kernel on its arguments, the result last; `TypeError` if it can't take one."""
         kernel = self.sources[name]
         function = _machine(kernel, 1)[1]
         function(*[_checked(kernel, k, array) for k, array in enumerate(arrays)])

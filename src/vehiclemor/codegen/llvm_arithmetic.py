@@ -23,13 +23,7 @@ LIBRARY = ("tan", "asin", "acos", "atan2", "sinh", "cosh", "tanh")
 
 
 def arithmetic(builder: Any, kind: str, arguments: Sequence[Any]) -> Any:
-    """Write an operation of values of one type, all floats or all vectors.
-
-    Raises
-    ------
-    ValueError
-        If there are no instructions of that kind.
-    """
+    """Write an operation of values of one type, floats or vectors; `ValueError` of other kinds."""
     of = arguments[0].type
     if kind in BINARY:
         return getattr(builder, BINARY[kind])(*arguments, flags=FLAGS)

@@ -54,15 +54,7 @@ class Rows(NamedTuple):
 
 
 def emit(kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int = 1) -> None:
-    """Write the instructions of a kernel where the builder stands.
-
-    Parameters
-    ----------
-    rows
-        Argument -> where it is.
-    lanes
-        Samples at once, see `kernel_module`.
-    """
+    """Write a kernel where the builder stands; rows tell where its arguments are."""
     writer = _Writer(kernel, builder, rows, lanes)
     for number in kernel.named:
         writer.value(number)

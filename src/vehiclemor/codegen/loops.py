@@ -34,15 +34,7 @@ ARRAYS = [struct.Struct(f"{dimensions + 1}q") for dimensions in range(4)]
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """A bundle of arrays and numbers, taken apart once for many runs.
-
-    Attributes
-    ----------
-    bundle
-        Named tuple of declared types; it must not change.
-    words
-        Addresses, shapes and numbers as loops take them.
-    """
+    """A bundle of arrays and numbers, taken apart once for many runs; it must not change."""
 
     bundle: Any
     words: bytes
@@ -54,13 +46,7 @@ def ready(bundle: Any) -> Ready:
 
 
 class Prepared:
-    """A loop with its arguments in words, of which some may be replaced from run to run.
-
-    Attributes
-    ----------
-    words
-        See `compiler.compiled_loops`.
-    """
+    """A loop with its arguments in words, some of which may be replaced from run to run."""
 
     __slots__ = ("_entry", "_given", "_kept", "_places", "words")
 
@@ -91,17 +77,7 @@ class Prepared:
 
 
 class Loop:
-    """A compiled loop as a function of arrays, numbers and named tuples of these.
-
-    Parameters
-    ----------
-    name
-        Of the entry.
-    declared
-        Name -> declared type of each argument.
-    code
-        Owner of the machine code.
-    """
+    """A compiled loop as a function of arrays, numbers and named tuples of these."""
 
     def __init__(self, name: str, declared: Mapping[str, Any], code: MachineCode) -> None:
         self.name = name
@@ -119,13 +95,7 @@ class Loop:
         return self.prepared(*arguments)()
 
     def prepared(self, *arguments: Any) -> Prepared:
-        """The loop with its arguments, which it keeps alive.
-
-        Raises
-        ------
-        TypeError
-            If an array has another type than the loop was compiled for.
-        """
+        """The loop with its arguments, which it keeps alive; `TypeError` if one does not fit."""
         name = self.name
         packed = b"".join(
             [
@@ -190,25 +160,14 @@ def loops(
     kernels: Mapping[str, Kernel] | None = None,
     sizes: Mapping[str, int] | None = None,
 ) -> dict[str, Loop]:
-    """Compiled entries of modules of loops, from the cache or compiled now.
+    """Compiled entries, functions with declared types, of modules of loops.
 
-    Parameters
-    ----------
-    modules
-        Names of modules below this package; a function of a later one takes the place of one of the
-        same name in an earlier one.
-    entries
-        Functions that Python calls, with declared types.
-    kernels
-        Name -> kernels that are written where the loops call them.
-    sizes
-        Name -> value of constants that the compiler shall know.
+    Modules are named below this package; a function of a later one takes the place of one of the
+    same name.  Kernels are written where the loops call them by name; sizes are constants that the
+    compiler shall know, by name.
     """
     return _loops(
-        tuple(modules),
-        tuple(entries),
-        tuple((kernels or {}).items()),
-        tuple((sizes or {}).items()),
+        tuple(modules), tuple(entries), tuple((kernels or {}).items()), tuple((sizes or {}).items())
     )
 
 

@@ -177,16 +177,9 @@ def function(kind: str, *values: Value) -> Value:
 class Kernel:
     """A kernel, and what it wants of its arrays.
 
-    Attributes
-    ----------
-    name, arguments
-        Of the kernel.
-    sizes
-        Smallest number of floats of each argument.
-    columns
-        Length of the rows of its result; 0 if that is a vector.
-    listed
-        The operations and numbers of those with names, as JSON: few programs ask for them.
+    Sizes are the smallest numbers of floats of its arguments, columns the length of the rows of its
+    result, 0 if that is a vector.  Operations and numbers of those with names are listed as JSON:
+    few programs ask for them.
     """
 
     name: str
@@ -248,13 +241,7 @@ class Kernel:
         return [*seeds, "_result"] if seeds else [n for n in self.arguments if n != "_constants"]
 
     def check(self, *lengths: int) -> None:
-        """Raise `ValueError` if the kernel reads or writes more floats than its arguments have.
-
-        Parameters
-        ----------
-        lengths
-            Of the arguments in order, as far as they are known.
-        """
+        """Raise `ValueError` if it needs more floats than its first arguments have (`lengths`)."""
         for argument, size, length in zip(self.arguments, self.sizes, lengths, strict=False):
             if size > length:
                 raise ValueError(f"kernel {self.name}: {argument} has {length} floats, not {size}")

@@ -24,10 +24,7 @@ DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 def plug_in_digest(components: Sequence[object]) -> str:
     """Hash of the plug-ins that components come from, as their files are now.
 
-    Raises
-    ------
-    PlugInError
-        If a file says something else than what is loaded: results would be those of neither.
+    `PlugInError` if one says something else than what is loaded: results would be those of neither.
     """
     found = [_plug_in_files(component) for component in components]
     files = sorted({path for paths in found for path in paths or ()})
@@ -68,15 +65,7 @@ def _is_loaded(module: ModuleType, text: bytes) -> bool:
 
 
 def source_digest(layers: Sequence[str], files: Sequence[str] = ()) -> str:
-    """Hash of layers and files of this package.
-
-    Parameters
-    ----------
-    layers
-        Folders of the package, with all that is in them.
-    files
-        Further files of the package.
-    """
+    """Hash of layers of this package, folders with all that is in them, and of further files."""
     paths = [path for layer in layers for path in sorted((PACKAGE / layer).rglob("*.py"))]
     paths += [PACKAGE / name for name in files]
     texts = [(path.relative_to(PACKAGE).as_posix(), path.read_bytes()) for path in paths]

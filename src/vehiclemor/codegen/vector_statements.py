@@ -26,13 +26,7 @@ POINTER = DOUBLE.as_pointer()
 
 
 def write(name: str, builder: Any, arguments: Sequence[Any], factors: Sequence[Any]) -> None:
-    """Write the instructions of a statement.
-
-    Parameters
-    ----------
-    arguments
-        As above, pointers for vectors, but for the factors of `combine`.
-    """
+    """Write a statement; arguments are as above, pointers for vectors, without factors."""
     match name, arguments:
         case "combine", [to, n, *places]:
             _combine(builder, to, n, factors, places)

@@ -28,19 +28,7 @@ AT_ONCE = 12
 def weighted_sums(
     builder: Any, coefficients: Any, terms: Iterable[Any], targets: int
 ) -> list[ir.Value]:
-    """Write the instructions of the sums.
-
-    Parameters
-    ----------
-    builder
-        Where the instructions go.
-    coefficients
-        Pointer to the first coefficient of rows of `padded(targets)` floats, one for each term.
-    terms
-        Values of the terms.
-    targets
-        Number of sums.
-    """
+    """Write the sums; coefficients are rows of `padded(targets)` floats, one for each term."""
     vectors = padded(targets) // WIDTH
     chains: list[list[Any]] = [[None] * vectors for _ in range(CHAINS)]
     for j, term in enumerate(terms):

@@ -7,7 +7,7 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import extent_of
+from vehiclemor.inputs.polynomials import extent_of, first_beyond, kept
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
@@ -16,11 +16,8 @@ from vehiclemor.registry import component
 def checked_maneuver(maneuver: str | Maneuver, definition: ModelDefinition) -> Maneuver:
     """A maneuver, also by its name; a signal with all inputs that a model has.
 
-    Raises
-    ------
-    InputError
-        If it is none, gives other inputs than the model has, or one that leaves the bounds in which
-        the model declares that it means anything.
+    `InputError` if it is none, gives other inputs than the model has, or one that leaves the bounds
+    in which the model declares that it means anything.
     """
     if isinstance(maneuver, str):
         maneuver = component("maneuver", maneuver)
@@ -57,7 +54,7 @@ def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
     outside = np.flatnonzero((extent.low < low) | (extent.high > high))
     if len(outside):
         however_quick = np.full((2, len(low)), np.inf)
-        since = extent_of(maneuver, np.vstack([low, high, however_quick])).since
+        since = first_beyond(maneuver, np.vstack([low, high, however_quick]))
         j = outside[since[outside].argmin()]
         name, unit = definition.inputs[j].name, definition.inputs[j].unit
         value = maneuver.at(since[j : j + 1])[0, j]
@@ -97,14 +94,10 @@ def check_resolved(maneuver: Maneuver) -> None:
         )
 
 
+@kept
 def cut_short(maneuver: Maneuver) -> str:
     """That a maneuver goes on after the end of its run, if it does."""
-    return "" if isinstance(maneuver, Signal) else _cut_short(maneuver)
-
-
-@lru_cache(maxsize=64)
-def _cut_short(maneuver: Maneuver) -> str:
-    last = max(maneuver.break_points, default=0.0)
+    last = 0.0 if isinstance(maneuver, Signal) else max(maneuver.break_points, default=0.0)
     if last <= maneuver.duration:
         return ""
     return f"the maneuver would end at {last:.4g} s, after the run"

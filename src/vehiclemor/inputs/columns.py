@@ -45,10 +45,7 @@ def csv_columns(path: Path, separator: str) -> dict[str, np.ndarray]:
 def array_columns(data: Any, time: str) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Columns (n,) of labelled data along the times, these among them, and units that they tell.
 
-    Raises
-    ------
-    InputError
-        If they are no data of xarray, or have no times.
+    `InputError` if they are no data of xarray, or have no times.
     """
     import xarray as xr
 
@@ -79,10 +76,7 @@ def chosen_columns(
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Times (n,), inputs (n, inputs) and their names, of the columns that are named, else of all.
 
-    Raises
-    ------
-    InputError
-        If there is no such column, or it tells another unit than one of SI.
+    `InputError` if there is no such column, or it tells another unit than one of SI.
     """
     chosen = inputs or [name for name in columns if name != time]
     named = chosen if isinstance(chosen, Mapping) else {name: name for name in listed(chosen)}

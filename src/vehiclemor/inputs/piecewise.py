@@ -66,11 +66,7 @@ def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
 
     One piece for each interval; segments end at kinks, at jumps, and where nothing moves for long.
     Runs with the same segments share all but their coefficients, which are of one array.
-
-    Raises
-    ------
-    InputError
-        If times (n,) don't increase, or something isn't finite.
+    `InputError` if times (n,) don't increase, or something isn't finite.
     """
     runs, n, inputs = samples.shape
     coefficients = np.empty((runs * (n - 1), inputs, HOLDS[hold] + 1))

@@ -6,9 +6,10 @@ Chebyshev points of equal pieces (L. N. Trefethen, Approximation Theory and Appr
 input's largest value.  A signal brings its own.
 """
 
-from functools import cache, lru_cache
+from collections.abc import Callable
+from functools import cache, lru_cache, wraps
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.inputs.signal import Signal
 
+Made = TypeVar("Made")
 ACCURACY = 1e-11
 SIGNAL_LOOPS = ("inputs.polynomial_loops",)
 MOST_PIECES = 1 << 15
@@ -27,18 +29,37 @@ DEGREE = 5
 KEPT = 512
 
 
+def kept(make: Callable[[Maneuver], Made]) -> Callable[[Maneuver], Made]:
+    """The function, its results kept: of a signal as long as it lives, of others the last ones."""
+    of_maneuver = lru_cache(maxsize=KEPT)(make)
+
+    @wraps(make)
+    def found(maneuver: Maneuver) -> Made:
+        if not isinstance(maneuver, Signal):
+            return of_maneuver(maneuver)
+        held = maneuver.kept.get(make)
+        if held is None:
+            held = maneuver.kept[make] = make(maneuver)
+        return held
+
+    return found
+
+
+@kept
 def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
-    if not isinstance(maneuver, Signal):
-        return _recorded(maneuver)
-    # Kept with the signal, so not longer than it.
-    if "recorded" not in maneuver.kept:
-        ready, times = signal_of(maneuver), _times(maneuver.duration, maneuver.samples)
-        inputs = np.empty((len(times), ready.bundle.coefficients.shape[1]))
-        _signal_loops()["sampled"](ready, times, inputs)
-        inputs.flags.writeable = False
-        maneuver.kept["recorded"] = times, inputs
-    return maneuver.kept["recorded"]
+    if isinstance(maneuver, Signal):
+        signal, times = signal_of(maneuver), _times(maneuver.duration, maneuver.samples)
+        inputs = np.empty((len(times), signal.bundle.coefficients.shape[1]))
+        _signal_loops()["sampled"](signal, times, inputs)
+    elif (unit := _of_unit_amplitude(maneuver)) is not None:
+        times, inputs = recorded_inputs(unit)
+        inputs = maneuver.amplitude_factor * inputs
+    else:
+        times = maneuver.times
+        inputs = loop_array(maneuver.at(times))
+    times.flags.writeable = inputs.flags.writeable = False
+    return times, inputs
 
 
 @cache
@@ -50,52 +71,37 @@ def _signal_loops() -> dict[str, Loop]:
 class Extent(NamedTuple):
     """How far inputs go in whole signals, between output times too.
 
-    Attributes
-    ----------
-    low, high
-        Smallest and largest value of each input (inputs,).
-    largest
-        Sizes (3, inputs): largest magnitudes of the inputs and of what of them is above 2 Hz,
-        root of the integral of the square of what is above 8 Hz, see `polynomial_loops.extent`.
-    since
-        Times (inputs,) in s at which limits are passed first; infinite if they are not.
+    Smallest and largest value of each input (inputs,); sizes (3, inputs): largest magnitudes of the
+    inputs and of what of them is above 2 Hz, root of the integral of the square of what is above 8
+    Hz, see `polynomial_loops.extent`.
     """
 
     low: np.ndarray
     high: np.ndarray
     largest: np.ndarray
-    since: np.ndarray
 
 
-def extent_of(maneuver: Maneuver, limits: np.ndarray | None = None) -> Extent:
-    """Extent of the inputs of a maneuver; without limits it is kept.
-
-    Parameters
-    ----------
-    limits
-        As `polynomial_loops.extent` takes them (4, inputs), for `since`.
-    """
-    if limits is not None:
-        return _extent(signal_of(maneuver), limits)
-    if not isinstance(maneuver, Signal):
-        return _kept_extent(maneuver)
-    if "extent" not in maneuver.kept:
-        maneuver.kept["extent"] = _extent(signal_of(maneuver))
-    return maneuver.kept["extent"]
+@kept
+def extent_of(maneuver: Maneuver) -> Extent:
+    """Extent of the inputs of a maneuver."""
+    found = _extent(maneuver)
+    largest = found[1:4].copy()
+    np.maximum(-found[0], found[1], out=largest[0])
+    return Extent(found[0], found[1], largest)
 
 
-@lru_cache(maxsize=KEPT)
-def _kept_extent(maneuver: Maneuver) -> Extent:
-    return _extent(_found_signal(maneuver))
+def first_beyond(maneuver: Maneuver, limits: np.ndarray) -> np.ndarray:
+    """Times (inputs,) in s at which limits (4, inputs) of `polynomial_loops.extent` are passed."""
+    return _extent(maneuver, limits)[4]
 
 
-def _extent(signal: Ready, limits: np.ndarray | None = None) -> Extent:
+def _extent(maneuver: Maneuver, limits: np.ndarray | None = None) -> np.ndarray:
+    """Result (5, inputs) of `polynomial_loops.extent`."""
+    signal = signal_of(maneuver)
     inputs = signal.bundle.coefficients.shape[1]
     found = np.empty((5, inputs))
     _signal_loops()["extent"](signal, _no_limits(inputs) if limits is None else limits, found)
-    largest = found[1:4].copy()
-    np.maximum(-found[0], found[1], out=largest[0])
-    return Extent(found[0], found[1], largest, found[4])
+    return found
 
 
 @cache
@@ -126,44 +132,16 @@ def _times(duration: float, samples: int) -> np.ndarray:
     return times
 
 
-@lru_cache(maxsize=KEPT)
-def _recorded(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
-    if (unit := _of_unit_amplitude(maneuver)) is not None:
-        times, inputs = _recorded(unit)
-        inputs = maneuver.amplitude_factor * inputs
-    else:
-        times = maneuver.times
-        inputs = loop_array(maneuver.at(times))
-    times.flags.writeable = inputs.flags.writeable = False
-    return times, inputs
-
-
+@kept
 def signal_of(maneuver: Maneuver) -> Ready:
-    """Piecewise polynomial inputs of a maneuver, those of a signal as they are.
+    """Piecewise polynomial inputs of a maneuver: those of a signal, of a function approximations.
 
-    Raises
-    ------
-    InputError
-        If an input isn't finite, or isn't smooth between the break points that the maneuver names.
+    `InputError` if one isn't finite, or isn't smooth between the break points that it names.
     """
-    if not isinstance(maneuver, Signal):
-        return _found_signal(maneuver)
-    if "ready" not in maneuver.kept:
-        maneuver.kept["ready"] = ready(maneuver.polynomials)
-    return maneuver.kept["ready"]
-
-
-@lru_cache(maxsize=KEPT)
-def _found_signal(maneuver: Maneuver) -> Ready:
-    """Polynomials of a function, searched for.
-
-    Raises
-    ------
-    InputError
-        If an input isn't finite, or isn't smooth between the break points that the maneuver names.
-    """
+    if isinstance(maneuver, Signal):
+        return ready(maneuver.polynomials)
     if (unit := _of_unit_amplitude(maneuver)) is not None:
-        signal: Pieces = _found_signal(unit).bundle
+        signal: Pieces = signal_of(unit).bundle
         coefficients = maneuver.amplitude_factor * signal.coefficients
         return ready(signal._replace(coefficients=coefficients))
     inner = sorted(t for t in set(maneuver.break_points) if 0.0 < t < maneuver.duration)
@@ -191,13 +169,7 @@ def _segment(
     largest: np.ndarray,
     known: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Polynomials (pieces, inputs, 6) between two break points.
-
-    Parameters
-    ----------
-    known
-        Times and inputs that the polynomials must give too, as far as they lie inside.
-    """
+    """Polynomials (pieces, inputs, 6) between two break points, which also give known values."""
     a, b = ends
     # One-sided values at the ends, where the input may jump.
     inside = min(max(1e-13, 2.0 * np.spacing(b) / (b - a)), 1e-6)

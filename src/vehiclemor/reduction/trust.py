@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import extent_of
+from vehiclemor.inputs.polynomials import extent_of, first_beyond
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.sizes import shaped
@@ -61,7 +61,7 @@ def largest_inputs(maneuvers: Sequence[Maneuver]) -> np.ndarray:
 
 def inputs_beyond(maneuver: Maneuver, known: np.ndarray) -> np.ndarray:
     """Times (inputs,) in s at which inputs pass what is known of them (3, inputs) first."""
-    return extent_of(maneuver, np.array([-known[0], *known])).since
+    return first_beyond(maneuver, np.array([-known[0], *known]))
 
 
 @dataclass(frozen=True)

@@ -14,21 +14,13 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import recorded_inputs
-from vehiclemor.inputs.signal import Signal
+from vehiclemor.inputs.polynomials import kept, recorded_inputs
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import choice
-from vehiclemor.simulation.checks import (
-    check_positive,
-    checked_array,
-    checked_inputs,
-    output_times,
-)
-from vehiclemor.simulation.kernel_derivatives import By
-from vehiclemor.simulation.kinematic_derivatives import kinematic_derivatives
+from vehiclemor.simulation.checks import check_positive, checked_array, checked_inputs, output_times
+from vehiclemor.simulation.kernel_derivatives import By, chosen
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton import newton_loops
-from vehiclemor.simulation.newton.lane_loops import LaneKernels
 from vehiclemor.simulation.newton.lane_runs import LaneRuns
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
@@ -39,6 +31,10 @@ LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
 SOLVERS = ("newton", "newton_lanes")
+# What derivatives are of -> function of the equations, if it is one.
+RESULTS = {"residual": "residual", "outputs": "outputs", "coordinates": ""}
+# Largest gap (m or rad) between joints at which coordinates count as a solution.
+CLOSED = 1e-6
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
@@ -92,10 +88,33 @@ class AlgebraicModel(Model):
     def jacobian(
         self, state: Any, u: Any, with_respect_to: By = "state", of: str = "residual"
     ) -> np.ndarray:
-        """Derivatives of `residual`, `outputs` or `coordinates`, see `kinematic_derivatives`."""
-        if of == "residual" and with_respect_to == "state":
+        """Analytic derivatives of `residual`, `outputs` or `coordinates`, see `Model.jacobian`.
+
+        By the state: of the residual or of the outputs as functions of q.  By inputs or parameters:
+        of the residual with q held, of coordinates and outputs with q following, by the implicit
+        function theorem dq = -Phi_q^-1 Phi_u du.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the coordinates that are to follow don't close the joints.
+        """
+        function, by = chosen(of, RESULTS), with_respect_to
+        if by == "state" and not function:
+            raise InputError("derivatives of the coordinates are by inputs or parameters")
+        if of == "residual" and by == "state":
             return self.evaluated("residual_jacobian", state, u)[:, :-1].copy()
-        return kinematic_derivatives(self, state, u, with_respect_to, of)
+        if of == "residual" or by == "state":
+            return self.jacobian_of(function, state, u, by)
+        gap = float(np.abs(self.evaluated("residual", state, u)).max())
+        if not gap < CLOSED:
+            raise InputError(f"{self.name}: at these coordinates the joints are {gap:.3g} m apart")
+        change = self.jacobian_of("residual", state, u, by)
+        moved = -np.linalg.solve(self.evaluated("residual_jacobian", state, u)[:, :-1], change)
+        if not function:
+            return moved
+        follows = self.jacobian_of(function, state, u, "state") @ moved
+        return self.jacobian_of(function, state, u, by) + follows
 
     def newton_step(self, q: Any, u: Any) -> np.ndarray:
         """Newton step Phi_q^-1 Phi by straight-line elimination, shape (n,)."""
@@ -212,30 +231,11 @@ class AlgebraicModel(Model):
         return run if outputs is None else run.chosen(outputs)
 
     def sampled(self, maneuver: Maneuver) -> Sampled:
-        """Output times (samples,) in s of a maneuver and its inputs, which are ready for loops.
-
-        They are kept, so they can't be written.
-
-        Raises
-        ------
-        InputError
-            As of `inputs_of`.
-        """
-        maneuver = checked_maneuver(maneuver, self.definition)
-        if not isinstance(maneuver, Signal):
-            return _sampled(maneuver)
-        if "sampled" not in maneuver.kept:
-            maneuver.kept["sampled"] = _ready_samples(maneuver)
-        return maneuver.kept["sampled"]
+        """Output times in s of a maneuver and its inputs, ready for loops; to be read only."""
+        return _sampled(checked_maneuver(maneuver, self.definition))
 
     def inputs_of(self, maneuver: Maneuver, times: np.ndarray) -> np.ndarray:
-        """Inputs (samples, number of inputs) of a maneuver as the loops want them.
-
-        Raises
-        ------
-        InputError
-            If they are not the model's, or one isn't finite.
-        """
+        """Inputs (samples, inputs) of a maneuver as loops want them, or `InputError`."""
         maneuver = checked_maneuver(maneuver, self.definition)
         return checked_inputs(maneuver.at(times), times, self.inputs)
 
@@ -288,7 +288,7 @@ class AlgebraicModel(Model):
     def _lanes(self) -> LaneRuns:
         names = "newton_step", "outputs"
         addresses = [address_of(self.kernels, name, LANES) for name in names]
-        kernels = ready(LaneKernels(np.array(addresses, dtype=np.int64)))
+        kernels = np.array(addresses, dtype=np.int64)
         sizes = len(self.coordinates), len(self.inputs), len(self.outputs)
         loop = self.loop("lane_path", "simulation.newton.lane_loops")
         return LaneRuns(loop, self._ready_mechanism, kernels, sizes)
@@ -334,15 +334,7 @@ class AlgebraicModel(Model):
         )
 
     def loop(self, name: str, *further: str) -> Loop:
-        """A compiled loop with the model's kernels inlined.
-
-        Parameters
-        ----------
-        name
-            Of the entry, in the last of the modules.
-        further
-            Modules behind those of the full-order loops.
-        """
+        """A loop of the full-order solution, or of modules behind it, with the kernels inlined."""
         n, parts = len(self.coordinates), self.equations.sources["tangent_parts"].sizes[-1]
         sizes = {"N": n, "INPUTS": len(self.inputs), "ENTRIES": parts - n}
         inlined = {key: self.equations.sources[key] for key in INLINED_KERNELS}
@@ -367,13 +359,11 @@ def _iteration(tolerance: float, shortest: float) -> Ready:
     return ready(newton_loops.Iteration(tolerance, *limits))
 
 
-def _ready_samples(maneuver: Maneuver) -> Sampled:
+@kept
+def _sampled(maneuver: Maneuver) -> Sampled:
     times, inputs = recorded_inputs(maneuver)
     checked_inputs(inputs, times, maneuver.inputs)
     return times, inputs, ready(newton_loops.Samples(inputs))
-
-
-_sampled = lru_cache(maxsize=64)(_ready_samples)
 
 
 def new_counts() -> np.ndarray:

@@ -39,24 +39,9 @@ def build(
 ) -> Model:
     """Derive (or fetch), compile and parametrise a registered model.
 
-    Parameters
-    ----------
-    parameter_file
-        The model's own by default.
-    overrides
-        Parameter name -> value in SI units that replaces the file's.
-
-    Returns
-    -------
-    AlgebraicModel or DynamicModel
-        As the model's kind is `ae`, or `ode` and `dae`; both are a `Model`.
-
-    Raises
-    ------
-    InputError
-        If the name or an override is wrong.
-    VehiclemorError
-        If the parameters can't be read, or the model can't be assembled from them or can't stand.
+    The parameter file is the model's own by default, overrides are values in SI units by name.
+    `InputError` if the name or an override is wrong; another `VehiclemorError` if the parameters
+    can't be read, or the model can't be assembled from them or can't stand.
     """
     definition: ModelDefinition = component("model", name)
     path = parameter_file or definition.parameter_file
@@ -186,13 +171,7 @@ def _check_states(definition: ModelDefinition, initial: Mapping[str, np.ndarray]
 def compiled(
     name: str, derive: Callable[[], Program], loops: Sequence[str] = LOOP_SOURCES
 ) -> tuple[Derivation, str]:
-    """Derivation of a model, whatever its parameters, and the hash of the source of what runs it.
-
-    Parameters
-    ----------
-    loops
-        Modules of the loops that run it.
-    """
+    """Derivation of a model, and the hash of its source and of the loops that run it."""
     with blamed(f"model {name!r}: its equations can't be derived", derive):
         made = derivation(name, derive)
     text = f"{made.source}\n{loops_digest(loops)}"

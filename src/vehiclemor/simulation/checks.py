@@ -15,12 +15,9 @@ LARGEST = sys.float_info.max
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
-    """A finite array (size,) of floats, as compiled functions want it; a number is one entry.
+    """A finite array (size,) of floats as compiled functions want it, or `InputError`.
 
-    Raises
-    ------
-    InputError
-        If the shape is another one or an entry isn't finite.
+    A number is an array of one.
     """
     try:
         array = np.atleast_1d(loop_array(value))
@@ -37,13 +34,7 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
 def checked_path(
     value: Any, size: int, name: str, samples: int | None = None, finite: bool = True
 ) -> np.ndarray:
-    """A path (samples, size) of floats, as compiled functions want it; finite unless told.
-
-    Raises
-    ------
-    InputError
-        If it has another shape, or holds what is no finite number.
-    """
+    """A path (samples, size) for compiled functions, finite unless told; or `InputError`."""
     try:
         path = loop_array(value)
     except (TypeError, ValueError) as error:
@@ -58,13 +49,7 @@ def checked_path(
 
 
 def checked_inputs(value: Any, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
-    """Inputs (samples, inputs) at given times, as compiled functions want them.
-
-    Raises
-    ------
-    InputError
-        If there are none, they have another shape or one isn't finite; its time is named.
-    """
+    """Finite inputs (samples, inputs) for compiled functions; `InputError` names the time."""
     if not len(times):
         raise InputError("inputs are needed at one time at least")
     inputs = checked_path(value, len(names), "inputs", len(times), finite=False)
@@ -88,19 +73,11 @@ def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
 def output_times(
     given: Any, maneuver: Maneuver, repeats: bool = False, begin: float = 0.0
 ) -> np.ndarray:
-    """Output times (samples,) in s; the maneuver's from `begin` on where none are given.
+    """Output times (samples,) in s that increase within a maneuver, or `InputError`.
 
-    They are a copy that can't be written: many runs share it.
-
-    Parameters
-    ----------
-    repeats
-        Whether a time may stand twice, as the edges of windows do in snapshots.
-
-    Raises
-    ------
-    InputError
-        If they don't increase within the maneuver.
+    They are a copy that can't be written, as many runs share it.
+    By default the maneuver's from `begin` on.  With `repeats` a time may stand twice, as the edges
+    of windows do in snapshots.
     """
     if begin:
         within("begin", number("begin", begin), (0.0, maneuver.duration), " s")
@@ -130,14 +107,7 @@ def _shared(times: np.ndarray) -> np.ndarray:
 
 
 def limits_of(definition: ModelDefinition) -> tuple[list[str], tuple[str, ...], np.ndarray]:
-    """What outputs are watched for.
-
-    Returns
-    -------
-    tuple
-        Names of the outputs with a range of validity; of these and, after them, of the loads; their
-        smallest and largest values (limits, 2).
-    """
+    """Names of outputs with a range of validity; these and, behind them, loads; limits (k, 2)."""
     names = [quantity.name for quantity in definition.outputs]
     # An input is checked before the run.
     valid = {name: r for name, r in definition.validity.items() if name in names}

@@ -54,13 +54,7 @@ def solved_parameters(
 
 
 def components(definition: ModelDefinition, name: str) -> range:
-    """Numbers of the components of a parameter among those of all.
-
-    Raises
-    ------
-    InputError
-        If it is no parameter of the model.
-    """
+    """Numbers of the components of a parameter among those of all, or `InputError`."""
     declared = definition.parameters
     place = [*declared].index(choice("parameter", name, declared))
     first = sum(before.size for before in [*declared.values()][:place])

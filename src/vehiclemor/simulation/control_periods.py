@@ -64,13 +64,7 @@ class ControlPeriods(ShortRepr):
         return {}
 
     def spans(self, breaks: np.ndarray, end: float, begin: float = 0.0) -> Ready:
-        """Spans from `begin` to `end`, no break point or window edge inside; whole ones are kept.
-
-        Parameters
-        ----------
-        breaks
-            Ends of the smooth segments of the inputs, from 0 to the end of the maneuver.
-        """
+        """As `smooth_spans`, with the window edges; those of whole runs are kept."""
         if begin:
             return ready(smooth_spans(breaks, self.edges, end, begin))
         key = breaks.tobytes(), end
@@ -82,7 +76,10 @@ class ControlPeriods(ShortRepr):
 
 
 def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float = 0.0) -> Spans:
-    """Spans from `begin` to `end` without a break point of the inputs or a window edge inside."""
+    """Spans from `begin` to `end` without a window edge or a break point of the inputs inside.
+
+    Break points are ends of the smooth segments of the inputs, from 0 to the end of the maneuver.
+    """
     cuts = np.unique(np.concatenate([breaks, edges, [begin, end]]))
     cuts = cuts[(cuts >= begin) & (cuts <= end)]
     # Times that differ by rounding are one.

@@ -14,10 +14,7 @@ from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import recorded_inputs
-from vehiclemor.simulation.checks import (
-    left_validity,
-    lifted_wheels,
-)
+from vehiclemor.simulation.checks import left_validity, lifted_wheels
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.integrators.catalogue import integrator
 from vehiclemor.simulation.integrators.mirror_image import partners
@@ -222,16 +219,9 @@ class DynamicModel(Model):
         how: Solver,
         outputs: tuple[str, ...] | None = None,
     ) -> Trajectory:
-        """Trajectory of the full or a projected system; a divergence is recorded in it.
+        """Trajectory of the full or a projected system from a state; it records a divergence.
 
-        Parameters
-        ----------
-        state
-            Initial state (2 n,).
-        windows
-            Formulation of the system and its subspaces by window.
-        outputs
-            Those that alone are kept.
+        The windows tell the formulation and its subspaces; of outputs those named alone are kept.
         """
         maneuver = checked_maneuver(maneuver, self.definition)
         if windows.formulation == "coordinates":
@@ -242,30 +232,6 @@ class DynamicModel(Model):
         found = self.recorded(maneuver, run, inputs, run.whole, outputs=outputs)
         run.give_back()
         return found
-
-    def recorded(
-        self,
-        maneuver: Maneuver,
-        run: Run,
-        inputs: np.ndarray,
-        states: np.ndarray,
-        trust: Trust | None = None,
-        outputs: tuple[str, ...] | None = None,
-    ) -> Trajectory:
-        """Trajectory of a run whose path has been brought to the model's states.
-
-        Parameters
-        ----------
-        inputs
-            At the output times (samples, inputs).
-        states
-            Where the run is recorded: 2 n columns, and what may follow them.
-        trust
-            What a reduced model tells of the run.
-        outputs
-            Outputs, coordinates or speeds that alone are kept; else all can be read.
-        """
-        return self._recorded(run, inputs, states, cut_short(maneuver), trust, outputs)
 
     def trajectory(
         self,
@@ -278,18 +244,24 @@ class DynamicModel(Model):
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
         run = Run(times, states, np.asarray(counts), seconds, failure)
-        return self._recorded(run, loop_array(inputs), loop_array(states), "")
+        return self.recorded(None, run, loop_array(inputs), loop_array(states))
 
-    def _recorded(
+    def recorded(
         self,
+        maneuver: Maneuver | None,
         run: Run,
         inputs: np.ndarray,
         states: np.ndarray,
-        remark: str,
         trust: Trust | None = None,
         outputs: tuple[str, ...] | None = None,
     ) -> Trajectory:
-        """See `recorded`; a remark is added to what there is to remark."""
+        """Trajectory of a run whose path has been brought to the model's states.
+
+        Inputs are those at the output times (samples, inputs); states stand where the run is
+        recorded, 2 n columns and what may follow them.  Trust is what a reduced model tells of the
+        run.  Where outputs are named, these alone are kept; else all can be read.
+        """
+        remark = "" if maneuver is None else cut_short(maneuver)
         recorder, times, n = self._recorder, run.times, 2 * len(self.coordinates)
         at_points = run.recorded_at(inputs)[1]
         first = recorder.first_outside(run, at_points, states)

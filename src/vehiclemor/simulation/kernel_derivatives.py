@@ -40,12 +40,9 @@ def _sensitivity(kernels: Kernels, name: str, arrays: Arrays, size: int, place: 
 
 
 def parameter_names(by: Any) -> tuple[str, ...]:
-    """Names of the parameters that derivatives are taken by; none for the state or the inputs.
+    """Names of parameters that derivatives are by; none for state and inputs.
 
-    Raises
-    ------
-    InputError
-        If it is neither a name nor a sequence of names.
+    `InputError` if it is neither a name nor a sequence of names.
     """
     if isinstance(by, str):
         return () if by in PLACES else (by,)

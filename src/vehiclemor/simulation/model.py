@@ -170,13 +170,7 @@ class Model(ShortRepr):
     def values_at(
         self, function: str, states: np.ndarray, inputs: np.ndarray, finite: bool = False
     ) -> np.ndarray:
-        """Results (samples, size) of a function of the equations along a path.
-
-        Parameters
-        ----------
-        finite
-            Whether to refuse what is no number, as a trajectory is after it has failed.
-        """
+        """Results (samples, size) of a function of the equations along a path, finite if told."""
         self.require(function)
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
         return at_samples(self.kernels, function, self.constants, (states, inputs), sizes, finite)
@@ -202,13 +196,7 @@ class Model(ShortRepr):
                 raise InputError(f"{self.name} has no {name}: {needed}")
 
     def evaluated(self, function: str, state: Any, u: Any) -> np.ndarray:
-        """Result of a function of the equations at a state (n,) and inputs.
-
-        Raises
-        ------
-        InputError
-            If the model has no such function, or a value isn't finite.
-        """
+        """Result of a function of the equations at a state (n,) and inputs, or `InputError`."""
         self.require(function)
         result = np.empty(self.equations.shapes[function])
         state, u = self._state(state, "q" if self.kind == "ae" else "x"), self._inputs(u)
@@ -228,12 +216,9 @@ class Model(ShortRepr):
         return self.kernels.bare(function, self.constants)
 
     def jacobian_of(self, function: str, state: Any, u: Any, by: By) -> np.ndarray:
-        """Analytic derivatives (results, columns) of a function of the equations, see `jacobian`.
+        """Analytic derivatives of a function of the equations, see `jacobian`.
 
-        Raises
-        ------
-        InputError
-            If an argument is wrong, or the derivatives aren't finite.
+        `InputError` if an argument is wrong, or the derivatives aren't finite.
         """
         self.require(function)
         names, size = parameter_names(by), math.prod(self.equations.shapes[function])

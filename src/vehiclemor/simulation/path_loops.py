@@ -65,14 +65,9 @@ def watched(
 ) -> Int:
     """The first sample at which each of some outputs is outside of its range; else their number.
 
-    Parameters
-    ----------
-    states
-        At the points of a run (points, n or more).
-    places
-        See `structures.Output`; where there are none the points are the samples.
-    results
-        Scratch space (points, results) of the kernel.
+    States are those at the points of a run (points, n or more), which are the samples where there
+    are no places, see `structures.Output`; results (points, results) of the kernel are scratch
+    space.
     """
     samples = len(places) if len(places) else len(states)
     for k in range(len(first)):

@@ -23,21 +23,10 @@ def at_samples(
     sizes: tuple[int, int, int],
     finite: bool = False,
 ) -> np.ndarray:
-    """Results (samples, size) of a kernel at every sample of a path.
+    """Results (samples, size) of a kernel at every sample of paths of states and inputs.
 
-    Parameters
-    ----------
-    paths
-        States and inputs by sample.
-    sizes
-        Numbers of states, inputs and results.
-    finite
-        Whether to refuse what is not finite.
-
-    Raises
-    ------
-    InputError
-        If a path has another shape: the kernel reads as many numbers as it knows.
+    `sizes` are numbers of states, inputs and results: `InputError` if a path has another shape, as
+    the kernel reads as many numbers as it knows, or if it must be finite and isn't.
     """
     states = checked_path(paths[0], sizes[0], "states", finite=finite)
     inputs = checked_path(paths[1], sizes[1], "inputs", len(states), finite)
@@ -64,19 +53,9 @@ def evaluate(
 
 
 def address_of(kernels: Kernels, name: str, lanes: int = 1, results: tuple[int, ...] = ()) -> int:
-    """Address of a kernel for compiled loops, which don't look before they call it.
+    """Address of a kernel for loops, which don't look before they call it; else `InputError`.
 
-    Parameters
-    ----------
-    lanes
-        Samples that it takes at once.
-    results
-        Numbers of the results that it computes; all where none are named.
-
-    Raises
-    ------
-    InputError
-        If there is none.
+    See `Kernels.address`.
     """
     address = kernels.address(name, lanes, results)
     if not address:

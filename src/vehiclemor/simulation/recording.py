@@ -19,13 +19,7 @@ NO_RANGES = np.empty((0, 2))
 
 
 class Recorder:
-    """Makes outputs of runs of a model, and watches those that have limits.
-
-    Attributes
-    ----------
-    limited
-        Outputs with a range of validity, see `checks.limits_of`; loads are watched behind them.
-    """
+    """Makes outputs of runs of a model; watches those that are `limited`, and loads behind them."""
 
     def __init__(self, model: Model) -> None:
         self.model = model
@@ -35,10 +29,7 @@ class Recorder:
     def first_outside(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> list[int]:
         """The first sample at which each watched output is out of its limits; else all samples.
 
-        Parameters
-        ----------
-        inputs, states
-            At the points of the run (points or more, number).
+        Inputs and states are those at the points of the run (points or more, number).
         """
         held = run.kept.get("watched")
         if held is None or held[0] is not states:
@@ -81,10 +72,7 @@ class Recorder:
     ) -> tuple[Ready, int]:
         """Outputs, coordinates or speeds as loops over so many points take them.
 
-        Returns
-        -------
-        tuple
-            The outputs, and how many of them a kernel makes: the others are states.
+        The number tells how many of them a kernel makes: the others are states.
         """
         lanes = LANES if rows >= LANES else 1
         if (names, lanes) not in self._packed:

@@ -40,18 +40,9 @@ class Sensitivity(NamedTuple):
 class StepSpace(NamedTuple):
     """A workspace of one step at a time, and what is overwritten for each.
 
-    Attributes
-    ----------
-    times
-        Arrays that end with the length of the step.
-    window
-        Index (1,) of the control period.
-    coefficients
-        Of the inputs (1, inputs, 6).
-    means
-        Origins (windows, n) of the subspaces.
-    first
-        The word of the first step to try, as a number.
+    These are arrays of times that end with the length of the step, the index (1,) of the window,
+    coefficients (1, inputs, 6) of the inputs, origins (windows, n) of the subspaces, and the word
+    of the first step to try.
     """
 
     space: Workspace

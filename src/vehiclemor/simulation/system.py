@@ -88,13 +88,7 @@ class System(ShortRepr):
                 source.check(*given, *([results[name]] if name in results else ()))
 
     def equations(self, *names: str, step: int = 0) -> Equations:
-        """Kernels of these names, at their places, as compiled loops take them.
-
-        Parameters
-        ----------
-        step
-            Address of a kernel that takes whole steps, if any.
-        """
+        """Kernels of these names as loops take them, and the address of one of whole steps."""
         places = ("derivative", "outputs", "second_order", "speeds")
         found = [address_of(self.kernels, name) if name in names else 0 for name in places]
         kernels = np.array([*found, step], dtype=np.int64)
@@ -174,13 +168,6 @@ class System(ShortRepr):
         few = len(self.reference) <= catalogue.MOST_STATES
         return few and catalogue.integrator(solver).stepped is not None
 
-    def step_address(self, solver: str) -> int:
-        """Address of the kernel that takes whole steps of an integrator."""
-        stepped = catalogue.integrator(solver).stepped
-        assert stepped
-        kernel = stepped.kernel(self.frame, self.inputs)
-        return address_of(Kernels([kernel]), kernel.name)
-
     def method(self, solver: str, active: np.ndarray) -> Ready:
         """What an integrator needs beside its code; kept for further runs."""
         key = solver, active.tobytes()
@@ -204,7 +191,10 @@ class System(ShortRepr):
         """The kernels that a run calls, a solver's whole steps too; kept for further runs."""
         key = formulation, solver
         if key not in self._ready:
-            step = self.step_address(solver) if solver else 0
+            step = 0
+            if solver and (stepped := catalogue.integrator(solver).stepped):
+                kernel = stepped.kernel(self.frame, self.inputs)
+                step = address_of(Kernels([kernel]), kernel.name)
             self._ready[key] = ready(self.equations(*FORMULATIONS[formulation], step=step))
         return self._ready[key]
 
@@ -216,17 +206,9 @@ class System(ShortRepr):
         solver: Solver,
         direct_until: float = np.inf,
     ) -> Run:
-        """Integrate from a state (n,) over a maneuver.
+        """Integrate from a state (n,) over a maneuver; `InputError` if a value or name is wrong.
 
-        Parameters
-        ----------
-        direct_until
-            Time in s from which on the run may be recorded at points, see `structures.Output`.
-
-        Raises
-        ------
-        InputError
-            If a value is out of bounds or a name is unknown.
+        From `direct_until` s on the run may be recorded at points, see `structures.Output`.
         """
         name, tolerance, times, longest, begin = solver
         check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
@@ -294,7 +276,8 @@ class System(ShortRepr):
         name = catalogue.ALIASES.get(solver.name, solver.name)
         chosen = catalogue.integrator(name)
         full = windows.formulation == "full"
-        catalogue.check_formulation(name, full)
+        if catalogue.frozen(name) and not full:
+            raise InputError(f"{name} freezes the full model's Jacobian: not for a reduced model")
         whole_steps = full and self.whole_steps(name)
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = chosen.formulation if full else windows.formulation

@@ -248,10 +248,7 @@ def output_names(outputs: Any) -> tuple[str, ...]:
 def sample_rows(times: Any, known: np.ndarray) -> np.ndarray:
     """Numbers of the samples at some of the output times, all in s.
 
-    Raises
-    ------
-    InputError
-        If the times don't increase, or one of them is no output time.
+    `InputError` if the times don't increase, or one of them is no output time.
     """
     try:
         wanted = np.atleast_1d(real_array(times))
@@ -274,13 +271,7 @@ def sample_rows(times: Any, known: np.ndarray) -> np.ndarray:
 def trajectory_dataset(
     model: Any, trajectory: Trajectory, further: dict[str, tuple] | None = None
 ) -> xr.Dataset:
-    """Labelled dataset of a trajectory: histories, counts, seconds and status, with units.
-
-    Parameters
-    ----------
-    further
-        Name -> (dimensions, values, attributes) of variables to add.
-    """
+    """Labelled dataset of histories, counts, seconds, status and further variables, with units."""
     import xarray as xr
 
     variables: dict[str, tuple] = {}

@@ -7,6 +7,7 @@ kind.  It belongs to one run at a time, in whichever thread: lists are popped an
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -71,21 +72,14 @@ class Solver(NamedTuple):
 
 
 class DrivenBy(NamedTuple):
-    """What of a maneuver goes into a run.
-
-    Attributes
-    ----------
-    signal, spans
-        Piecewise polynomials, and the parts of the run.
-    inputs
-        At the output times (samples, inputs).
-    """
+    """What of a maneuver goes into a run: signal, parts of the run, inputs at the output times."""
 
     signal: Ready
     spans: Ready
     inputs: np.ndarray
 
 
+@dataclass(eq=False, slots=True)
 class Workspace:
     """Arrays of one run at a time and, packed once, the loop that uses them.
 
@@ -105,20 +99,13 @@ class Workspace:
         What other loops have made of the run; their arrays last as long.
     """
 
-    __slots__ = ("buffer", "call", "kept", "output", "signal", "start", "windows")
-
-    def __init__(
-        self,
-        call: Prepared,
-        start: np.ndarray,
-        output: Output,
-        buffer: np.ndarray,
-        windows: ControlPeriods,
-        signal: Ready,
-    ) -> None:
-        self.call, self.start, self.output, self.buffer = call, start, output, buffer
-        self.windows, self.signal = windows, signal
-        self.kept: dict[str, Any] = {}
+    call: Prepared
+    start: np.ndarray
+    output: Output
+    buffer: np.ndarray
+    windows: ControlPeriods
+    signal: Ready
+    kept: dict[str, Any] = field(default_factory=dict)
 
     def take(self, drive: DrivenBy) -> None:
         """Have the next run driven by another maneuver of the same output times."""
@@ -128,6 +115,7 @@ class Workspace:
         self.output.given[:] = drive.inputs
 
 
+@dataclass(eq=False, slots=True)
 class Run:
     """What a compiled run leaves behind.
 
@@ -137,8 +125,6 @@ class Run:
         Output times (samples,) in s.
     whole
         States where it is recorded (rows or more, dim), NaN from a failure on.
-    rows
-        How many of its rows tell something.
     counts
         Numbers in the order of `DYNAMIC_COUNTS`.
     seconds
@@ -147,25 +133,27 @@ class Run:
         Why the run has ended early, empty if it has not.
     space
         Where its arrays are from; none of a path that is given.
+    left
+        Called with the space once nothing reads its arrays any more.
+    rows
+        How many of its rows tell something.
     """
 
-    __slots__ = ("_left", "counts", "failure", "rows", "seconds", "space", "times", "whole")
+    times: np.ndarray
+    whole: np.ndarray
+    counts: np.ndarray
+    seconds: float
+    failure: str
+    space: Workspace | None = None
+    left: Callable[[Workspace], None] | None = None
+    rows: int = field(init=False)
 
-    def __init__(
-        self,
-        times: np.ndarray,
-        whole: np.ndarray,
-        counts: np.ndarray,
-        seconds: float,
-        failure: str,
-        space: Workspace | None = None,
-        left: Callable[[Workspace], None] | None = None,
-    ) -> None:
-        self.times, self.whole, self.rows, self.counts = times, whole, len(whole), counts
-        self.seconds, self.failure, self.space, self._left = seconds, failure, space, left
+    def __post_init__(self) -> None:
+        """Find how far it is recorded."""
+        self.rows = len(self.whole)
         places = self.places
         if len(places):
-            reached = int(places[:, 0].argmax()) if failure else -1
+            reached = int(places[:, 0].argmax()) if self.failure else -1
             row, part = places[reached].tolist()
             # Kernels take so many at once.
             self.rows = max(int(row) + (1 if part < 0.0 else NODES), LANES)
@@ -185,7 +173,7 @@ class Run:
 
         Of a workspace that is used again they always stand in the same place.
         """
-        if self.space is None or self._left is None:
+        if self.space is None or self.left is None:
             return self.times, inputs
         output = self.space.output
         return (
@@ -199,6 +187,6 @@ class Run:
 
     def give_back(self) -> None:
         """Leave its arrays to the next run: nothing may read them any more."""
-        if self._left is not None and self.space is not None:
-            self._left(self.space)
-            self.space = self._left = None
+        if self.left is not None and self.space is not None:
+            self.left(self.space)
+            self.space = self.left = None

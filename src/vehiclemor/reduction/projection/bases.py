@@ -25,7 +25,9 @@ Rank = Annotated[
     ),
     AT_MOST_COORDINATES,
 ]
-Snapshots = Annotated[int, Field(ge=2, description="snapshots in each control period and training run")]
+Snapshots = Annotated[
+    int, Field(ge=2, description="snapshots in each control period and training run")
+]
 RankTolerance = Annotated[
     float,
     Field(

@@ -8,12 +8,7 @@ import math
 
 from vehiclemor.codegen.loop_types import call_kernel
 from vehiclemor.inputs.polynomial_loops import input_at
-from vehiclemor.simulation.integrators.structures import (
-    DERIVATIVE,
-    RHS_CALLS,
-    SECOND_ORDER,
-    SPEEDS,
-)
+from vehiclemor.simulation.integrators.structures import DERIVATIVE, RHS_CALLS, SECOND_ORDER, SPEEDS
 
 INLINED = ("rhs", "reconstruct", "positions_and_rates", "galerkin", "product")
 

@@ -8,14 +8,9 @@ NODES, POWERS, CLASSICAL, AT_END = range(4)
 def set_weights(k, table, numbers, weights):
     """Weights of a step with k nodes: zero and past ones; classical weight of the corrector.
 
-    Parameters
-    ----------
-    table
-        phi_1, phi_2, ... of h B by row.
-    numbers
-        Rows of nodes in steps, and those that are set, see above.
-    weights
-        Of N (k + 1, columns) in the predictor, the last in the corrector; they are set.
+    The table has phi_1, phi_2, ...  of h B by row; numbers are rows of nodes in steps, and of what
+    is set, see above.  The weights of N (k + 1, columns) in the predictor, the last in the
+    corrector, are set.
     """
     nodes, powers = numbers[NODES], numbers[POWERS]
     classical, at_end = numbers[CLASSICAL], numbers[AT_END]

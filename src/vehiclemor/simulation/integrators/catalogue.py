@@ -11,13 +11,16 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.codegen.operations import Kernel
-from vehiclemor.exceptions import InputError
 from vehiclemor.progress import first_use
 from vehiclemor.registry import choice
 from vehiclemor.simulation.formulations import FORMULATIONS
-from vehiclemor.simulation.integrators import exponential_functions, exponential_modes, tableaus
+from vehiclemor.simulation.integrators import (
+    exponential_functions,
+    exponential_modes,
+    rodas4,
+    ros34pw2,
+)
 from vehiclemor.simulation.integrators.loop import scratch_end
-from vehiclemor.simulation.integrators.ros34pw2 import GAMMA
 from vehiclemor.simulation.integrators.step_kernels import Frame, exponential_step, w_step
 from vehiclemor.simulation.integrators.structures import Control
 
@@ -32,15 +35,7 @@ NOTHING = np.zeros((1, 1, 1))
 
 
 class Stored(NamedTuple):
-    """What is stored of a frozen Jacobian.
-
-    Attributes
-    ----------
-    operators
-        For every step size: (step sizes, rows, columns).
-    shared
-        For all of them: (rows, columns).
-    """
+    """What is stored of a frozen Jacobian: matrices by step size, and one for all step sizes."""
 
     operators: np.ndarray
     shared: np.ndarray = NOTHING[0]
@@ -49,14 +44,8 @@ class Stored(NamedTuple):
 class Stepped(NamedTuple):
     """Whole steps as one kernel.
 
-    Attributes
-    ----------
-    kernel
-        Makes the kernel from the frame and the number of inputs.
-    tables
-        Makes transposed operators (step sizes, tables, n, n) of a diagonal block.
-    modules
-        Modules of the loop's functions.
+    It is made from the frame and the number of inputs, its tables are transposed operators (step
+    sizes, tables, n, n) of a diagonal block, and the loop's functions stand in the modules.
     """
 
     kernel: Callable[[Frame, int], Kernel]
@@ -111,7 +100,7 @@ def inverses(jacobian: np.ndarray, active: np.ndarray) -> Stored:
 
 def transposed_inverses(jacobian: np.ndarray) -> np.ndarray:
     """Transposed (step sizes, 1, n, n) of (I - gamma h J)^-1."""
-    matrices = np.eye(len(jacobian)) - GAMMA * STEP_GRID[:, None, None] * jacobian
+    matrices = np.eye(len(jacobian)) - ros34pw2.GAMMA * STEP_GRID[:, None, None] * jacobian
     return np.ascontiguousarray(np.linalg.inv(matrices).swapaxes(1, 2)[:, None])
 
 
@@ -146,7 +135,7 @@ INTEGRATORS = {
         4,
         Control(1.0 / 4.0, 1.0 / 4.0),
         ("cubic", "dense_solves", "rodas4"),
-        tableaus.rodas4(),
+        rodas4.tableau(),
         squares=2,
     ),
     "ros34pw2": Integrator(
@@ -154,7 +143,7 @@ INTEGRATORS = {
         3,
         Control(1.0 / 3.0, 1.0 / 3.0),
         ("step_grid", "cubic", "ros34pw2"),
-        tableaus.ros34pw2(),
+        ros34pw2.tableau(),
         inverses,
         stepped=Stepped(
             w_step, transposed_inverses, ("step_grid", "cubic", "ros34pw2", "stepped_ros34pw2")
@@ -216,12 +205,6 @@ def frozen(name: str) -> bool:
     return integrator(name).operators is not None
 
 
-def check_formulation(name: str, full: bool) -> None:
-    """Raise `InputError` if an integrator can't run a reduced system."""
-    if frozen(name) and not full:
-        raise InputError(f"{name} freezes the full model's Jacobian: not for a reduced model")
-
-
 @lru_cache(maxsize=64)
 def control_of(name: str, tolerance: float, longest: float) -> Ready:
     """Limits and step-size control of a run."""
@@ -246,13 +229,7 @@ def rhs_loop(formulation: str) -> Loop:
 
 
 def time_loop(chosen: Integrator, formulation: str, whole_steps: bool = False) -> Loop:
-    """The compiled time loop of an integrator and a formulation.
-
-    Parameters
-    ----------
-    whole_steps
-        Whether a kernel takes them.
-    """
+    """The compiled time loop of an integrator and a formulation; a kernel may take whole steps."""
     own = chosen.stepped.modules if whole_steps and chosen.stepped else chosen.modules
     modules = (
         *_problem_modules(formulation),

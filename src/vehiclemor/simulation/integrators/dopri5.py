@@ -15,14 +15,7 @@ A41, A42, A43 = 44 / 45, -56 / 15, 32 / 9
 A51, A52, A53, A54 = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
 A61, A62, A63, A64, A65 = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
 B1, B3, B4, B5, B6 = 35 / 384, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
-E1, E3, E4, E5, E6, E7 = (
-    71 / 57600,
-    -71 / 16695,
-    71 / 1920,
-    -17253 / 339200,
-    22 / 525,
-    -1 / 40,
-)
+E1, E3, E4, E5, E6, E7 = (71 / 57600, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
 D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
@@ -33,25 +26,9 @@ def work_space(buffer, first, integers, dim, inputs):
     """Scratch space from place `first` of the buffer on."""
     # Stages as rows of one array: so the compiler sees few arrays that might overlap.
     k = matrix(buffer, first, 7, dim)
-    none = vector(buffer, first, 0)
-    return Work(
-        vector(buffer, first + 7 * dim, dim),
-        k[0],
-        vector(buffer, first + 8 * dim, dim),
-        k[6],
-        vector(buffer, first + 9 * dim, dim),
-        vector(buffer, first + 9 * dim, dim),
-        k,
-        k,
-        k,
-        k,
-        integers,
-        integers,
-        none,
-        none,
-        none,
-        none,
-    )
+    ends, none = matrix(buffer, first + 7 * dim, 3, dim), vector(buffer, first, 0)
+    states = ends[0], k[0], ends[1], k[6], ends[2], ends[2]
+    return Work(*states, k, k, k, k, integers, integers, none, none, none, none)
 
 
 def begin(problem, t, method, work):

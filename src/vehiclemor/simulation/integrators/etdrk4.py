@@ -23,6 +23,7 @@ one serve, exact for A = J grid[index] / h.  Operators: see `exponential_functio
 from vehiclemor.codegen.loop_types import matrix, vector
 from vehiclemor.simulation.formulations.full import rhs
 from vehiclemor.simulation.integrators.step_grid import (
+    add_rows,
     heading_of,
     index_below,
     nearest_index,
@@ -48,28 +49,12 @@ V, HALF, WHOLE_STEP, PRODUCT, F1, Y_PAST, F_PAST, CHANGE = range(4, 12)
 
 def work_space(buffer, first, integers, dim, inputs):
     """Scratch space from place `first` of the buffer on."""
-    rows = matrix(buffer, first, 5, dim)
+    rows, none = matrix(buffer, first, 5, dim), vector(buffer, first, 0)
     stages = matrix(buffer, first + 5 * dim, 12, dim)
-    place = first + 20 * dim
-    none = vector(buffer, first, 0)
-    return Work(
-        rows[0],
-        rows[1],
-        rows[2],
-        rows[3],
-        rows[4],
-        stages[V],
-        stages,
-        matrix(buffer, first + 17 * dim, 3, dim),
-        rows,
-        rows,
-        integers,
-        integers,
-        vector(buffer, place, 4),
-        none,
-        none,
-        none,
-    )
+    curve = matrix(buffer, first + 17 * dim, 3, dim)
+    states = rows[0], rows[1], rows[2], rows[3], rows[4], stages[V]
+    whole, memory = (integers, integers), vector(buffer, first + 20 * dim, 4)
+    return Work(*states, stages, curve, rows, rows, *whole, memory, none, none, none)
 
 
 def begin(problem, t, method, work):
@@ -96,24 +81,9 @@ def quadrature_weights(past, h):
 
 def applied(operators, first, b, result):
     """Product of a matrix with b; its transpose are rows of the operators from `first` on."""
-    dim = len(b)
-    for i in range(dim):
+    for i in range(len(b)):
         result[i] = 0.0
-    # Four rows at a time: the result is loaded and stored a quarter as often.
-    j = 0
-    while j + 3 < dim:
-        w0, w1, w2, w3 = b[j], b[j + 1], b[j + 2], b[j + 3]
-        row = first + j
-        for i in range(dim):
-            result[i] += (operators[row, i] * w0 + operators[row + 1, i] * w1) + (
-                operators[row + 2, i] * w2 + operators[row + 3, i] * w3
-            )
-        j += 4
-    while j < dim:
-        w0 = b[j]
-        for i in range(dim):
-            result[i] += operators[first + j, i] * w0
-        j += 1
+    add_rows(operators, first, b, len(b), result)
 
 
 def step(problem, t, h, method, work, counts):

@@ -24,14 +24,9 @@ from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import IntVector, Matrix, Vector, matrix
 from vehiclemor.simulation.formulations.full import error_norm, rhs
-from vehiclemor.simulation.integrators.adams_weights import (
-    AT_END,
-    CLASSICAL,
-    NODES,
-    set_weights,
-)
-from vehiclemor.simulation.integrators.step_grid import index_below, nearest_index
-from vehiclemor.simulation.integrators.structures import RHS_CALLS
+from vehiclemor.simulation.integrators.adams_weights import AT_END, CLASSICAL, NODES, set_weights
+from vehiclemor.simulation.integrators.step_grid import add_rows, index_below, nearest_index
+from vehiclemor.simulation.integrators.structures import RHS_CALLS, rows_of
 
 INLINED = (
     "begin",
@@ -104,23 +99,13 @@ class AdamsWork(NamedTuple):
 
 def work_space(buffer, first, integers, dim, inputs):
     """Scratch space from place `first` of the buffer on: 65 vectors and 48 numbers."""
-    rows = matrix(buffer, first, 7, dim)
-    place = first + 7 * dim
-    return AdamsWork(
-        rows[0],
-        rows[1],
-        rows[2],
-        rows[3],
-        rows[4],
-        rows[5],
-        rows[6],
-        matrix(buffer, place, KEPT + 1, 4 * dim),
-        matrix(buffer, place + 32 * dim, 4, dim),
-        matrix(buffer, place + 36 * dim, MOST_ORDER + 2, 2 * dim),
-        matrix(buffer, place + 50 * dim, 2, 4 * dim),
-        matrix(buffer, place + 58 * dim, 6, 8),
-        integers,
-    )
+    rows, place = matrix(buffer, first, 7, dim), first + 7 * dim
+    past = matrix(buffer, place, KEPT + 1, 4 * dim)
+    modal = matrix(buffer, place + 32 * dim, 4, dim)
+    weights = matrix(buffer, place + 36 * dim, MOST_ORDER + 2, 2 * dim)
+    sums = matrix(buffer, place + 50 * dim, 2, 4 * dim)
+    numbers = matrix(buffer, place + 58 * dim, 6, 8)
+    return AdamsWork(*rows_of(rows), rows[6], past, modal, weights, sums, numbers, integers)
 
 
 def sizes(method, dim):
@@ -143,7 +128,7 @@ def begin(problem, t, method, work):
     now = work.modal[NOW]
     for i in range(r):
         now[i] = 0.0
-    add_product(method.shared, 0, work.y, r, now)
+    add_rows(method.shared, 0, work.y, r, now)
     record(method, work, 0, work.f, work.y, now)
 
 
@@ -157,7 +142,7 @@ def record(method, work, row, f, y, modal):
     slope = kept[dim : dim + r]
     for i in range(r):
         slope[i] = 0.0
-    add_product(shared, 0, f, r, slope)
+    add_rows(shared, 0, f, r, slope)
     rates, forth, back = shared[dim + r], shared[dim + r + 1], shared[dim + r + 2]
     rest = kept[dim + r : dim + 2 * r]
     for i in range(r):
@@ -166,25 +151,6 @@ def record(method, work, row, f, y, modal):
     for i in range(pairs):
         rest[one + i] -= forth[i] * modal[two + i]
         rest[two + i] -= back[i] * modal[one + i]
-
-
-def add_product(rows, first, b, size, result):
-    """Add the combination with b of rows, from `first` on, to a vector of that size."""
-    # Four rows at a time: the result is loaded and stored a quarter as often.
-    j = 0
-    while j + 3 < len(b):
-        w0, w1, w2, w3 = b[j], b[j + 1], b[j + 2], b[j + 3]
-        row = first + j
-        for i in range(size):
-            result[i] += (rows[row, i] * w0 + rows[row + 1, i] * w1) + (
-                rows[row + 2, i] * w2 + rows[row + 3, i] * w3
-            )
-        j += 4
-    while j < len(b):
-        w0 = b[j]
-        for i in range(size):
-            result[i] += rows[first + j, i] * w0
-        j += 1
 
 
 def longest_step(h, method, control, work):
@@ -272,7 +238,7 @@ def predict(h, stretch, table, method, work):
         predicted[i] = now[i] + change
     for i in range(dim):
         work.predictor[i] = work.y[i] + h * in_step[i]
-    add_product(method.shared, dim, added[:r], dim, work.predictor)
+    add_rows(method.shared, dim, added[:r], dim, work.predictor)
 
 
 def blend(stretch, row, dim, r, result):
@@ -301,7 +267,7 @@ def correct(h, stretch, method, work):
         new[i] = modal[PREDICTED, i] + change
     for i in range(dim):
         work.new[i] = work.predictor[i] + classical * difference[i]
-    add_product(method.shared, dim, added[:r], dim, work.new)
+    add_rows(method.shared, dim, added[:r], dim, work.new)
 
 
 def accept(problem, t, h, method, work, counts):

@@ -55,19 +55,10 @@ def integrate(
     buffer: Vector,
     integers: IntVector,
 ) -> Int:
-    """Integrate from the start over all spans; a new window projects the state onto its space.
+    """Integrate from the start (n,) over all spans; a new window projects the state onto its space.
 
-    Parameters
-    ----------
-    start
-        State (n,).
-    buffer, integers
-        Scratch space, see `catalogue.scratch_size`.
-
-    Returns
-    -------
-    int
-        Why the run has ended; if early, when is the first number of the buffer.
+    Buffer and integers are scratch space, see `catalogue.scratch_size`.  Gives why the run has
+    ended; if early, when is the first number of the buffer.
     """
     n, inputs = len(start), signal.coefficients.shape[1]
     x = vector(buffer, 0, n)

@@ -5,8 +5,10 @@ IV.7 and VI.4, in transformed stages (no product with the Jacobian):
 
     (I / (gamma h) - A) U_i = f(t + alpha_i h, y + sum a_ij U_j) + sum c_ij / h U_j + d_i h f_t
 
-Rows of the tableau: a (6), c (6), then alpha, d, m and e.
+Rows of the tableau: a (6), c (6), then alpha, d, m and e; gamma is 1/4.
 """
+
+import numpy as np
 
 from vehiclemor.codegen.loop_types import matrix, vector
 from vehiclemor.simulation.formulations.full import rhs
@@ -17,6 +19,7 @@ from vehiclemor.simulation.integrators.structures import (
     LINEAR_SOLVES,
     RHS_CALLS,
     Work,
+    rows_of,
 )
 
 GAMMA = 0.25
@@ -26,29 +29,45 @@ ALPHA, D, M, E = 12, 13, 14, 15
 INLINED = ("accept", "longest_step", "step")
 
 
+def tableau() -> np.ndarray:
+    """Coefficients (16, 6), see above."""
+    a, c = np.zeros((6, 6)), np.zeros((6, 6))
+    a[1, :1] = [1.544]
+    a[2, :2] = [0.9466785280815826, 0.2557011698983284]
+    a[3, :3] = [3.314825187068521, 2.896124015972201, 0.9986419139977817]
+    a[4, :4] = [1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950]
+    a[5, :4] = a[4, :4]
+    a[5, 4] = 1.0
+    c[1, :1] = [-5.6688]
+    c[2, :2] = [-2.430093356833875, -0.2063599157091915]
+    c[3, :3] = [-0.1073529058151375, -9.594562251023355, -20.47028614809616]
+    c[4, :4] = [7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160]
+    c[5, :5] = [
+        8.083246795921522,
+        -7.981132988064893,
+        -31.52159432874371,
+        16.31930543123136,
+        -6.058818238834054,
+    ]
+    m = a[5].copy()
+    m[5] = 1.0
+    e = np.zeros(6)
+    e[5] = 1.0
+    alpha = np.array([0.0, 0.386, 0.21, 0.63, 1.0, 1.0])
+    d = np.array([0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0])
+    return np.vstack([a, c, alpha, d, m, e])
+
+
 def work_space(buffer, first, integers, dim, inputs):
     """Scratch space from place `first` of the buffer on."""
-    rows = matrix(buffer, first, S + 12, dim)
+    ends = matrix(buffer, first, 6, dim)
+    stages = matrix(buffer, first + 6 * dim, S + 3, dim)
+    curve = matrix(buffer, first + (S + 9) * dim, 3, dim)
     place = first + (S + 12) * dim
+    squares = matrix(buffer, place, dim, dim), matrix(buffer, place + dim * dim, dim, dim)
     none = vector(buffer, first, 0)
-    return Work(
-        rows[0],
-        rows[1],
-        rows[2],
-        rows[3],
-        rows[4],
-        rows[5],
-        matrix(buffer, first + 6 * dim, S + 3, dim),
-        matrix(buffer, first + (S + 9) * dim, 3, dim),
-        matrix(buffer, place, dim, dim),
-        matrix(buffer, place + dim * dim, dim, dim),
-        integers[4 : 4 + dim],
-        integers[:4],
-        none,
-        none,
-        none,
-        none,
-    )
+    whole = integers[4 : 4 + dim], integers[:4]
+    return Work(*rows_of(ends), stages, curve, *squares, *whole, none, none, none, none)
 
 
 def begin(problem, t, method, work):

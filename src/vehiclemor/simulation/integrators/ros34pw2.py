@@ -8,10 +8,12 @@ Rows of the tableau: a (4), gamma c (4), then alpha, m and e; operators are the 
 columns of (I - gamma h J)^-1.
 """
 
+import numpy as np
+
 from vehiclemor.codegen.loop_types import matrix, vector
 from vehiclemor.simulation.formulations.full import rhs
 from vehiclemor.simulation.integrators.step_grid import heading_of, index_above, rotate
-from vehiclemor.simulation.integrators.structures import LINEAR_SOLVES, RHS_CALLS, Work
+from vehiclemor.simulation.integrators.structures import LINEAR_SOLVES, RHS_CALLS, Work, rows_of
 
 GAMMA = 4.3586652150845900e-01
 ALPHA, M, E = 8, 9, 10
@@ -19,28 +21,37 @@ ALPHA, M, E = 8, 9, 10
 INLINED = ("accept", "longest_step", "step")
 
 
+def tableau() -> np.ndarray:
+    """Coefficients (11, 4), see above.
+
+    The time derivative is left out: order 3 holds for any matrix, its column of f_t included.
+    """
+    alpha = np.zeros((4, 4))
+    alpha[1, 0] = 8.7173304301691801e-01
+    alpha[2, :2] = [8.4457060015369423e-01, -1.1299064236484185e-01]
+    alpha[3, 2] = 1.0
+    g = GAMMA * np.eye(4)
+    g[1, 0] = -8.7173304301691801e-01
+    g[2, :2] = [-9.0338057013044082e-01, 5.4180672388095326e-02]
+    g[3, :3] = [2.4212380706095346e-01, -1.2232505839045147e00, 5.4526025533510214e-01]
+    b = np.array([2.4212380706095346e-01, -1.2232505839045147e00, 1.5452602553351020e00, GAMMA])
+    embedded = np.array(
+        [3.7810903145819369e-01, -9.6042292212423178e-02, 0.5, 2.1793326075422950e-01]
+    )
+    inverse = np.linalg.inv(g)
+    a = np.tril(alpha @ inverse, -1)
+    c = np.tril(np.eye(4) / GAMMA - inverse, -1)
+    m, e = b @ inverse, (b - embedded) @ inverse
+    return np.vstack([a, GAMMA * c, alpha.sum(axis=1), m, e])
+
+
 def work_space(buffer, first, integers, dim, inputs):
     """Scratch space from place `first` of the buffer on."""
-    rows = matrix(buffer, first, 7, dim)
-    none = vector(buffer, first, 0)
-    return Work(
-        rows[0],
-        rows[1],
-        rows[2],
-        rows[3],
-        rows[4],
-        rows[5],
-        matrix(buffer, first + 6 * dim, 5, dim),
-        matrix(buffer, first + 11 * dim, 3, dim),
-        rows,
-        rows,
-        integers,
-        integers,
-        none,
-        none,
-        none,
-        none,
-    )
+    ends, none = matrix(buffer, first, 6, dim), vector(buffer, first, 0)
+    stages = matrix(buffer, first + 6 * dim, 5, dim)
+    curve = matrix(buffer, first + 11 * dim, 3, dim)
+    whole = integers, integers
+    return Work(*rows_of(ends), stages, curve, ends, ends, *whole, none, none, none, none)
 
 
 def begin(problem, t, method, work):

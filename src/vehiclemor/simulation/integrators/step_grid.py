@@ -1,4 +1,4 @@
-"""Step sizes for which operators are stored, and vectors turned to heading zero."""
+"""Step sizes for which operators are stored, their products, vectors turned to heading zero."""
 
 import math
 
@@ -46,3 +46,22 @@ def rotate(vector, rotating, cosine, sine):
         a, b = vector[rotating[k]], vector[rotating[k + 1]]
         vector[rotating[k]] = cosine * a - sine * b
         vector[rotating[k + 1]] = sine * a + cosine * b
+
+
+def add_rows(rows, first, b, size, result):
+    """Add the combination with b of rows, from `first` on, to a vector of that size."""
+    # Four rows at a time: the result is loaded and stored a quarter as often.
+    j = 0
+    while j + 3 < len(b):
+        w0, w1, w2, w3 = b[j], b[j + 1], b[j + 2], b[j + 3]
+        row = first + j
+        for i in range(size):
+            result[i] += (rows[row, i] * w0 + rows[row + 1, i] * w1) + (
+                rows[row + 2, i] * w2 + rows[row + 3, i] * w3
+            )
+        j += 4
+    while j < len(b):
+        w0 = b[j]
+        for i in range(size):
+            result[i] += rows[first + j, i] * w0
+        j += 1

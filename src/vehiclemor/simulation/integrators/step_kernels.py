@@ -17,7 +17,7 @@ import numpy as np
 
 from vehiclemor.codegen.operations import Kernel, Listing, Value
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.simulation.integrators import ros34pw2, tableaus
+from vehiclemor.simulation.integrators import ros34pw2
 from vehiclemor.simulation.integrators.etdrk4 import ERROR_SHARE
 from vehiclemor.simulation.integrators.exponential_functions import (
     AT_ZERO,
@@ -38,14 +38,9 @@ RESULTS = ("new", "rates", "error")
 class Frame(NamedTuple):
     """Coordinates in which operators are stored.
 
-    Attributes
-    ----------
-    blocks
-        By block: its coordinates, each a sum of one or two states with signs.
-    columns
-        By block: numbers of the coordinates that the right-hand side depends on.
-    rotating
-        Numbers of the heading and of pairs of states that turn with it; may be empty.
+    Each block has coordinates, sums of one or two states with signs, and columns, numbers of those
+    that the right-hand side depends on.  Rotating are the heading and pairs of states that turn
+    with it; they may be none.
     """
 
     blocks: tuple[Block, ...]
@@ -207,7 +202,7 @@ def w_step(frame: Frame, inputs: int) -> Kernel:
 
     The second argument is the stored inverse.
     """
-    tableau, step = tableaus.ros34pw2(), _Step(frame, ("y", "f"), 1)
+    tableau, step = ros34pw2.tableau(), _Step(frame, ("y", "f"), 1)
     n, stages = step.n, ("s0", "s1", "s2", "s3")
     for name in ("new", "error"):
         step.at(name)

@@ -22,24 +22,10 @@ def work_space(buffer, first, integers, dim, inputs):
     memory = vector(buffer, place + 4 * dim, 4)
     stride = (dim + 3) // 4 * 4
     result = vector(buffer, place + 4 * dim + 4, 3 * stride)
-    return Work(
-        given[:dim],
-        given[dim : 2 * dim],
-        result[:dim],
-        result[stride : stride + dim],
-        result[2 * stride : 2 * stride + dim],
-        rows[0],
-        rows,
-        rows[1:],
-        rows,
-        rows,
-        integers,
-        integers,
-        memory,
-        given,
-        given[4 * dim + 6 :],
-        result,
-    )
+    end, rates, error = result[:dim], result[stride : stride + dim], result[2 * stride :]
+    states = given[:dim], given[dim : 2 * dim], end, rates, error[:dim], rows[0]
+    values, whole = given[4 * dim + 6 :], (integers, integers)
+    return Work(*states, rows, rows[1:], rows, rows, *whole, memory, given, values, result)
 
 
 def begin(problem, t, method, work):

@@ -6,12 +6,7 @@ What is not here is as in `ros34pw2`.
 from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
 from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.integrators.step_grid import index_above
-from vehiclemor.simulation.integrators.structures import (
-    LINEAR_SOLVES,
-    RHS_CALLS,
-    STEP_KERNEL,
-    Work,
-)
+from vehiclemor.simulation.integrators.structures import LINEAR_SOLVES, RHS_CALLS, STEP_KERNEL, Work
 
 ALPHA = 8
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
@@ -24,24 +19,10 @@ def work_space(buffer, first, integers, dim, inputs):
     rows = matrix(buffer, first + len(given), 5, dim)
     stride = (dim + 3) // 4 * 4
     result = vector(buffer, first + len(given) + 5 * dim, 2 * stride)
-    return Work(
-        given[:dim],
-        given[dim : 2 * dim],
-        result[:dim],
-        rows[0],
-        result[stride : stride + dim],
-        rows[1],
-        rows,
-        rows[2:],
-        rows,
-        rows,
-        integers,
-        integers,
-        result,
-        given,
-        given[2 * dim + 1 :],
-        result,
-    )
+    end, error = result[:dim], result[stride : stride + dim]
+    states = given[:dim], given[dim : 2 * dim], end, rows[0], error, rows[1]
+    values, whole = given[2 * dim + 1 :], (integers, integers)
+    return Work(*states, rows, rows[2:], rows, rows, *whole, result, given, values, result)
 
 
 def step(problem, t, h, method, work, counts):

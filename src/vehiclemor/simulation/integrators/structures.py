@@ -38,12 +38,7 @@ class Equations(NamedTuple):
 class Spans(NamedTuple):
     """Parts of a run without a break point of the inputs or an edge of a window inside.
 
-    Attributes
-    ----------
-    edges
-        Times (spans + 1,) in s.
-    segments, windows
-        Segment of the signal and control period of each span.
+    Edges (spans + 1,) are times in s; a span lies in one segment of the signal and one window.
     """
 
     edges: Vector
@@ -214,16 +209,9 @@ class Outputs(NamedTuple):
 class Problem(NamedTuple):
     """Equations on one span and one window, with scratch space.
 
-    Attributes
-    ----------
-    segment
-        Number of the segment of the signal.
-    mean, trial, test
-        Mean (n,) of the window, trial basis and test basis (R, n) by rows.
-    x, u, dx
-        Scratch: state (n,), inputs, rates (n,).
-    second_order, small
-        Scratch (n / 2, n / 2 + 1): mass matrix and forces, and their projection.
+    A segment of the signal, the mean (n,) of the window, trial and test basis (R, n) by rows.
+    Scratch: state (n,), inputs, rates (n,); mass matrix and forces (n / 2, n / 2 + 1), and their
+    projection.
     """
 
     segment: int
@@ -282,3 +270,8 @@ class Work(NamedTuple):
     given: Vector
     values: Vector
     result: Vector
+
+
+def rows_of(states):
+    """The first vectors of `Work`, from the state to the middle, as rows of a matrix."""
+    return states[0], states[1], states[2], states[3], states[4], states[5]

@@ -6,17 +6,7 @@ at once.  Where one does not converge as it must on the branch, see `newton_loop
 up: the caller solves sample by sample.
 """
 
-from typing import NamedTuple
-
-from vehiclemor.codegen.loop_types import (
-    Int,
-    IntVector,
-    Matrix,
-    Vector,
-    call_lanes,
-    matrix,
-    vector,
-)
+from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector, call_lanes, matrix, vector
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.newton.newton_loops import (
     CERTAIN,
@@ -43,12 +33,6 @@ STEP, RESULTS = range(2)
 # extrapolation that is as good as between samples.
 WAY = 16
 INLINED = ("corrected", "extrapolated")
-
-
-class LaneKernels(NamedTuple):
-    """Addresses of kernels in vector lanes, by place, to be made ready once."""
-
-    kernels: IntVector
 
 
 def corrected(q, u, mechanism, kernels, iteration, work):

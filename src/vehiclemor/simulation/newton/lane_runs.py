@@ -1,5 +1,6 @@
 """Runs of Newton's method in vector lanes, packed once for all with the same inputs."""
 
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -12,39 +13,25 @@ from vehiclemor.simulation.workspaces import Pool
 
 
 class LaneRun(NamedTuple):
-    """The loop with its arguments.
-
-    Attributes
-    ----------
-    counts
-        Counts of the loop, and behind them the sample at which it stops.
-    table
-        Word of the address of the table, which is fresh in each run.
-    """
+    """The loop with its arguments, its counts, and the word of the address of its table."""
 
     call: Prepared
     counts: np.ndarray
     table: int
 
 
+@dataclass(frozen=True, eq=False)
 class LaneRuns:
-    """Runs of one mechanism.
+    """Runs of one mechanism by `lane_loops.lane_path`, whose arguments have the same names.
 
-    Parameters
-    ----------
-    loop
-        `lane_path` of `lane_loops`.
-    mechanism, kernels
-        Its arguments of these names.
-    sizes
-        Numbers of coordinates, inputs and outputs.
+    Sizes are numbers of coordinates, inputs and outputs.
     """
 
-    def __init__(
-        self, loop: Loop, mechanism: Ready, kernels: Ready, sizes: tuple[int, int, int]
-    ) -> None:
-        self._loop, self._mechanism, self._kernels = loop, mechanism, kernels
-        self._sizes, self._pool = sizes, Pool[LaneRun]()
+    loop: Loop
+    mechanism: Ready
+    kernels: np.ndarray
+    sizes: tuple[int, int, int]
+    _pool: Pool[LaneRun] = field(default_factory=Pool)
 
     def solved(
         self, samples: Ready, iteration: Ready
@@ -53,7 +40,7 @@ class LaneRuns:
 
         There are as many samples as lanes at least.
         """
-        kind, (n, _, m) = (samples, iteration), self._sizes
+        kind, (n, _, m) = (samples, iteration), self.sizes
         run = self._pool.taken(kind, lambda: self._packed(samples, iteration))
         # One table is written faster than two.
         table = np.empty((len(samples.bundle.inputs), n + m))
@@ -64,11 +51,11 @@ class LaneRuns:
         return None if status else (table, counts, seconds)
 
     def _packed(self, samples: Ready, iteration: Ready) -> LaneRun:
-        n, inputs, m = self._sizes
+        n, inputs, m = self.sizes
         solution = Solution(np.empty((0, n + m)), np.zeros(SAMPLE + 1, dtype=np.int64))
         buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 2))
-        shared = self._mechanism, samples, self._kernels, iteration
-        call = self._loop.prepared(*shared, solution, buffer)
+        shared = self.mechanism, samples, self.kernels, iteration
+        call = self.loop.prepared(*shared, solution, buffer)
         table = call.address("solution.path")
         call.words[table + 1] = len(samples.bundle.inputs)
         return LaneRun(call, solution.counts, table)

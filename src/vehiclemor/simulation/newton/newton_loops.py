@@ -30,16 +30,9 @@ N, INPUTS = 0, 0
 class Iteration(NamedTuple):
     """When an iteration ends.
 
-    Attributes
-    ----------
-    tolerance
-        Largest component of the last step.
-    limit
-        Most iterations for a sample.
-    largest_increment
-        Increment of an input above which its step is cut into substeps.
-    shortest_step
-        Step of an input at which the way to a position is given up.
+    The largest component of the last step is below the tolerance, after so many iterations for a
+    sample at most.  A step of the input is cut into substeps above the largest increment; below the
+    shortest step the way to a position is given up.
     """
 
     tolerance: Float
@@ -51,16 +44,9 @@ class Iteration(NamedTuple):
 class Mechanism(NamedTuple):
     """What is solved.
 
-    Attributes
-    ----------
-    start
-        Coordinates (N,) at the design position, where the inputs are zero.
-    stops
-        Largest magnitude (N,) of each coordinate.
-    constants
-        Of the kernels.
-    orientation
-        Sign of the Jacobian's determinant at the design position: it changes at a fold.
+    It starts at coordinates (N,) of the design position, where the inputs are zero.  Stops are the
+    largest magnitudes (N,) of coordinates, constants those of the kernels.  The orientation is the
+    sign of the Jacobian's determinant at the design position: it changes at a fold.
     """
 
     start: Vector
@@ -84,15 +70,7 @@ class Work(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Where a solution is recorded.
-
-    Attributes
-    ----------
-    path
-        Coordinates (samples, n).
-    counts
-        By place, see above (5,).
-    """
+    """Where a solution is recorded: coordinates (samples, n), counts by place (5,), see above."""
 
     path: Matrix
     counts: IntVector
@@ -232,13 +210,10 @@ def newton(q, u, mechanism, iteration, work):
 
 
 def moved(q, u, place, target, mechanism, iteration, work):
-    """Move one input of a solved position to a target in steps that stay on the branch.
+    """Move one input of a solved position to a target in steps that stay on the branch: iterations.
 
-    Returns
-    -------
-    int
-        Iterations, negative where not even the shortest step goes further, since the branch or a
-        stop is near: q and u are then those of the last position.
+    They are negative where not even the shortest step goes further, since the branch or a stop is
+    near: q and u are then those of the last position.
     """
     length, iterations = iteration.largest_increment, 0
     while u[place] != target:
@@ -273,10 +248,7 @@ def within(q, stops):
 def approach(q, u, target, mechanism, iteration, work):
     """From the design position to the inputs of a target, one after the other, the height last.
 
-    Returns
-    -------
-    int
-        Iterations, negative where the branch ends before.
+    Gives iterations, negative where the branch ends before.
     """
     for i in range(N):
         q[i] = mechanism.start[i]
@@ -292,11 +264,7 @@ def approach(q, u, target, mechanism, iteration, work):
 
 
 def newton_path(
-    mechanism: Mechanism,
-    inputs: Matrix,
-    iteration: Iteration,
-    solution: Solution,
-    buffer: Vector,
+    mechanism: Mechanism, inputs: Matrix, iteration: Iteration, solution: Solution, buffer: Vector
 ) -> Int:
     """Newton's method with a fresh Jacobian in every iteration, started at the previous sample.
 
@@ -332,11 +300,7 @@ def newton_path(
 
 
 def travel_limit(
-    mechanism: Mechanism,
-    target: Vector,
-    iteration: Iteration,
-    reached: Vector,
-    buffer: Vector,
+    mechanism: Mechanism, target: Vector, iteration: Iteration, reached: Vector, buffer: Vector
 ) -> Int:
     """How far the branch goes to a target, one input after the other, the height last.
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.simulation.integrators import dopri5 as pair
-from vehiclemor.simulation.integrators import ros34pw2, tableaus
+from vehiclemor.simulation.integrators import rodas4, ros34pw2
 
 
 def weighted(b: np.ndarray, conditions: list, tolerance: float) -> float:
@@ -67,7 +67,7 @@ def rosenbrock(a, c, m, e, gamma) -> SimpleNamespace:
     )
 
 
-ROWS, OTHER = tableaus.rodas4(), tableaus.ros34pw2()
+ROWS, OTHER = rodas4.tableau(), ros34pw2.tableau()
 RODAS4 = rosenbrock(ROWS[:6], ROWS[6:12], ROWS[14], ROWS[15], 0.25)
 ROS34PW2 = rosenbrock(OTHER[:4], OTHER[4:8] / ros34pw2.GAMMA, OTHER[9], OTHER[10], ros34pw2.GAMMA)
 
