@@ -141,8 +141,6 @@ class Reader:
         found = stored.view(complex) if complex_pairs else stored.astype(part["type"])
         if not all(type(size) is int and size >= 0 for size in part["shape"]):
             raise ValueError(f"{quoted(part['shape'])} is no shape")
-        if found.dtype.kind in "fc" and np.isnan(found).any():
-            raise ValueError("an array holds what is no number")
         found = found.reshape(part["shape"])
         return found.T if part["turned"] else found
 
