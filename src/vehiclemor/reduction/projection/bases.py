@@ -21,7 +21,7 @@ Rank = Annotated[
     int,
     Field(
         ge=1,
-        description="number of basis vectors in each control period; by default no more than coordinates",
+        description="basis vectors in each control period; by default no more than coordinates",
     ),
     AT_MOST_COORDINATES,
 ]
