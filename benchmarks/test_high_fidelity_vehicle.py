@@ -78,7 +78,7 @@ def test_kernel(benchmark, model, kernel):
     states = np.tile(model.start("dropped"), (CALLS, 1))
     inputs = np.full((CALLS, 3), 1e-3)
     size = int(np.prod(model.equations.shapes[kernel]))
-    result = benchmark(model.system.along, kernel, states, inputs, size)
+    result = benchmark(model.system.values_at, kernel, states, inputs, size)
     benchmark.extra_info["operations"] = model.operation_counts[kernel]["total"]
     assert np.isfinite(result).all()
 
