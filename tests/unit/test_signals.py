@@ -167,6 +167,15 @@ def test_what_is_noisy_is_run_as_accurately_as_what_is_smooth(car, hold):
     assert np.abs(found.outputs - exact.outputs)[:, place].max() < 0.01
 
 
+@pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4", "exponential_adams", "rodas4"])
+def test_a_spline_that_sets_off_from_rest_is_not_stepped_over(car, solver):
+    t = np.linspace(0.0, 4.0, 401)
+    signal = vm.Signal.from_samples(t, 0.01 * np.sin(5.0 * np.maximum(t - 1.0, 0.0)), "cubic")
+    exact = car.simulate(signal, "equilibrium", solver="dopri5", tolerance=1e-10)
+    found = car.simulate(signal, "equilibrium", solver=solver, tolerance=1e-7)
+    np.testing.assert_allclose(found["lateral_position"], exact["lateral_position"], atol=2e-5)
+
+
 def test_the_run_begins_with_the_first_sample_and_a_car_is_its_own_mirror_image(car):
     t = np.linspace(0.0, 4.0, 129)
     u = 0.01 * np.sin(t) ** 3

@@ -13,6 +13,8 @@ EQUIDISTANT = 1e-8
 KINK, FINE = 1e-3, 0.01
 # A stretch of equal samples is quiet from so long (s) on: a run at rest could step over its end.
 QUIET = 0.1
+# What a spline may swing within such a stretch, relative to the largest value.
+SWING = 1e-6
 # What else `through` returns: times that don't increase, a run (this less its number) that is not
 # finite.
 DISORDERED, NOT_FINITE = -1, -2
@@ -104,7 +106,7 @@ def through(
             if not math.isfinite(values[n - 1, j]):
                 return NOT_FINITE - run
         if degree > 0:
-            rest(times, values, work[4])
+            rest(times, values, work[4], own)
         first[run, 0], count = 0, 1
         for i in range(1, n - 1):
             if work[4, i] > 0.0:
@@ -157,8 +159,11 @@ def bend(values, j, work):
             work[4, i] = 1.0
 
 
-def rest(times, values, marks):
-    """Mark where stretches begin and end in which no input moves."""
+def rest(times, values, marks, own):
+    """Mark where stretches begin and end in which no input moves.
+
+    A spline that sets off from rest swings between the samples before: these are marked too.
+    """
     n, begin, moved = len(values), 0, False
     for i in range(n):
         moves = False
@@ -170,7 +175,20 @@ def rest(times, values, marks):
         elif moves != moved or i == n - 1:
             if not moved and times[i] - times[begin] >= QUIET:
                 marks[begin] = marks[i] = 1.0
+                mark_swings(values, marks, own, begin, i)
             begin, moved = i, moves
+
+
+def mark_swings(values, marks, own, begin, end):
+    """Mark the samples beside which a polynomial moves though they are equal."""
+    for j in range(values.shape[1]):
+        largest = 0.0
+        for i in range(len(values)):
+            largest = max(largest, abs(values[i, j]))
+        for k in range(begin, end):
+            for power in range(1, own.shape[2]):
+                if abs(own[k, j, power]) > SWING * largest:
+                    marks[k] = marks[k + 1] = 1.0
 
 
 def eliminate(work):

@@ -21,7 +21,7 @@ from vehiclemor.registry import choice
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.build import build, reparametrised
 from vehiclemor.simulation.checks import checked_path
-from vehiclemor.simulation.dynamic import REFERENCE_SOLVER, REFERENCE_TOLERANCE
+from vehiclemor.simulation.dynamic import reference_solver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
 from vehiclemor.simulation.trajectory import (
@@ -130,12 +130,15 @@ def simulate_many(
 
     with one_thread(), ThreadPoolExecutor(threads, "vehiclemor") as pool:
         found = list(itertools.chain(*pool.map(reports, range(0, runs, CHUNK))))
-    return _dataset(full, list(names), kept, values, found).assign_attrs(_about(given, full, runs))
+    return _dataset(full, list(names), kept, values, found).assign_attrs(
+        _about(given, full, signals)
+    )
 
 
-def _about(given: Any, full: Model, runs: int) -> dict[str, Any]:
+def _about(given: Any, full: Model, signals: Sequence[Maneuver]) -> dict[str, Any]:
     """Attributes of the result: of which model with which settings it is."""
-    default = {"solver": REFERENCE_SOLVER, "tolerance": REFERENCE_TOLERANCE}
+    solver, tolerance = reference_solver(signals[0])
+    runs, default = len(signals), {"solver": solver, "tolerance": tolerance}
     if full.kind == "ae":
         default = {"solver": "newton", "tolerance": NEWTON_TOLERANCE}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")

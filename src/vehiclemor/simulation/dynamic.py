@@ -14,6 +14,7 @@ from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import recorded_inputs
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.simulation.checks import left_validity, lifted_wheels
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.integrators.catalogue import integrator
@@ -35,8 +36,16 @@ from vehiclemor.simulation.workspaces import Run, Solver
 # What derivatives are of -> function of the equations.
 RESULTS = {"rhs": "derivative", "outputs": "outputs"}
 # How the full-order runs that others are measured against are solved: of the integrators the
-# fastest of that error, see the page on findings.  The tolerance of others is as tight as is usual.
-REFERENCE_SOLVER, REFERENCE_TOLERANCE, TIGHT = "exponential_adams", 1e-10, 1e-9
+# fastest of that error, see the page on findings; and where inputs have a corner at each sample.
+SMOOTH, CORNERED = ("exponential_adams", 1e-10), ("dopri5", 1e-9)
+# The tolerance of others is as tight as is usual.
+TIGHT = 1e-9
+
+
+def reference_solver(maneuver: Maneuver) -> tuple[str, float]:
+    """Integrator and tolerance of a full-order run that others are measured against."""
+    cornered = isinstance(maneuver, Signal) and maneuver.hold == "linear"
+    return CORNERED if cornered else SMOOTH
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,8 +182,8 @@ class DynamicModel(Model):
             `dopri5`: Dormand-Prince 5(4).  `rodas4`: Rosenbrock method of order 4, a fresh
             Jacobian in every step.  `ros34pw2`: W-method of order 3 with one Jacobian, that of
             straight running, for all steps and runs.  With the same `etdrk4`: exponential
-            Runge-Kutta method of order 4, and `exponential_adams`, the default: exponential Adams
-            method of order up to 6.
+            Runge-Kutta method of order 4, and `exponential_adams`: exponential Adams method of
+            order up to 6.  By default that, or `dopri5` through samples on straight lines.
         tolerance
             Largest local error of a state relative to its typical size plus its own.
         outputs
@@ -192,15 +201,18 @@ class DynamicModel(Model):
         ConvergenceError
             If the integration fails or leaves the model's range of validity.
         """
-        if solver is not None:
+        if solver is None:
+            solver, usual = reference_solver(maneuver)
+        else:
             integrator(solver)
+            usual = TIGHT
         trajectory = self.integrate(
             maneuver,
             self.start(start),
             whole_space(2 * len(self.coordinates)),
             Solver(
-                solver or REFERENCE_SOLVER,
-                (TIGHT if solver else REFERENCE_TOLERANCE) if tolerance is None else tolerance,
+                solver,
+                usual if tolerance is None else tolerance,
                 times,
                 longest_step,
                 begin if type(begin) is float else number("begin", begin),
