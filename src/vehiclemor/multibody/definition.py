@@ -17,10 +17,11 @@ from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr
 
 if TYPE_CHECKING:
+    from vehiclemor.multibody.structure import Structure
     from vehiclemor.symbolic.program import Program
 
-# Algebraic equations; ordinary differential equations; those with constraints.
-KINDS = ("ae", "ode", "dae")
+# Algebraic equations; ordinary differential equations; those with constraints; sparse matrices.
+KINDS = ("ae", "ode", "dae", "structural")
 # A mechanism without forces has no equilibrium to find: the name stands for its design position,
 # so that studies can name the same start for every kind of model.
 DESIGN_START = "equilibrium"
@@ -53,16 +54,23 @@ class ModelDefinition(ShortRepr):
     Attributes
     ----------
     name, kind, summary
-        Registered name; `ae`, `ode` or `dae` (constraints stabilised); one line.
+        Registered name; `ae`, `ode`, `dae` (constraints stabilised) or `structural`; one line.
     maneuver
         Name of the nominal maneuver.
     coordinates, speeds, inputs, outputs
         Quantities in order.  A state is the coordinates and, after them, as many speeds; models of
-        kind `ae` have no speeds.
+        kind `ae` have no speeds.  Coordinates of a structure have no names: there are none.
     equations
         Residual equations with their units (kind `ae`).
     constraints
         Constraints with their units (kind `dae`).
+    ports
+        Deflections of the ports with their units (kind `structural`).
+    structure
+        Parameters -> matrices (kind `structural`).
+    online
+        Parameters that may differ between runs of one reduced model, which keeps its basis then
+        (kind `structural`).
     parameters
         Name -> unit, size and bounds.
     parameter_file
@@ -139,6 +147,9 @@ class ModelDefinition(ShortRepr):
     equations: tuple[Quantity, ...] = ()
     joints: tuple[str, ...] = ()
     constraints: tuple[Quantity, ...] = ()
+    ports: tuple[Quantity, ...] = ()
+    structure: Callable[[Values], Structure] = _unset
+    online: tuple[str, ...] = ()
     parameter_file: Path | None = None
     check: Callable[[Values], None] = _anything
     design_coordinates: Callable[[Values], np.ndarray] = _unset
@@ -174,14 +185,15 @@ class ModelDefinition(ShortRepr):
             if not all(isinstance(quantity, Quantity) for quantity in quantities):
                 raise InputError(f"model {self.name!r}: {kind} must be quantities with units")
             names = [quantity.name for quantity in quantities]
-            if len(set(names)) != len(names) or not (names or kind == "speeds"):
+            optional = kind == "speeds" or (kind == "coordinates" and self.kind == "structural")
+            if len(set(names)) != len(names) or not (names or optional):
                 raise InputError(f"model {self.name!r}: {kind} are missing or named twice: {names}")
         for name, declared in self.parameters.items():
             if not isinstance(declared, Declared):
                 raise InputError(
                     f"model {self.name!r}: parameter {name!r} is not declared by a unit"
                 )
-        needed = "design_coordinates" if self.kind == "ae" else "starts"
+        needed = {"ae": "design_coordinates", "structural": "structure"}.get(self.kind, "starts")
         if getattr(self, needed) is _unset:
             raise InputError(f"model {self.name!r} of kind {self.kind} declares no {needed}")
         expected = 0 if self.kind == "ae" else len(self.coordinates)
@@ -198,6 +210,7 @@ class ModelDefinition(ShortRepr):
         self._known("planar", self.planar, self.states)
         self._known("heading_pairs", (n for pair in self.heading_pairs for n in pair), self.states)
         self._known("error_scale", self.error_scale, self.states)
+        self._known("online", self.online, self.parameters)
         self._known("validity", self.validity, outputs | {q.name for q in self.inputs})
         self._known("loads", self.loads, outputs)
         self._known("tabled_outputs", self.tabled_outputs, outputs)

@@ -1,0 +1,54 @@
+"""Structures: sparse matrices of linear elastic bodies, and ports through which forces act.
+
+    M q'' + (E + d K) q' + K q = load + B f(w, w', u),   w = B' q
+
+Springs, dampers and tires act between few points.  Their forces f are the law of the ports, which
+is declared as other equations are; all else are arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Matrices of a structure with n coordinates, p ports and some outputs.
+
+    Outputs are those of the motion about the static state, but for the forces:
+    y = Cq (q - q0) + Cv q' + Ca q'' + Cf f.
+
+    Attributes
+    ----------
+    mass, stiffness
+        M and K (n, n), symmetric; K without what acts at the ports.
+    damping_time
+        d in s, of damping that is proportional to K.
+    damping
+        E (n, n), all other damping; few of its entries are not zero.
+    ports
+        B (n, p): deflections of the ports are w = B' q.
+    load
+        Weight (n,) in N and N m.
+    outputs
+        Cq, Cv, Ca (outputs, n) and Cf (outputs, p).
+    """
+
+    mass: csc_array
+    stiffness: csc_array
+    damping_time: float
+    damping: csc_array
+    ports: csc_array
+    load: np.ndarray
+    outputs: tuple[csc_array, csc_array, csc_array, csc_array]
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self.load)
