@@ -22,7 +22,7 @@ from vehiclemor.netcdf_file import INTEGRITY, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.parts import Reader, Writer
-from vehiclemor.reduction.trust import InputRange
+from vehiclemor.reduction.trust import SAMPLED, InputRange
 from vehiclemor.reduction.validation import checked_fit, checked_settings, validated
 from vehiclemor.registry import component
 from vehiclemor.short_repr import shortened
@@ -100,7 +100,7 @@ def read(path: Any) -> dict[str, Any]:
         known = made["input_range"]
         if not isinstance(known, InputRange):
             raise TypeError(f"input_range is {quoted(known)}, no InputRange")
-        kinds = 1 if model.kind == "ae" else 3
+        kinds = 1 if model.kind in SAMPLED else 3
         require(known.largest.shape == (kinds, len(model.inputs)), "largest")
         if not _alike(stored["response"], response(model, made["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")
@@ -122,6 +122,11 @@ def fingerprint(model: Model) -> np.ndarray:
     """What a model's equations and outputs give at one state: equal for equal models."""
     state, u = model.start(), 1e-2 * np.cos(np.arange(len(model.inputs)))
     state += 1e-3 * np.cos(np.arange(len(state)))
+    if model.kind == "structural":
+        x = np.cos(np.arange(2 * len(model.definition.ports)))
+        result = np.empty((len(model.definition.ports), 3))
+        model.kernels.call("port_forces", x, u, model.constants, result)
+        return result.ravel()
     equations = "residual" if model.kind == "ae" else "derivative"
     parts = [model.evaluated(name, state, u) for name in (equations, "outputs")]
     return np.concatenate(parts)

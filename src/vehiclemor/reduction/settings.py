@@ -69,6 +69,14 @@ Tolerance = Annotated[
         description="largest local error of a state relative to its typical size",
     ),
 ]
+StructuralTolerance = Annotated[
+    float,
+    Field(
+        gt=0.0,
+        le=LARGEST_TOLERANCE,
+        description="largest error of an output by the step size, as part of its range",
+    ),
+]
 
 
 class OnlineSettings(Settings):

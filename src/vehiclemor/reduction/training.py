@@ -59,13 +59,16 @@ def own_speed(model: Model) -> float | None:
 
 
 def difference(model: Model, other: Model) -> str:
-    """The first parameter in which two models differ; empty if they are one."""
+    """The first parameter in which two models differ; empty if they are one.
+
+    What says how a run starts, and what a reduced model may change from run to run, makes none.
+    """
     if model.parameters is other.parameters:
         return ""
     others = other.parameters.values()
     differing = (
         name
         for name, value in model.parameters.values().items()
-        if name not in OF_STARTS and not np.array_equal(value, others[name])
+        if name not in (*OF_STARTS, *model.definition.online) and not np.array_equal(value, others[name])
     )
     return next(differing, "")

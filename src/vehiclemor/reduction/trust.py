@@ -18,6 +18,9 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.sizes import shaped
 
+# Kinds of models whose inputs are known by their magnitudes at output times: a mechanism has no
+# memory, and roads differ in all else.
+SAMPLED = ("ae", "structural")
 # One part in a million is rounding.
 EDGE = 1.0 + 1e-6
 # An input that was zero in training may be nothing else.
@@ -100,7 +103,7 @@ class InputRange:
     def trust(self, model: Model, maneuver: Maneuver, speed: float) -> Trust:
         """How far a run with an initial speed in m/s goes in the range."""
         maneuver = maneuver.for_inputs(model.inputs)
-        if model.kind == "ae":
+        if model.kind in SAMPLED:
             return self.trust_of_inputs(model.inputs, maneuver.at(maneuver.times), maneuver.times)
         used = extent_of(maneuver).largest / self._sizes
         since = np.full(len(model.inputs), np.inf)
@@ -154,7 +157,7 @@ def input_range(
     low, high = min(speeds), max(speeds)
     middle = 0.5 * (low + high)
     reach = EDGE * (max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0)
-    if model.kind == "ae":
+    if model.kind in SAMPLED:
         values = [np.abs(m.at(m.times)).max(axis=0) for m in maneuvers]
         largest = EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
         return InputRange(largest, middle, reach, np.inf)

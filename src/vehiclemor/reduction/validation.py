@@ -76,11 +76,12 @@ def fitted(
 
 def for_model(method: Method, reduced: FittedModel, model: Model, settings: Any) -> FittedModel:
     """What a method gives of a model with other parameters; `InputError` if it learns from runs."""
-    if method.learns_from != "inputs":
+    remade = getattr(reduced, "for_model", None)
+    if method.learns_from != "inputs" and (remade is None or difference(reduced.model, model)):
         raise InputError(
             f"{method.name} is trained on runs of one model: reduce that with the other parameters"
         )
-    if (remade := getattr(reduced, "for_model", None)) is not None:
+    if remade is not None:
         with blamed(f"method {method.name!r}: for_model", remade):
             return checked_fit(method.name, remade(model))
     return fitted(method, model, (), settings)

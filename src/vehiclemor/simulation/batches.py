@@ -24,6 +24,7 @@ from vehiclemor.simulation.checks import checked_path
 from vehiclemor.simulation.dynamic import reference_solver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
+from vehiclemor.simulation.structural import SOLVER, TIGHT
 from vehiclemor.simulation.trajectory import (
     STATUSES,
     Names,
@@ -139,7 +140,9 @@ def _about(given: Any, full: Model, signals: Sequence[Maneuver]) -> dict[str, An
     """Attributes of the result: of which model with which settings it is."""
     solver, tolerance = reference_solver(signals[0])
     runs, default = len(signals), {"solver": solver, "tolerance": tolerance}
-    if full.kind == "ae":
+    if full.kind == "structural":
+        default = {"solver": SOLVER, "tolerance": TIGHT}
+    elif full.kind == "ae":
         default = {"solver": "newton", "tolerance": NEWTON_TOLERANCE}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
     title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.algebraic import AlgebraicModel
     from vehiclemor.simulation.dynamic import DynamicModel
     from vehiclemor.simulation.model import Model
+    from vehiclemor.simulation.structural import StructuralModel
     from vehiclemor.symbolic.program import Program
 
 # Largest gap (m or rad) between the joints of a mechanism that counts as assembled.
@@ -62,7 +63,7 @@ def _made(
     derived: tuple[Derivation, str] | None = None,
 ) -> Model:
     """A model of equations that may have been derived already, see `compiled`."""
-    make = _algebraic if definition.kind == "ae" else _dynamic
+    make = {"ae": _algebraic, "structural": _structural}.get(definition.kind, _dynamic)
     return make(definition, parameters, derived)
 
 
@@ -138,6 +139,21 @@ def _dynamic(
     return DynamicModel(definition, equations, parameters, digest, constants, initial)
 
 
+def _structural(
+    definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
+) -> StructuralModel:
+    """A model of sparse matrices and a port law; the matrices are made when they are needed."""
+    from vehiclemor.simulation.structural import STRUCTURAL_LOOPS, StructuralModel
+
+    with blamed(f"model {definition.name!r}: check", definition.check):
+        definition.check(values_of(definition, parameters.flat()))
+    equations, digest = derived or compiled(definition.name, definition.derive, STRUCTURAL_LOOPS)
+    check_equations(definition, equations)
+    constants = hoisted_constants(equations, parameters.flat(), [])
+    initial = {DESIGN_START: np.zeros(0)}
+    return StructuralModel(definition, equations, parameters, digest, constants, initial)
+
+
 def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
     """Raise `InputError` if functions that were derived are missing or of another shape."""
     n, outputs = len(definition.coordinates), len(definition.outputs)
@@ -145,11 +161,14 @@ def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
     if definition.kind == "ae":
         needed = {"residual": (n,), "residual_jacobian": (n, n + 1), "newton_step": (n,)}
         further: dict[str, tuple[int, ...]] = {"joints": (len(definition.joints), 3)}
+    elif definition.kind == "structural":
+        needed, further = {"port_forces": (len(definition.ports), 3)}, {}
     else:
         needed = {"derivative": (2 * n,)}
         further = {"second_order": (n, n + 1), "speeds": (n,), "violations": (constraints, 2)}
         further["descriptor"] = (n + constraints, n + 1)
-    needed["outputs"] = (outputs,)
+    if definition.kind != "structural":
+        needed["outputs"] = (outputs,)
     for function, shape in (needed | further).items():
         derived = equations.shapes.get(function)
         if derived is None and function in needed:

@@ -46,9 +46,16 @@ DYNAMIC_COUNTS = {
     "factorisations": "LU factorisations of an iteration matrix",
     "linear_solves": "solutions of a linear system, or products with a stored inverse",
 }
+STRUCTURAL_COUNTS = {
+    "steps": "steps",
+    "port_evaluations": "evaluations of the port forces",
+    "linear_solves": "solutions of the linear system of a step",
+}
 # By kind of model; the second is how often the equations were evaluated.
 COUNTS = {"ae": ALGEBRAIC_COUNTS, "ode": DYNAMIC_COUNTS, "dae": DYNAMIC_COUNTS}
+COUNTS["structural"] = STRUCTURAL_COUNTS
 EVALUATIONS = {"ae": "residual_evaluations", "ode": "rhs_calls", "dae": "rhs_calls"}
+EVALUATIONS["structural"] = "port_evaluations"
 
 
 @dataclass(frozen=True)

@@ -154,7 +154,8 @@ kept_reference = lru_cache(maxsize=1024)(reference_run)
 
 def _wanted(model: Model, experiment: Experiment) -> Fit:
     settings, method = _text(experiment.settings), experiment.method
-    own, function = experiment.test[0].parameters, component("method", method).fit
+    online, function = model.definition.online, component("method", method).fit
+    own = tuple(pair for pair in experiment.test[0].parameters if pair[0] not in online)
     return Fit(model, own, method, settings, experiment.training, experiment.code, function)
 
 
@@ -250,7 +251,7 @@ def _tested(
 ) -> Outcome:
     """A test scenario, simulated with the reduced model."""
     own, start = model_of_run(model, scenario), start_of(model, scenario)
-    reduced: Any = fit.reduced
+    reduced: Any = for_run(fit.reduced, own)
     many = experiment.keep == "errors"
     # The first run loads machine code and warms caches, another is timed where it is compared.
     if not (many or fit.warm or reference is None):
@@ -285,6 +286,13 @@ def _tested(
         raise PlugInError(f"best_approximation gives shape {np.shape(nearest)}, not its argument's")
     projected = own.outputs_at(nearest, reference.inputs)
     return Outcome(judged, reference, rms(projected - reference.outputs))
+
+
+def for_run(reduced: Any, own: Model) -> Any:
+    """A reduced model with the online parameters of a run."""
+    if not own.definition.online or getattr(reduced, "model", own) is own:
+        return reduced
+    return getattr(reduced, "for_model", lambda _: reduced)(own)
 
 
 @lru_cache(maxsize=64)

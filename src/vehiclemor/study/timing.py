@@ -28,10 +28,10 @@ from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, timed
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, model_of
+from vehiclemor.study.evaluate import evaluate, for_run, fresh_fit, kept_fit, model_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.result import variables
-from vehiclemor.study.scenario import start_of
+from vehiclemor.study.scenario import model_of_run, start_of
 from vehiclemor.study.store import stored
 
 if TYPE_CHECKING:
@@ -171,13 +171,19 @@ def _rounds(
     runs that fail have in all.  All runs of a round follow one another: load hits all alike.
     """
     model = model_of(experiments[0])
-    tests = [(scenario.maneuver, start_of(model, scenario)) for scenario in experiments[0].test]
+    scenarios = experiments[0].test
+    tests = [(scenario.maneuver, start_of(model, scenario)) for scenario in scenarios]
     shape = (len(experiments), len(tests))
     wanted = np.ones(shape, dtype=bool) if finished is None else finished.copy()
     # Each has a name of its own, so that progress never goes back.
     work = f"rounds of times on {model.name}, {what}"
     tell(work, 0, rounds[0] + 1)
     fits = [_warm_fit(model, e, bool(w.any())) for e, w in zip(experiments, wanted, strict=True)]
+    for_test = {
+        (index, place): for_run(reduced, model_of_run(model, scenario))
+        for index, (reduced, _) in enumerate(fits)
+        for place, scenario in enumerate(scenarios)
+    }
     seconds = np.full((rounds[0] + 1, *shape, 2), np.nan)
     for turn in range(rounds[0] + 1):
         for place, test in enumerate(tests):
@@ -186,7 +192,7 @@ def _rounds(
                 long = turn == 0 or seconds[0, index, place, WHOLE] >= LONG_RUN
                 if reduced is None or not wanted[index, place] or (long and turn > rounds[1]):
                     continue
-                run = partial(reduced.simulate, *test)
+                run = partial(for_test[index, place].simulate, *test)
                 found = attempt(partial(called, run, REPEATS_OF_LONG if long else REPEATS))
                 if isinstance(found, Failure):
                     wanted[index, place], seconds[:, index, place] = False, np.nan

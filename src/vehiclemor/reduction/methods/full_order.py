@@ -1,7 +1,7 @@
 """The full-order model itself: the baseline of every comparison."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -17,6 +17,7 @@ from vehiclemor.reduction.settings import (
     OnlineSettings,
     Settings,
     StepTolerance,
+    StructuralTolerance,
     Tolerance,
     Value,
 )
@@ -26,6 +27,7 @@ from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.structural import USUAL, StructuralModel
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -50,6 +52,15 @@ class DynamicSettings(OnlineSettings):
         "etdrk4: exponential method of order 4; exponential_adams: of order 6, for high accuracy",
     )
     tolerance: Tolerance = 1e-8
+
+
+class StructuralSettings(Settings):
+    """How structures are integrated."""
+
+    solver: Literal["generalised_alpha"] = Field(
+        "generalised_alpha", description="of order 2, one step size a run, damped at infinity"
+    )
+    tolerance: StructuralTolerance = USUAL
 
 
 # The paper's kind of baseline: a general-purpose integrator of variable step.
@@ -127,23 +138,44 @@ class FullOrderMechanism(FullOrder, ReducedMechanism):
         return self.model.jacobian(state, inputs, by, of)
 
 
+@dataclass(frozen=True, eq=False)
+class FullOrderStructure(FullOrder):
+    """A structural model; it gives whole runs alone."""
+
+    model: StructuralModel
+
+    @property
+    def order(self) -> int:
+        """Number of coordinates."""
+        return self.model.size
+
+    def for_model(self, model: StructuralModel) -> "FullOrderStructure":
+        """The same for another model."""
+        return replace(self, model=model)
+
+
+CLASSES = {"ae": FullOrderMechanism, "structural": FullOrderStructure}
+
+
 def fit(
     model: Model, training: Training, settings: AlgebraicSettings | DynamicSettings
 ) -> FullOrder:
     """Nothing is fitted, and no training run is looked at."""
-    kind = FullOrderSystem if isinstance(model, DynamicModel) else FullOrderMechanism
+    kind = CLASSES.get(model.kind, FullOrderSystem)
     return kind(model, settings.solver, settings.tolerance)  # type: ignore[arg-type]
 
 
 METHOD = Method(
     name="full_order",
     summary="no reduction: the full-order model, the baseline",
-    settings={"ae": AlgebraicSettings, "ode": DynamicSettings, "dae": DynamicSettings},
+    settings={"ae": AlgebraicSettings, "ode": DynamicSettings, "dae": DynamicSettings}
+    | {"structural": StructuralSettings},
     # Strongest: the fastest solver found whose errors are within the bounds of the studies.
     presets={
         "ae": _presets("newton_lanes", 1e-4),
         "ode": _presets("ros34pw2", 2e-3, paper=PAPER),
         "dae": _presets("ros34pw2", 7e-4, paper=PAPER),
+        "structural": _presets("generalised_alpha", 1e-3),
     },
     fit=fit,
     learns_from="inputs",

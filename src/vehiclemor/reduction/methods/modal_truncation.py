@@ -12,17 +12,25 @@ with d' = A d + B0 s + B1 s' + B2 s'' has none left in the rate of d - K0 s - K1
 and K0 = B1 + A B2.  What is left drives no stabilised constraint: the eigenvalues at which those
 cluster are no motion.  Speed, heading and place are kept as in every reduced vehicle: the speed
 stays that of the start, and the dynamics are those of the model's own speed.  Nothing is trained.
+
+Of a structure all modes up to a frequency are kept, linearised at the static state.
 """
 
 import time
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.projection.modes import free_modes
+from vehiclemor.reduction.projection.structural import (
+    ReducedStructure,
+    StructuralSettings,
+    reduced,
+)
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import FeatureListing
@@ -45,6 +53,7 @@ from vehiclemor.reduction.vehicle.slow_modes import (
     without_derivatives,
 )
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.model import Model
 
 # Modes that steering moves by less than this part of the most moved one are symmetric.
 MOVED = 1e-8
@@ -118,11 +127,24 @@ def truncated(lateral: Lateral, fastest: float, static: bool) -> Lateral:
     )
 
 
-def fit(
-    model: DynamicModel, training: Training, settings: ModalTruncationSettings
-) -> ReducedVehicle:
+class StructuralModesSettings(StructuralSettings):
+    """Settings for a structure."""
+
+    highest: float = Field(100.0, gt=0.0, le=1e5, description="modes of up to so many Hz are kept")
+
+
+def fit(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
     """Linearise and truncate; no training run is looked at.  `InputError` if no mode is kept."""
     began = time.process_time()
+    if model.kind == "structural":
+        return reduced(model, [free_modes(model, settings.highest)], settings, began)
+    return steered_modes(model, settings, began)
+
+
+def steered_modes(
+    model: DynamicModel, settings: ModalTruncationSettings, began: float
+) -> ReducedVehicle:
+    """Slow lateral modes of a vehicle; offline cost from `began` (`time.process_time()`) on."""
     shape = VehicleShape(model)
     static = settings.static_correction == "yes"
     lateral = truncated(lateral_modes(shape), settings.fastest, static)
@@ -160,12 +182,20 @@ def fit(
     )
 
 
+def refusal(model: Model) -> str:
+    """Why a model is no vehicle whose lateral modes steering moves; structures have all modes."""
+    return "" if model.kind == "structural" else no_steered_vehicle(model)
+
+
 METHOD = Method(
     name="modal_truncation",
-    summary="slow lateral modes of the linearised vehicle, the others static",
+    summary="slow modes of the linearised model: lateral ones of a car, all of a structure",
     reference="10.1109/TAC.1966.1098264",
-    settings=dict.fromkeys(("ode", "dae"), ModalTruncationSettings),
-    refusal=no_steered_vehicle,
+    settings={
+        **dict.fromkeys(("ode", "dae"), ModalTruncationSettings),
+        "structural": StructuralModesSettings,
+    },
+    refusal=refusal,
     fit=fit,
     learns_from="inputs",
 )

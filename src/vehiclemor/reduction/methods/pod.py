@@ -12,22 +12,23 @@ from pydantic import Field, create_model
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import FittedModel, Method
-from vehiclemor.reduction.projection import algebraic, dynamic
+from vehiclemor.reduction.projection import algebraic, dynamic, structural
 from vehiclemor.reduction.projection.bases import Snapshots, window_edges
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 
-PROJECTIONS = {"ae": algebraic, "ode": dynamic, "dae": dynamic}
+PROJECTIONS = {"ae": algebraic, "ode": dynamic, "dae": dynamic, "structural": structural}
 SETTINGS: dict[str, type[Settings]] = {
     "ae": algebraic.AlgebraicPodSettings,
     "ode": dynamic.DynamicPodSettings,
     "dae": dynamic.ConstrainedPodSettings,
+    "structural": structural.StructuralPodSettings,
 }
 # Lengths in s of the paper's control periods, and the shortest: no motion of a vehicle happens in
 # less.
-PERIODS = {"ae": 5.0, "ode": 0.5, "dae": 0.1}
-SHORTEST_PERIOD = {"ae": 1e-3, "ode": 1e-2, "dae": 1e-2}
+PERIODS = {"ae": 5.0, "ode": 0.5, "dae": 0.1, "structural": 0.5}
+SHORTEST_PERIOD = {"ae": 1e-3, "ode": 1e-2, "dae": 1e-2, "structural": 0.1}
 ControlPeriod = Annotated[float, Field(gt=0.0, description="length of a control period in s")]
 Restart = Annotated[
     Literal["own", "projected", "full_model"],
@@ -52,14 +53,16 @@ PRESETS = {
 def _in_periods(kind: str) -> type[Settings]:
     """Settings of POD in control periods."""
     fields: dict[str, Any] = {"control_period": (ControlPeriod, PERIODS[kind])}
-    if kind != "ae":
+    if kind in ("ode", "dae"):
         fields["restart"] = Restart, "own"
     return create_model("PodSettings", __base__=SETTINGS[kind], **fields)
 
 
 def _of_one_basis(kind: str) -> type[Settings]:
     """Settings of POD with one basis."""
-    fields: dict[str, Any] = {"snapshots": (Snapshots, SNAPSHOTS[kind])}
+    fields: dict[str, Any] = {}
+    if kind in SNAPSHOTS:
+        fields["snapshots"] = Snapshots, SNAPSHOTS[kind]
     return create_model("FixedBasisSettings", __base__=SETTINGS[kind], **fields)
 
 

@@ -54,13 +54,18 @@ class ReplayModel(ShortRepr):
         paths = nearest.coordinates, nearest.speeds
         # Copies: the training run stays what it is.
         q, v = (p.copy() if alike else _resampled(nearest.times, p, times) for p in paths)
+        if self.model.kind == "structural":
+            # There are no coordinates to make outputs of.
+            outputs = _resampled(nearest.times, nearest.outputs, times).copy()
+        else:
+            outputs = self.model.outputs_at(np.hstack((q, v)), inputs)
         return replace(
             nearest,
             times=times,
             inputs=inputs,
             coordinates=q,
             speeds=v,
-            outputs=self.model.outputs_at(np.hstack((q, v)), inputs),
+            outputs=outputs,
             counts=dict.fromkeys(self.model.counts, 0),
             seconds=0.0,
         )

@@ -1,0 +1,97 @@
+"""The same vehicle on another mesh, at full order: the null model of structures.
+
+Whoever wants a cheaper model of a structure can make larger elements.
+"""
+
+import tomllib
+from dataclasses import dataclass, replace
+
+from pydantic import Field
+
+from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.reduction.interface import Method, OfflineCost
+from vehiclemor.reduction.settings import Settings, StructuralTolerance
+from vehiclemor.reduction.training import Training
+from vehiclemor.simulation.build import reparametrised
+from vehiclemor.simulation.structural import USUAL, StructuralModel
+from vehiclemor.simulation.trajectory import Start, Trajectory
+
+
+class CoarseMeshSettings(Settings):
+    """Settings for a structure."""
+
+    mesh: str = Field(
+        "elements_per_bay = 1, shell_size = 0", description="parameters of the mesh, as in TOML"
+    )
+    tolerance: StructuralTolerance = USUAL
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseMesh:
+    """The full model on a coarse mesh in the place of a reduced one."""
+
+    model: StructuralModel
+    mesh: str
+    tolerance: float
+    offline: OfflineCost
+
+    def check_sizes(self) -> None:
+        """There are none."""
+
+    @property
+    def order(self) -> int:
+        """Number of coordinates of the coarse mesh."""
+        return self.coarse.size
+
+    @property
+    def coarse(self) -> StructuralModel:
+        """The model on the coarse mesh."""
+        found = self.__dict__.get("_coarse")
+        if found is None:
+            found = self.__dict__["_coarse"] = reparametrised(self.model, parameters(self.mesh))
+        return found
+
+    def for_model(self, model: StructuralModel) -> "CoarseMesh":
+        """The same mesh for a model whose other parameters differ."""
+        return replace(self, model=model)
+
+    def simulate(
+        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
+        """A run at the maneuver's output times."""
+        self.model.start(start)
+        return self.coarse.run(maneuver, None, self.tolerance, outputs)
+
+    def best_approximation(self, states: object) -> None:
+        """There is no subspace."""
+        del states
+
+
+def parameters(mesh: str) -> dict[str, float]:
+    """Parameters of a mesh by name; `InputError` if the text is none."""
+    try:
+        return tomllib.loads(f"mesh = {{ {mesh} }}")["mesh"]
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"coarse_mesh: mesh: {error}") from None
+
+
+def check(model: StructuralModel, settings: CoarseMeshSettings) -> None:
+    """Raise `InputError` if the mesh is none."""
+    reparametrised(model, parameters(settings.mesh))
+
+
+def fit(model: StructuralModel, training: Training, settings: CoarseMeshSettings) -> CoarseMesh:
+    """Nothing is fitted, and no training run is looked at."""
+    return CoarseMesh(model, settings.mesh, settings.tolerance, OfflineCost())
+
+
+METHOD = Method(
+    name="coarse_mesh",
+    summary="no reduction: larger elements, the null model of structures",
+    settings={"structural": CoarseMeshSettings},
+    fit=fit,
+    check=check,
+    learns_from="inputs",
+    own_limits=True,
+)

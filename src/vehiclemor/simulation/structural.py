@@ -1,0 +1,475 @@
+"""Structural models (kind `structural`) ready to run: sparse matrices and the law of their ports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache, cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
+from vehiclemor.inputs.checks import checked_maneuver
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import recorded_inputs
+from vehiclemor.multibody.structure import Structure
+from vehiclemor.registry import choice
+from vehiclemor.simulation import structural_loops as compiled
+from vehiclemor.simulation.checks import (
+    checked_inputs,
+    left_validity,
+    lifted_wheels,
+    limits_of,
+)
+from vehiclemor.simulation.kernel_derivatives import By
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.paths import address_of
+from vehiclemor.simulation.run_timer import timed
+from vehiclemor.simulation.structural_loops import Columns, Marching, Weights
+from vehiclemor.simulation.trajectory import (
+    STRUCTURAL_COUNTS,
+    Names,
+    Start,
+    Trajectory,
+    output_names,
+)
+
+STRUCTURAL_LOOPS = ("simulation.structural_loops",)
+SOLVER = "generalised_alpha"
+# Spectral radius of the method at infinity.
+DAMPED = 0.8
+# Step sizes in s that are tried, and how long (s) a run is repeated to estimate its error.
+LONGEST_STEP, SHORTEST_STEP = 4e-3, 6.25e-5
+FIRST_STEP = 1e-3
+TRIED = 0.75
+# Largest errors of outputs, as part of their ranges: of full-order references, and by default.
+TIGHT, USUAL = 1e-4, 1e-3
+REASONS = {
+    compiled.NOT_FINITE: "a coordinate is not finite",
+    compiled.NO_CONVERGENCE: "no convergence of the port forces",
+}
+# Runs whose step sizes are kept.
+MOST_RUNS = 1024
+# Changes of port forces (N) at which a static state counts as found.
+STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 100
+
+
+def weights_of(h: float, damping_time: float) -> tuple[Weights, tuple[float, float, float]]:
+    """Coefficients for a step of h s, and those of M, E and K in the matrix that is factored."""
+    a_m, a_f = (2.0 * DAMPED - 1.0) / (DAMPED + 1.0), DAMPED / (DAMPED + 1.0)
+    beta, gamma = 0.25 * (1.0 - a_m + a_f) ** 2, 0.5 - a_m + a_f
+    slope, after = gamma / (beta * h), 1.0 - a_f
+    rate_rate, rate_acceleration = 1.0 - gamma / beta, h * (1.0 - 0.5 * gamma / beta)
+    of_mass, of_damping = (1.0 - a_m) / (beta * h * h), after * slope
+    of_stiffness = after + of_damping * damping_time
+    weights = Weights(
+        slope=slope,
+        rate_rate=rate_rate,
+        rate_acceleration=rate_acceleration,
+        change=1.0 / (beta * h * h),
+        change_rate=1.0 / (beta * h),
+        change_acceleration=0.5 / beta - 1.0,
+        mass_position=of_mass,
+        mass_rate=(1.0 - a_m) / (beta * h),
+        mass_acceleration=(1.0 - a_m) * (0.5 / beta - 1.0) - a_m,
+        damped_position=of_damping,
+        damped_rate=after * rate_rate + a_f,
+        damped_acceleration=after * rate_acceleration,
+        mass_share=of_mass / of_stiffness,
+        damping_share=of_damping / of_stiffness,
+        stiffness_share=1.0 / of_stiffness,
+        after=after,
+        before=a_f,
+        earlier=a_f / after,
+        damping_time=damping_time,
+    )
+    return weights, (of_mass, of_damping, of_stiffness)
+
+
+def columns_of(matrix: Any) -> Columns:
+    """A sparse matrix by columns, as loops take it."""
+    matrix = matrix.tocsc()
+    matrix.sort_indices()
+    matrix.eliminate_zeros()
+    rows, values = matrix.indices.astype(np.int64), np.ascontiguousarray(matrix.data, dtype=float)
+    begins = np.ones(len(rows), dtype=bool)
+    begins[1:] = np.diff(rows) != 1
+    begins[matrix.indptr[:-1][np.diff(matrix.indptr) > 0]] = True
+    places = np.flatnonzero(begins)
+    pieces = np.searchsorted(places, matrix.indptr).astype(np.int64)
+    table = np.column_stack([np.append(rows[places], 0), np.append(places, len(rows))])
+    return Columns(pieces, table.ravel().astype(np.int64), values)
+
+
+@dataclass(frozen=True, eq=False)
+class PortLaw:
+    """Forces of the ports, as equations declare them, about a static state.
+
+    Attributes
+    ----------
+    kernels, constants
+        Of the equations.
+    static
+        Deflections and forces (2, p) at the static state.
+    """
+
+    kernels: Any
+    constants: np.ndarray
+    static: np.ndarray
+
+    def at(self, deflections: np.ndarray, rates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Forces (p,) beyond the static ones and derivatives by deflections and rates, (p, 3)."""
+        x = np.concatenate([self.static[0] + deflections, rates])
+        found = np.empty((len(deflections), 3))
+        self.kernels.call("port_forces", x, np.ascontiguousarray(inputs), self.constants, found)
+        found[:, 0] -= self.static[1]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class StructuralSystem:
+    """A structure with the law of its ports, full or reduced, as the time loop takes it.
+
+    Coordinates are those of the motion about the static state.
+    """
+
+    structure: Structure
+    law: PortLaw
+    _marching: dict[float, Ready] = field(default_factory=dict)
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        """Order (n,) of the coordinates in which factors of the matrices stay sparse."""
+        return ordering(self.structure)
+
+    def marching(self, h: float) -> Ready:
+        """The structure with a step size in s; its matrix is factored once."""
+        found = self._marching.get(h)
+        if found is None:
+            # A step whose error is estimated needs two.
+            if len(self._marching) > 3:
+                self._marching.pop(next(iter(self._marching)), None)
+            found = self._marching[h] = ready(self._prepared(h))
+        return found
+
+    def _prepared(self, h: float) -> Marching:
+        s, order = self.structure, self.order
+        weights, (of_mass, of_damping, of_stiffness) = weights_of(h, s.damping_time)
+        mass, damping, stiffness = (
+            m[order][:, order] for m in (s.mass, s.damping, s.stiffness)
+        )
+        matrix = of_mass * mass + of_damping * damping + of_stiffness * stiffness
+        ports = s.ports.tocsr()[order]
+        factor = factored(matrix)
+        response = np.ascontiguousarray(factor.solve(ports.toarray()))
+        cq, cv, ca, cf = s.outputs
+        return Marching(
+            mass=columns_of(mass),
+            damping=columns_of(damping),
+            factor=columns_of(without_diagonal(factor.L)),
+            ports=columns_of(ports),
+            pivots=1.0 / factor.U.diagonal(),
+            response=response,
+            compliance=np.ascontiguousarray(weights.after * (ports.T @ response)),
+            weights=weights,
+            law=np.array([address_of(self.law.kernels, "port_forces")], dtype=np.int64),
+            constants=self.law.constants,
+            static=np.ascontiguousarray(self.law.static),
+            positions=columns_of(cq.tocsc()[:, order].T),
+            rates=columns_of(cv.tocsc()[:, order].T),
+            accelerations=columns_of(ca.tocsc()[:, order].T),
+            forces=columns_of(cf.T),
+        )
+
+    def march(
+        self, state: np.ndarray, inputs: np.ndarray, h: float, every: int, recorded: bool = False
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+        """A run in steps of h s from a state (3, n): coordinates, rates and accelerations.
+
+        Inputs (steps + 1, inputs) are those at all steps.  Gives outputs (samples, outputs) and
+        coordinates (samples, n), none unless recorded, at every so many steps; counts; and why it
+        has ended.  The state becomes the last one.
+        """
+        n, p, samples = state.shape[1], self.law.static.shape[1], (len(inputs) - 1) // every + 1
+        histories = np.full((samples, self.structure.outputs[0].shape[0]), np.nan)
+        states = np.full((samples if recorded else 0, n), np.nan)
+        buffer = np.empty(compiled.WORK_ROWS * n + compiled.PORT_ROWS * p + p * (p + 8))
+        counts, order = np.zeros(3, dtype=np.int64), self.order
+        moved = np.ascontiguousarray(state[:, order])
+        arguments = moved, inputs, every, histories, states, buffer, counts
+        reason = structural_loop()(self.marching(h), *arguments)
+        state[:, order] = moved
+        if recorded:
+            states[:, order] = states.copy()
+        return histories, states, counts, reason
+
+
+@dataclass(frozen=True, eq=False)
+class Periods:
+    """Structures that follow one another in time; the full one is a single period.
+
+    Attributes
+    ----------
+    systems
+        Of each period.
+    edges
+        Times in s at which the next one begins.
+    passed
+        Coordinates at each edge are these matrices times the ones before.
+    """
+
+    systems: tuple[StructuralSystem, ...]
+    edges: tuple[float, ...] = ()
+    passed: tuple[np.ndarray, ...] = ()
+    _steps: dict[Any, int] = field(default_factory=dict)
+
+    def march(
+        self, maneuver: Maneuver, tolerance: float, recorded: bool
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+        """A run from the static state, see `StructuralSystem.march`."""
+        key = maneuver, tolerance
+        if key not in self._steps:
+            if len(self._steps) >= MOST_RUNS:
+                self._steps.clear()
+            self._steps[key] = self.steps(maneuver, tolerance)
+        return self.steps_of(maneuver, self._steps[key], maneuver.samples, recorded)
+
+    def steps_of(
+        self, maneuver: Maneuver, every: int, samples: int, recorded: bool = False
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+        """The first samples of a run with so many steps between output times."""
+        inputs = inputs_at_steps(maneuver, every)
+        spacing = maneuver.duration / max(maneuver.samples - 1, 1)
+        ends = [min(round(edge / spacing), samples - 1) for edge in self.edges] + [samples - 1]
+        state, first, parts = np.zeros((3, self.systems[0].structure.size)), 0, []
+        for k, (system, end) in enumerate(zip(self.systems, ends, strict=True)):
+            if k:
+                state = state @ self.passed[k - 1].T
+            part = inputs[first * every : end * every + 1]
+            parts.append(system.march(state, part, spacing / every, every, recorded))
+            first = end
+            if parts[-1][3]:
+                break
+        histories = np.full((samples, parts[0][0].shape[1]), np.nan)
+        states = np.full((samples if recorded else 0, parts[0][1].shape[1]), np.nan)
+        first = 0
+        for part, end in zip(parts, ends, strict=False):
+            # The sample on an edge is of the later period.
+            histories[first : end + 1] = part[0]
+            if recorded:
+                states[first : end + 1] = part[1]
+            first = end
+        return histories, states, sum(part[2] for part in parts), parts[-1][3]
+
+    def steps(self, maneuver: Maneuver, tolerance: float) -> int:
+        """Steps between output times, so many that outputs are as accurate as asked for.
+
+        The beginning of a run is repeated with half the step, as long as they differ by more than
+        the tolerance times the range of an output; the method is of second order.
+        """
+        spacing = maneuver.duration / max(maneuver.samples - 1, 1)
+        every = max(round(spacing / FIRST_STEP), 1)
+        least, most = (max(round(spacing / h), 1) for h in (LONGEST_STEP, SHORTEST_STEP))
+        samples = min(round(TRIED / spacing) + 1, maneuver.samples)
+        coarse = self.steps_of(maneuver, every, samples)[0]
+        while True:
+            fine = self.steps_of(maneuver, 2 * every, samples)[0]
+            error = relative_error(coarse, fine)
+            if not error > tolerance or every >= most:
+                break
+            every, coarse = min(2 * every, most), fine
+        # Errors grow with the square of the step.
+        while every > least and not every % 2 and 5.0 * error < tolerance:
+            every, error = every // 2, 4.0 * error
+        return every
+
+
+@lru_cache(maxsize=16)
+def inputs_at_steps(maneuver: Maneuver, every: int) -> np.ndarray:
+    """Inputs (steps + 1, inputs) of a maneuver with so many steps between output times."""
+    times = np.linspace(0.0, maneuver.duration, (maneuver.samples - 1) * every + 1)
+    inputs = checked_inputs(maneuver.at(times), times, maneuver.inputs)
+    inputs.flags.writeable = False
+    return inputs
+
+
+def relative_error(one: np.ndarray, other: np.ndarray) -> float:
+    """Largest RMS difference of outputs (samples, outputs) as part of their ranges."""
+    size = np.ptp(other, axis=0)
+    moving = size > 0.0
+    difference = np.sqrt(np.mean((one - other) ** 2, axis=0))
+    return float((difference[moving] / size[moving]).max(initial=0.0))
+
+
+def ordering(structure: Structure) -> np.ndarray:
+    """Order of the coordinates in which the factors of the matrices stay sparse."""
+    pattern = structure.mass + structure.stiffness + structure.damping
+    return np.argsort(factored(pattern, "MMD_AT_PLUS_A").perm_c)
+
+
+def factored(matrix: Any, order: str = "NATURAL") -> Any:
+    """Factors L (D L') of a symmetric matrix, without pivoting; `GeometryError` if it has none."""
+    from scipy.sparse.linalg import splu
+
+    try:
+        return splu(
+            matrix.tocsc(),
+            permc_spec=order,
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError as error:
+        raise GeometryError(f"the matrices of the structure are singular ({error})") from None
+
+
+def without_diagonal(low: Any) -> Any:
+    """A matrix without its diagonal."""
+    from scipy.sparse import tril
+
+    return tril(low, -1)
+
+
+@cache
+def structural_loop() -> Loop:
+    """The time loop of all structures."""
+    return loops(STRUCTURAL_LOOPS, ("march",))["march"]
+
+
+@dataclass(frozen=True, eq=False)
+class StructuralModel(Model):
+    """A structure whose ports have a compiled law; it starts from its static state alone."""
+
+    @cached_property
+    def system(self) -> StructuralSystem:
+        """The matrices, assembled when they are first needed, about the static state."""
+        structure = self.definition.structure(self.parameters.values())
+        return StructuralSystem(structure, self._static_law(structure))
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates n."""
+        return self.system.structure.size
+
+    def _static_law(self, structure: Structure) -> PortLaw:
+        """The law about the state in which the structure stands on a flat road.
+
+        Newton's method in the port forces; `GeometryError` if it can't stand.
+        """
+        p, nothing = structure.ports.shape[1], np.zeros(len(self.inputs))
+        law = PortLaw(self.equations.kernels, self.constants, np.zeros((2, p)))
+        # Ports that carry nothing at first are held by what the others have.
+        stiffness = np.full(p, 1e5)
+        held = structure.stiffness + structure.ports @ (stiffness[:, None] * structure.ports.T)
+        factor = factored(held, "MMD_AT_PLUS_A")
+        ports = structure.ports.toarray()
+        compliance = ports.T @ factor.solve(ports)
+        free = ports.T @ factor.solve(structure.load)
+        w = free.copy()
+        for _ in range(STATIC_ITERATIONS):
+            force, slope, _ = law.at(w, np.zeros(p), nothing).T
+            residual = free + compliance @ (force + stiffness * w) - w
+            jacobian = np.eye(p) - compliance * (slope + stiffness)
+            step = np.linalg.solve(jacobian, residual)
+            # Springs harden, and a tire that has lifted off gives no slope.
+            w += step * min(1.0, 0.05 / max(np.abs(step).max(), 1e-12))
+            if np.abs(stiffness * step).max() < STATIC_TOLERANCE:
+                force = law.at(w, np.zeros(p), nothing)[:, 0]
+                return PortLaw(law.kernels, law.constants, np.array([w, force]))
+        raise GeometryError(f"{self.name} finds no static state: it can't stand")
+
+    def simulate(
+        self,
+        maneuver: Maneuver,
+        start: Start | None = None,
+        times: np.ndarray | None = None,
+        solver: str | None = None,
+        tolerance: float | None = None,
+        outputs: Names = None,
+    ) -> Trajectory:
+        """Full-order trajectory at the output times, or at some of them.
+
+        Parameters
+        ----------
+        maneuver
+            Its inputs are the model's.
+        start
+            The static state, whose name is the only start.
+        times
+            Some of the maneuver's output times (samples,) in s.
+        solver
+            `generalised_alpha`, the only one.
+        tolerance
+            Largest error of an output by the step size, as part of the output's range.
+        outputs
+            Names of outputs to keep, see `Trajectory.chosen`.
+
+        Raises
+        ------
+        InputError
+            If an input isn't finite, leaves the range of validity, or a name is unknown.
+        ConvergenceError
+            If the run leaves the model's range of validity.
+        """
+        choice("solver", SOLVER if solver is None else solver, (SOLVER,))
+        self.start(start)
+        found = self.run(maneuver, None, TIGHT if tolerance is None else tolerance, outputs)
+        if found.status != "ok":
+            raise ConvergenceError(f"{self.name}: {found.message}", found)
+        return found if times is None else found.chosen(times=times)
+
+    def run(
+        self,
+        maneuver: Maneuver,
+        periods: Periods | None = None,
+        tolerance: float = USUAL,
+        outputs: Names = None,
+        recorded: bool = False,
+    ) -> Trajectory:
+        """A run of the full structure, or of reduced ones by period; it records a divergence.
+
+        Where it is to be recorded, the trajectory has all n coordinates.
+        """
+        maneuver = checked_maneuver(maneuver, self.definition)
+        names = None if outputs is None else output_names(outputs)
+        periods = periods or Periods((self.system,))
+        counts = dict.fromkeys(STRUCTURAL_COUNTS, 0)
+        (histories, states, found, reason), seconds = timed(
+            lambda: periods.march(maneuver, tolerance, recorded)
+        )
+        counts |= dict(zip(STRUCTURAL_COUNTS, found.tolist(), strict=False))
+        times, inputs = recorded_inputs(maneuver)
+        failure = ""
+        if reason:
+            reached = int(np.isfinite(histories[:, 0]).sum())
+            failure = f"{REASONS[reason]} at t = {times[min(reached, len(times) - 1)]:.4g} s"
+        limited, watched, ranges = limits_of(self.definition)
+        columns = histories[:, [self.outputs.index(name) for name in watched]]
+        outside = ~((columns >= ranges[:, 0]) & (columns <= ranges[:, 1])) & np.isfinite(columns)
+        first = np.where(outside.any(axis=0), outside.argmax(axis=0), len(times)).tolist()
+        left = min(first[: len(limited)], default=len(times))
+        if left < len(times):
+            name = limited[first.index(left)]
+            failure = left_validity(self.definition, name, columns[left, first.index(left)], times[left])
+            histories[left:] = np.nan
+        run = Trajectory.of(
+            times=times,
+            inputs=inputs,
+            coordinates=states if recorded else inputs[:, :0],
+            speeds=inputs[:, :0],
+            outputs=histories,
+            counts=counts,
+            seconds=seconds,
+            status="diverged" if failure else "ok",
+            message=failure,
+            remark=lifted_wheels(self.definition.loads, first[len(limited) :], times),
+            trust=None,
+            names=self.outputs,
+            model=self,
+        )
+        return run if names is None else run.chosen(names)
+
+    def jacobian(self, state: Any, u: Any, with_respect_to: By = "state") -> np.ndarray:
+        """There is none by named states: `InputError`."""
+        del state, u, with_respect_to
+        raise InputError(f"{self.name} has no named states; reduce it for Jacobians")
