@@ -41,7 +41,7 @@ def component(kind: str, name: str) -> Any:
     `PlugInError` if it is a plug-in that can't be imported, or is something else.
     """
     entries = _entries(kind)
-    if name not in entries and isinstance(name, str) and (family := FAMILY.fullmatch(name)):
+    if isinstance(name, str) and name not in entries and (family := FAMILY.fullmatch(name)):
         return _member(kind, *family.groups())
     choice(kind, name, entries)
     where = f"{kind} {name!r} ({entries[name].value})"
@@ -69,10 +69,9 @@ def _member(kind: str, base: str, number: str) -> Any:
     where = f"{kind} {name!r} ({_entries(kind)[base].value})"
     with blamed(where, make):
         found = make(int(number))
-    if not isinstance(found, _class(kind)) or found.name != name:
-        raise PlugInError(
-            f"{where} is {quoted(found)}: it must be a {_class(kind).__name__} {name}"
-        )
+    wanted = _class(kind)
+    if not isinstance(found, wanted) or getattr(found, "name", "") != name:
+        raise PlugInError(f"{where} is {quoted(found)}: it must be a {wanted.__name__} {name!r}")
     return found
 
 

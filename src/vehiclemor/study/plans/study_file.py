@@ -10,12 +10,15 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
+from vehiclemor.reduction.training import SPEED
 from vehiclemor.toml_files import FileSchema, Line
 
 FACTORS = ("frequency_factor", "amplitude_factor")
 # Axes that say what is run and what is trained on; and how the name of a parameter's begins.
 TEXTS = ("maneuver", "start", "training")
 PARAMETER = "parameters."
+# Decimals of sampled factors, speeds and parameters: what a table prints is what was run.
+DECIMALS = 3
 # A grid of more points than this is a mistake in a file, not a study.
 MOST_POINTS = 1_000_000
 # Of the test sets of every study that gives none.
@@ -94,6 +97,12 @@ class Bound(FileSchema):
     reason: str = Field("ours", min_length=1, description="where the number comes from")
 
 
+def _of_no_speed(parameters: dict[str, list[float]]) -> dict[str, list[float]]:
+    if SPEED in parameters:
+        raise ValueError(f"{SPEED} is not given as a parameter, but by speed = [...]")
+    return parameters
+
+
 class Group(FileSchema):
     """Scenarios of one maneuver: every point, from every start.
 
@@ -107,19 +116,26 @@ class Group(FileSchema):
     frequency: list[float] = _list("factors, 1 by default")
     amplitude: list[float] = _list("factors, 1 by default")
     speed: list[float] = _list("m/s, the model's own by default")
+    parameters: Annotated[dict[str, list[float]], AfterValidator(_of_no_speed)] = _table(
+        "parameter -> values in SI units, to combine with all else; the model's own by default"
+    )
 
     @property
     def scenarios(self) -> int:
         """How many scenarios it is."""
         lists = (self.frequency, self.amplitude, self.speed)
         points = len(self.points) or math.prod(len(entry) or 1 for entry in lists)
-        return points * (len(self.start) or 1)
+        samples = math.prod(len(entry) for entry in self.parameters.values())
+        return points * samples * (len(self.start) or 1)
 
     @model_validator(mode="after")
     def _either(self) -> "Group":
         for name in self.model_fields_set - {"maneuver"}:
             if not getattr(self, name):
                 raise ValueError(f"{name} is empty")
+        for name, values in self.parameters.items():
+            if not values or not all(map(math.isfinite, values)):
+                raise ValueError(f"parameters: {name} is not a list of finite numbers")
         if self.points and (self.frequency or self.amplitude or self.speed):
             raise ValueError("give points or lists of factors, not both")
         if any(len(point) not in (2, 3) for point in self.points):
@@ -135,13 +151,22 @@ Learned = Annotated[
 Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
-def _ordered(limits: list[float]) -> list[float]:
+def _ordered(limits: list[Any]) -> list[Any]:
     if not (math.isfinite(limits[0]) and limits[0] <= limits[1] < math.inf):
         raise ValueError("a range is [from, to] with finite numbers in order")
     return limits
 
 
+def _printable(limits: list[float]) -> list[float]:
+    if any(round(limit, DECIMALS) != limit for limit in limits):
+        raise ValueError(f"values are drawn with {DECIMALS} decimals: from and to have no more")
+    return limits
+
+
 Range = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
+Member = Annotated[int, Field(ge=0, le=10**15)]
+Numbers = Annotated[list[Member], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
+Drawn = dict[str, Annotated[Range, AfterValidator(_printable)]]
 
 
 class Box(FileSchema):
@@ -154,6 +179,12 @@ class Box(FileSchema):
     both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
     speed: Range | None = Field(None, description="m/s, the model's own by default")
     start: list[str] = _list("initial conditions, equally likely; the model's first")
+    members: Numbers | None = Field(
+        None, description="of a family: numbers of its members, from and to; MANEUVER:NUMBER is run"
+    )
+    parameters: Annotated[Drawn, AfterValidator(_of_no_speed)] = _table(
+        "parameter -> [from, to] in SI units; the model's own by default"
+    )
 
     @field_validator("frequency")
     @classmethod
