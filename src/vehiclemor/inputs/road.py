@@ -10,10 +10,11 @@ tracks at a distance b have the coherence
 
     g(n) = 2 pi n b K1(2 pi n b)
 
-(cross density over density; K1 is a modified Bessel function).  Long waves are the same left and
-right, short waves are independent.  Isotropy: C. J. Dodds and J. D. Robson, The description of road
-surface roughness, J. Sound Vib. 31 (1973), 175-183.  Right and left phases differ by a wrapped
-Cauchy distribution, whose mean of exp(i difference) is g: so both tracks have the density exactly.
+(cross density over density; K1 is a modified Bessel function): long waves are the same left and
+right, short waves are independent.  Isotropy after C. J. Dodds and J. D. Robson, The description of
+road surface roughness, J. Sound Vib. 31 (1973), 175-183; the formula is its integral over all waves
+of this density.  Right and left phases differ by a wrapped Cauchy distribution, whose mean of
+exp(i difference) is g: so both tracks have the density exactly.
 """
 
 from dataclasses import dataclass, replace
