@@ -177,3 +177,7 @@ def test_weights_are_those_of_the_standards_table(hertz, weight):
     wave = np.sqrt(2.0) * np.sin(2.0 * np.pi * hertz * times)
     assert vm.weighted_rms(times, wave) == pytest.approx(weight, rel=0.005)
     assert vm.weighted_rms(times + 7.0, -3.0 * wave) == pytest.approx(3.0 * weight, rel=0.005)
+    # What begins at the end of a record does not come round to its beginning.
+    first, last = np.eye(1, 1000), np.eye(1, 1000, 999)
+    early, late = (vm.weighted_rms(times[:1000], pulse[0]) for pulse in (first, last))
+    assert late < 0.5 * early

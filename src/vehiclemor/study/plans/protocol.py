@@ -19,8 +19,8 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
 from vehiclemor.study.plans.loading import study_path
+from vehiclemor.study.plans.ranges import DECIMALS
 from vehiclemor.study.plans.study_file import (
-    DECIMALS,
     DRAWN,
     SETS,
     Box,

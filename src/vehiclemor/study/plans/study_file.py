@@ -10,15 +10,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
-from vehiclemor.reduction.training import SPEED
+from vehiclemor.study.plans.ranges import Drawn, Numbers, Range, without_speed
 from vehiclemor.toml_files import FileSchema, Line
 
 FACTORS = ("frequency_factor", "amplitude_factor")
 # Axes that say what is run and what is trained on; and how the name of a parameter's begins.
 TEXTS = ("maneuver", "start", "training")
 PARAMETER = "parameters."
-# Decimals of sampled factors, speeds and parameters: what a table prints is what was run.
-DECIMALS = 3
 # A grid of more points than this is a mistake in a file, not a study.
 MOST_POINTS = 1_000_000
 # Of the test sets of every study that gives none.
@@ -97,12 +95,6 @@ class Bound(FileSchema):
     reason: str = Field("ours", min_length=1, description="where the number comes from")
 
 
-def _of_no_speed(parameters: dict[str, list[float]]) -> dict[str, list[float]]:
-    if SPEED in parameters:
-        raise ValueError(f"{SPEED} is not given as a parameter, but by speed = [...]")
-    return parameters
-
-
 class Group(FileSchema):
     """Scenarios of one maneuver: every point, from every start.
 
@@ -116,7 +108,7 @@ class Group(FileSchema):
     frequency: list[float] = _list("factors, 1 by default")
     amplitude: list[float] = _list("factors, 1 by default")
     speed: list[float] = _list("m/s, the model's own by default")
-    parameters: Annotated[dict[str, list[float]], AfterValidator(_of_no_speed)] = _table(
+    parameters: Annotated[dict[str, list[float]], AfterValidator(without_speed)] = _table(
         "parameter -> values in SI units, to combine with all else; the model's own by default"
     )
 
@@ -151,24 +143,6 @@ Learned = Annotated[
 Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
-def _ordered(limits: list[Any]) -> list[Any]:
-    if not (math.isfinite(limits[0]) and limits[0] <= limits[1] < math.inf):
-        raise ValueError("a range is [from, to] with finite numbers in order")
-    return limits
-
-
-def _printable(limits: list[float]) -> list[float]:
-    if any(round(limit, DECIMALS) != limit for limit in limits):
-        raise ValueError(f"values are drawn with {DECIMALS} decimals: from and to have no more")
-    return limits
-
-
-Range = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
-Member = Annotated[int, Field(ge=0, le=10**15)]
-Numbers = Annotated[list[Member], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
-Drawn = dict[str, Annotated[Range, AfterValidator(_printable)]]
-
-
 class Box(FileSchema):
     """Runs of one maneuver, its numbers uniformly distributed in ranges [from, to]."""
 
@@ -182,9 +156,7 @@ class Box(FileSchema):
     members: Numbers | None = Field(
         None, description="of a family: numbers of its members, from and to; MANEUVER:NUMBER is run"
     )
-    parameters: Annotated[Drawn, AfterValidator(_of_no_speed)] = _table(
-        "parameter -> [from, to] in SI units; the model's own by default"
-    )
+    parameters: Drawn = _table("parameter -> [from, to] in SI units; the model's own by default")
 
     @field_validator("frequency")
     @classmethod
