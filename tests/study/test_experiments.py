@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import vehiclemor as vm
 from vehiclemor import provenance
 from vehiclemor.codegen import cache
-from vehiclemor.exceptions import ConvergenceError
+from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.failure import Failure
 from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods import pod, slow_manifold

@@ -73,7 +73,7 @@ def make_experiment(
     if keep != "errors" and len(test) != 1:
         raise ValueError(f"{keep} are kept of one test scenario, not of {len(test)}")
     if any(scenario.parameters != test[0].parameters for scenario in test):
-        raise InputError("the scenarios of a test set have several parameters; one model is tested")
+        raise InputError("the scenarios of a test set have several parameters; a test is of one model")
     return Experiment(
         model.name,
         model.kernel_hash,
