@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from vehiclemor.exceptions import VehiclemorError as VehiclemorError
     from vehiclemor.exporting.export import export as export
     from vehiclemor.inputs.maneuver import maneuver as maneuver
+    from vehiclemor.inputs.road import road as road
     from vehiclemor.inputs.signal import Signal as Signal
     from vehiclemor.inputs.signal import many_signals as many_signals
     from vehiclemor.metrics import errors as errors
+    from vehiclemor.metrics import weighted_rms as weighted_rms
     from vehiclemor.reduction.reduced_model import load as load
     from vehiclemor.reduction.reduced_model import rom as rom
     from vehiclemor.report.comparison import compare as compare
@@ -52,12 +54,14 @@ __all__ = [
     "models",
     "plot",
     "reduce",
+    "road",
     "rom",
     "run_study",
     "simulate",
     "simulate_many",
     "status",
     "studies",
+    "weighted_rms",
     "write_report",
 ]
 # Name -> module that defines it.
@@ -72,7 +76,9 @@ _DEFINED_IN = {
     "export": "vehiclemor.exporting.export",
     "figures": "vehiclemor.report.figures.catalogue",
     "maneuver": "vehiclemor.inputs.maneuver",
+    "road": "vehiclemor.inputs.road",
     "simulate_many": "vehiclemor.simulation.batches",
+    "weighted_rms": "vehiclemor.metrics",
     "write_report": "vehiclemor.report.page",
 }
 

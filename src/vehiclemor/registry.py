@@ -1,16 +1,18 @@
 """Models, methods and maneuvers by entry point: built-ins and plug-ins register the same way.
 
 An entry point of the group `vehiclemor.models` names a `ModelDefinition`, one of
-`vehiclemor.methods` a `Method`, one of `vehiclemor.maneuvers` a `Maneuver`.
+`vehiclemor.methods` a `Method`, one of `vehiclemor.maneuvers` a `Maneuver`.  A component that has a
+function `member` is a family: `NAME:NUMBER` is what it gives for the number.
 """
 
+import re
 from collections.abc import Collection, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from vehiclemor.arguments import quoted
-from vehiclemor.exceptions import InputError, PlugInError, blame, did_you_mean
+from vehiclemor.exceptions import InputError, PlugInError, blame, blamed, did_you_mean
 
 GROUPS = {
     "model": "vehiclemor.models",
@@ -24,6 +26,9 @@ CLASSES = {
     "maneuver": "vehiclemor.inputs.maneuver:Maneuver",
 }
 
+# One name for each member.  No number has more digits.
+FAMILY = re.compile(r"([^:]+):(0|[1-9][0-9]{0,17})")
+
 
 def names(kind: str) -> list[str]:
     """Registered names of a kind (`model`, `method` or `maneuver`), sorted."""
@@ -36,6 +41,8 @@ def component(kind: str, name: str) -> Any:
     `PlugInError` if it is a plug-in that can't be imported, or is something else.
     """
     entries = _entries(kind)
+    if isinstance(name, str) and name not in entries and (family := FAMILY.fullmatch(name)):
+        return _member(kind, *family.groups())
     choice(kind, name, entries)
     where = f"{kind} {name!r} ({entries[name].value})"
     try:
@@ -51,6 +58,21 @@ def component(kind: str, name: str) -> Any:
     if kind == "model" and loaded.name != name:
         raise PlugInError(f"{where} names itself {quoted(loaded.name)}: it must be the same name")
     return loaded
+
+
+def _member(kind: str, base: str, number: str) -> Any:
+    """Member of a family of components."""
+    family, name = component(kind, base), f"{base}:{number}"
+    make = getattr(family, "member", None)
+    if not callable(make):
+        raise InputError(f"unknown {kind} {quoted(name)}; {base} is no family: it has no members")
+    where = f"{kind} {name!r} ({_entries(kind)[base].value})"
+    with blamed(where, make):
+        found = make(int(number))
+    wanted = _class(kind)
+    if not isinstance(found, wanted) or getattr(found, "name", "") != name:
+        raise PlugInError(f"{where} is {quoted(found)}: it must be a {wanted.__name__} {name!r}")
+    return found
 
 
 def choice(kind: str, name: Any, known: Collection[str]) -> str:

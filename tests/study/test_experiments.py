@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import vehiclemor as vm
 from vehiclemor import provenance
 from vehiclemor.codegen import cache
-from vehiclemor.exceptions import ConvergenceError
+from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.failure import Failure
 from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods import pod, slow_manifold
@@ -164,7 +164,7 @@ def test_a_method_is_not_used_on_a_model_that_it_was_not_trained_on(model):
     found = evaluate(of_runs(model, "pod", runs[:1], runs[1:], rank=3))
     assert found["status"].item() == "rejected"
     assert "another" in found["message"].item()
-    with pytest.raises(ValueError, match="of one model"):
+    with pytest.raises(InputError, match="of one model"):
         of_runs(model, "pod", runs[:1], runs, rank=3)
 
 

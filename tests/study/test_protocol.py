@@ -12,12 +12,14 @@ import vehiclemor as vm
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.study.plans.choice import Validation, choose, outcomes, reasons
 from vehiclemor.study.plans.protocol import (
+    _of_group,
+    _sampled_run,
     load_protocol,
     protocol_names,
     sampled_runs,
     sampled_sets,
 )
-from vehiclemor.study.plans.study_file import Bound, Box, Draw
+from vehiclemor.study.plans.study_file import FACTORS, Bound, Box, Draw, Group
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 SAME_POINT = "f 1.01, a 1.435, equilibrium, 18.548 m/s"
@@ -115,6 +117,38 @@ def test_a_draw_fills_its_box_and_stays_inside(protocol):
     assert abs((amplitude > 0.0).mean() - 0.5) < 5.0 * 0.5 / 20.0
 
 
+def test_members_and_parameters_are_drawn_after_all_else(protocol):
+    box = BOX.model_copy(update={"maneuver": "road_travel"})
+    further = {"members": [3, 6], "parameters": {"tie_rod_inner.z": [0.1, 0.2], "a.b": [1.0, 1.0]}}
+    full = Box.model_validate(box.model_dump() | further)
+    assert _sampled_run(protocol.model, full, iter_of(9)).parameters[0] == ("a.b", 1.0)
+    for seed in range(20):
+        plain = _sampled_run(protocol.model, box, iter_of(seed))
+        run = _sampled_run(protocol.model, full, iter_of(seed))
+        of_plain = run.maneuver.perturbed(*(getattr(plain.maneuver, f) for f in FACTORS))
+        assert (run.maneuver, run.start, run.speed) == (of_plain, plain.start, plain.speed)
+        value = dict(run.parameters)["tie_rod_inner.z"]
+        assert 0.1 <= value == round(value, 3) <= 0.2
+    names = [_sampled_run(protocol.model, full, iter_of(k)).maneuver.name for k in range(400)]
+    counts = [names.count(f"road_travel:{number}") for number in (3, 4, 5, 6)]
+    # Binomial: five standard deviations.
+    assert sum(counts) == 400
+    assert all(abs(count - 100) < 5.0 * math.sqrt(75.0) for count in counts)
+
+
+def iter_of(seed):
+    return np.random.default_rng(seed).random
+
+
+def test_parameters_of_a_group_are_combined_with_all_else(protocol):
+    values = {"a.b": [1.0, 2.0, 3.0], "c": [4.0]}
+    group = Group(maneuver="road_travel:7", amplitude=[0.5, 1.0], parameters=values)
+    runs = _of_group(protocol.model, group)
+    assert len(set(runs)) == len(runs) == group.scenarios == 6
+    assert {run.parameters for run in runs} == {(("a.b", b), ("c", 4.0)) for b in (1.0, 2.0, 3.0)}
+    assert {run.maneuver.name for run in runs} == {"road_travel:7"}
+
+
 # How runs are judged
 
 
@@ -179,6 +213,14 @@ TWICE = '[[outside]]\nmaneuver = "chirp_travel"\npoints = [[1.0, 0.0]]\n\n[drawn
         (DRAWN, "frequency = [2.0, 0.7]", "drawn"),
         ("amplitude = [1.3, 1.4]", 'start = ["dropped"]', "drawn_outside, box 1: .*dropped"),
         ("runs = 5", "runs = 0", "drawn"),
+        (DRAWN, "members = [1, 2]", "drawn, box 1: .*sine_travel is no family"),
+        (DRAWN, "members = [2, 1]", "members.*in order"),
+        (DRAWN, "members = [-1, 1]", "members"),
+        (DRAWN, "parameters.wheel = [0.0, 1.0]", "drawn, box 1: .*wheel"),
+        (DRAWN, "parameters.wheel = [0.0, 0.0004]", "3 decimals"),
+        (DRAWN, "parameters.initial_speed = [1.0, 2.0]", r"by speed = \[...\]"),
+        ("[[0.9, 1.0]]", "[[0.9, 1.0]]\nparameters.wheel = [1.0]", "test, group 1: .*wheel"),
+        ("[[0.9, 1.0]]", "[[0.9, 1.0]]\nparameters.wheel = []", "wheel is not a list of finite"),
         ('maneuver = "chirp_travel"', 'maneuver = "chrp_travel"', "test, group 2: .*chirp_travel"),
         ("points = [[0.9, 1.0]]", "points = [[0.9, 1.0, 20.0]]", "test, group 1"),
         # Without amplitude a chirp is a sine: one run under two names.

@@ -69,10 +69,10 @@ def check_resolved(maneuver: Maneuver) -> None:
     """Raise `InputError` if the output times are too far apart to show the inputs.
 
     Between two output times without a corner an input stays within a quarter of its range of the
-    straight line, as a sine of three samples a period does; it may leave it once.  A signal is
-    known between them.
+    straight line, as a sine of three samples a period does; it may leave it once.  The rate of an
+    input is shown with it.  A signal is known between them.
     """
-    times, between = maneuver.times, 0.38
+    times, between, names = maneuver.times, 0.38, {*maneuver.inputs}
     if len(times) == 1 or isinstance(maneuver, Signal):
         return
     step = times[1]
@@ -86,6 +86,7 @@ def check_resolved(maneuver: Maneuver) -> None:
     wrong = off > 0.25 * (everywhere.max(axis=0) - everywhere.min(axis=0))
     corners = np.searchsorted(times, maneuver.break_points, side="right") - 1
     wrong[corners[(corners >= 0) & (corners < len(wrong))]] = False
+    wrong[:, [name.removesuffix("_dot") in names - {name} for name in maneuver.inputs]] = False
     column = int(wrong.sum(axis=0).argmax())
     if wrong[:, column].sum() > 1:
         raise InputError(

@@ -42,6 +42,8 @@ class Maneuver(ShortRepr):
     linear_in_amplitude
         Whether all inputs are proportional to the amplitude factor: then runs that differ in it
         alone share what is made of the signal.
+    member
+        Of a family, such as roads of other seeds: number -> maneuver, whose name is `NAME:NUMBER`.
 
     Raises
     ------
@@ -61,12 +63,13 @@ class Maneuver(ShortRepr):
     frequency_factor: float = 1.0
     amplitude_factor: float = 1.0
     linear_in_amplitude: bool = False
+    member: "Callable[[int], Maneuver] | None" = None
 
     def __post_init__(self) -> None:
         """Refuse what is no maneuver, so that its author reads one clear line."""
         for text in ("name", "summary"):
             line_of_text(f"{text} of a maneuver", getattr(self, text))
-        for function in ("signal", "corners"):
+        for function in ("signal", "corners", *["member"] * (self.member is not None)):
             if not callable(getattr(self, function)):
                 raise InputError(f"{self}: {function} is not a function")
         if isinstance(self.inputs, list):

@@ -58,7 +58,7 @@ def _pulse(times: np.ndarray, frequency: float) -> np.ndarray:
     return np.where(inside[:, None], pulse, 0.0)
 
 
-def _ramp(part: np.ndarray, length: float) -> np.ndarray:
+def ramp(part: np.ndarray, length: float) -> np.ndarray:
     """Quintic from 0 to 1 while `part` (n,) goes from 0 to 1, with derivatives (n, 3) in time."""
     z = np.clip(part, 0.0, 1.0)
     return np.column_stack(
@@ -89,7 +89,7 @@ def _sine(phase: np.ndarray, rate: np.ndarray, change: float | np.ndarray) -> np
 
 def _step(times: np.ndarray, frequency: float) -> np.ndarray:
     length = STEP_RAMP / frequency
-    return STEP_SIZE * _ramp((times - BEGIN) / length, length)
+    return STEP_SIZE * ramp((times - BEGIN) / length, length)
 
 
 def _sweep(times: np.ndarray, frequency: float) -> np.ndarray:
@@ -98,7 +98,7 @@ def _sweep(times: np.ndarray, frequency: float) -> np.ndarray:
     circle = 2.0 * np.pi * frequency
     phase = circle * (SWEEP_FIRST + 0.5 * growth * t) * t
     wave = _sine(phase, circle * (SWEEP_FIRST + growth * t), circle * growth)
-    return SWEEP_SIZE * _product(_ramp(t / ONSET, ONSET), wave)
+    return SWEEP_SIZE * _product(ramp(t / ONSET, ONSET), wave)
 
 
 def _multisine(times: np.ndarray, frequency: float) -> np.ndarray:
@@ -107,7 +107,7 @@ def _multisine(times: np.ndarray, frequency: float) -> np.ndarray:
     for hertz, phase in zip(MULTISINE * frequency, PHASES, strict=True):
         rate = np.full(len(t), 2.0 * np.pi * hertz)
         waves += _sine(rate * t + phase, rate, 0.0)
-    return MULTISINE_SIZE * _product(_ramp(t / ONSET, ONSET), waves)
+    return MULTISINE_SIZE * _product(ramp(t / ONSET, ONSET), waves)
 
 
 def _pulse_corners(frequency: float) -> tuple[float, ...]:

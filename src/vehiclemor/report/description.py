@@ -48,6 +48,7 @@ def description(
         **dict.fromkeys(data_names("studies"), _study),
         **dict.fromkeys(SCHEMAS, schema_description),
     }
+    known |= {name: _maneuver} if name.partition(":")[0] in names("maneuver") else {}
     describe = _study if name.endswith(".toml") else known.get(name)
     if describe is None:
         raise unknown("name", name, {*known, *names("model")})

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
+from vehiclemor.exceptions import InputError
 from vehiclemor.provenance import code_digest
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import Value
@@ -72,7 +73,7 @@ def make_experiment(
     if keep != "errors" and len(test) != 1:
         raise ValueError(f"{keep} are kept of one test scenario, not of {len(test)}")
     if any(scenario.parameters != test[0].parameters for scenario in test):
-        raise ValueError("the test scenarios of an experiment are of one model")
+        raise InputError("the scenarios of a test set have several parameters; a test is of one model")
     return Experiment(
         model.name,
         model.kernel_hash,

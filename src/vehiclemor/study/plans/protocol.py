@@ -19,15 +19,22 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
 from vehiclemor.study.plans.loading import study_path
-from vehiclemor.study.plans.study_file import DRAWN, SETS, Box, Draw, Group, MethodEntry, StudyFile
-from vehiclemor.study.scenario import Scenario, check, own_speed
+from vehiclemor.study.plans.ranges import DECIMALS
+from vehiclemor.study.plans.study_file import (
+    DRAWN,
+    SETS,
+    Box,
+    Draw,
+    Group,
+    MethodEntry,
+    StudyFile,
+)
+from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
 from vehiclemor.toml_files import read_toml
 
 FULL_ORDER, CONTENDER = "full order", "contender"
 # Of the names of the package's own; the model follows.
 PREFIX = "predictive-"
-# Decimals of sampled factors and speeds: what a table prints is what was run.
-DECIMALS = 3
 # Samples tried for each run before a box counts as too small.
 TRIES = 100
 
@@ -170,20 +177,28 @@ def _of_group(model: Model, group: Group) -> list[Scenario]:
     speeds = [[speed] for speed in group.speed] or [[]]
     products = itertools.product(*lists, speeds)
     points = group.points or [[frequency, size, *speed] for frequency, size, speed in products]
+    samples = itertools.product(*group.parameters.values())
+    tables = [overrides(dict(zip(group.parameters, sample, strict=True))) for sample in samples]
+    own = own_speed(model)
     return [
-        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else own_speed(model))
+        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else own, table)
         for point in points
         for start in group.start or model.starts[:1]
+        for table in tables
     ]
 
 
 def _corners(model: Model, box: Box) -> list[Scenario]:
-    """Scenarios of the corners of a box, and one from every start."""
-    starts = box.start or list(model.starts[:1])
+    """Scenarios of the corners of a box, and one of every start, end of members and parameters."""
+    starts, speeds = box.start or list(model.starts[:1]), box.speed or [None]
     factors = list(itertools.product(box.frequency, box.amplitude))
-    corners = itertools.product(factors, starts[:1], box.speed or [None])
-    others = itertools.product(factors[:1], starts[1:], (box.speed or [None])[:1])
-    return [Scenario.of(box.maneuver, *corner) for corner in (*corners, *others)]
+    ends = [{name: limits[end] for name, limits in box.parameters.items()} for end in (0, 1)]
+    low, high = (overrides(table) for table in ends)
+    members = [f"{box.maneuver}:{number}" for number in box.members or ()] or [box.maneuver]
+    corners = itertools.product(members[:1], factors, starts[:1], speeds, [low])
+    others = itertools.product(members[:1], factors[:1], starts[1:], speeds[:1], [low])
+    further = [(members[-1], factors[-1], starts[0], speeds[-1], high)]
+    return [Scenario.of(*corner) for corner in (*corners, *others, *further)]
 
 
 def _entry(model: Model, entry: MethodEntry, training: Scenarios) -> Entry:
@@ -257,4 +272,10 @@ def _sampled_run(model: Model, box: Box, random: Callable[[], float]) -> Scenari
     speed = own_speed(model) if box.speed is None else within(box.speed)
     starts = box.start or model.starts[:1]
     start = starts[int(random() * len(starts))]
-    return Scenario.of(box.maneuver, (frequency, amplitude), start, speed)
+    # What came later is drawn after all else, where it is asked for: draws before stay the same.
+    maneuver = box.maneuver
+    if box.members:
+        first, last = box.members
+        maneuver += f":{first + int(random() * (last + 1 - first))}"
+    table = overrides({name: within(box.parameters[name]) for name in sorted(box.parameters)})
+    return Scenario.of(maneuver, (frequency, amplitude), start, speed, table)

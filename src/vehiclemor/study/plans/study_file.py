@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
+from vehiclemor.study.plans.ranges import Drawn, Numbers, Range, without_speed
 from vehiclemor.toml_files import FileSchema, Line
 
 FACTORS = ("frequency_factor", "amplitude_factor")
@@ -107,19 +108,26 @@ class Group(FileSchema):
     frequency: list[float] = _list("factors, 1 by default")
     amplitude: list[float] = _list("factors, 1 by default")
     speed: list[float] = _list("m/s, the model's own by default")
+    parameters: Annotated[dict[str, list[float]], AfterValidator(without_speed)] = _table(
+        "parameter -> values in SI units, to combine with all else; the model's own by default"
+    )
 
     @property
     def scenarios(self) -> int:
         """How many scenarios it is."""
         lists = (self.frequency, self.amplitude, self.speed)
         points = len(self.points) or math.prod(len(entry) or 1 for entry in lists)
-        return points * (len(self.start) or 1)
+        samples = math.prod(len(entry) for entry in self.parameters.values())
+        return points * samples * (len(self.start) or 1)
 
     @model_validator(mode="after")
     def _either(self) -> "Group":
         for name in self.model_fields_set - {"maneuver"}:
             if not getattr(self, name):
                 raise ValueError(f"{name} is empty")
+        for name, values in self.parameters.items():
+            if not values or not all(map(math.isfinite, values)):
+                raise ValueError(f"parameters: {name} is not a list of finite numbers")
         if self.points and (self.frequency or self.amplitude or self.speed):
             raise ValueError("give points or lists of factors, not both")
         if any(len(point) not in (2, 3) for point in self.points):
@@ -135,15 +143,6 @@ Learned = Annotated[
 Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
-def _ordered(limits: list[float]) -> list[float]:
-    if not (math.isfinite(limits[0]) and limits[0] <= limits[1] < math.inf):
-        raise ValueError("a range is [from, to] with finite numbers in order")
-    return limits
-
-
-Range = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
-
-
 class Box(FileSchema):
     """Runs of one maneuver, its numbers uniformly distributed in ranges [from, to]."""
 
@@ -154,6 +153,10 @@ class Box(FileSchema):
     both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
     speed: Range | None = Field(None, description="m/s, the model's own by default")
     start: list[str] = _list("initial conditions, equally likely; the model's first")
+    members: Numbers | None = Field(
+        None, description="of a family: numbers of its members, from and to; MANEUVER:NUMBER is run"
+    )
+    parameters: Drawn = _table("parameter -> [from, to] in SI units; the model's own by default")
 
     @field_validator("frequency")
     @classmethod

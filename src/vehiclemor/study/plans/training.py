@@ -71,7 +71,7 @@ def _scenarios(
     if entry == "set":
         return [replace(test, maneuver=test.maneuver.perturbed(*pair)) for pair in factors]
     name = model.definition.maneuver if entry == "nominal" else entry
-    if name not in names("maneuver"):
+    if name.partition(":")[0] not in names("maneuver"):
         raise unknown("training", entry, [*NAMED, *names("maneuver")])
     return [_checked(model, replace(test, maneuver=component("maneuver", name)))]
 
