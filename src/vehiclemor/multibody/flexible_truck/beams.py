@@ -3,7 +3,8 @@
 Timoshenko's stiffness with St. Venant's torsion, consistent mass of the cubic shape functions
 (Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 5.6 and 11.4).  Axial forces act at
 the centroid, transverse ones at the shear centre; the nodes stand on the webs.  Left out: warping,
-which stiffens open sections in torsion, and the rotary inertia of bending.
+which stiffens open sections in torsion, the rotary inertia of bending, and
+half a cross member's width of the rails at either end.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vehiclemor.multibody.flexible_truck.frame import Channel, Frame, Layout, around
+from vehiclemor.multibody.flexible_truck.frame import Box, Channel, Frame, Layout, around
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -50,7 +51,11 @@ def _inertia(l: np.ndarray) -> list[list[np.ndarray]]:  # noqa: E741
 
 
 def matrices(
-    lengths: np.ndarray, section: Channel, modulus: float, poisson_ratio: float, density: float
+    lengths: np.ndarray,
+    section: Channel | Box,
+    modulus: float,
+    poisson_ratio: float,
+    density: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and mass (elements, 12, 12) of beams along x with upright webs, z up.
 
@@ -119,8 +124,7 @@ def frame(layout: Layout, elements_per_bay: int) -> Frame:
         share = np.arange(1, k)[:, None] / k
         nodes += list(nodes[first] + share * (nodes[last] - nodes[first]))
         row = np.array([first, *inner, last])
-        flanges = np.array([layout.inward(crossing), 0.0, 0.0])
-        groups.append((np.stack([row[:-1], row[1:]], axis=1), layout.cross, flanges))
+        groups.append((np.stack([row[:-1], row[1:]], axis=1), layout.cross, 0.0 * left))
     places = np.array(nodes)
     material = layout.modulus, layout.poisson_ratio, layout.density
     parts = []

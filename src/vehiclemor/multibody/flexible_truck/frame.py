@@ -69,6 +69,43 @@ class Channel:
 
 
 @dataclass(frozen=True)
+class Box:
+    """Thin-walled closed section by its middle line; lengths in m.  Formulas as for `Channel`."""
+
+    height: float
+    width: float
+    thickness: float
+    # Double symmetry: both centres are in the middle.
+    centroid = shear_centre = 0.0
+
+    @property
+    def area(self) -> float:
+        """Area in m2."""
+        return 2.0 * self.thickness * (self.height + self.width)
+
+    @property
+    def upright(self) -> float:
+        """Second moment of area in m4 that resists bending along the height."""
+        return self.thickness * self.height**2 * (self.height / 6.0 + self.width / 2.0)
+
+    @property
+    def sideways(self) -> float:
+        """Second moment of area in m4 that resists bending along the width."""
+        return self.thickness * self.width**2 * (self.width / 6.0 + self.height / 2.0)
+
+    @property
+    def torsion(self) -> float:
+        """Bredt's torsion constant in m4."""
+        enclosed = self.height * self.width
+        return 2.0 * self.thickness * enclosed**2 / (self.height + self.width)
+
+    @property
+    def shear_areas(self) -> tuple[float, float]:
+        """Areas in m2 that carry shear along the height and along the width."""
+        return 2.0 * self.thickness * self.height, 2.0 * self.thickness * self.width
+
+
+@dataclass(frozen=True)
 class Layout:
     """Geometry and material of the ladder: two rails, cross members at some of the stations.
 
@@ -89,7 +126,7 @@ class Layout:
     spacing: float
     height: float
     rail: Channel
-    cross: Channel
+    cross: Box
     modulus: float
     poisson_ratio: float
     density: float
@@ -109,11 +146,6 @@ class Layout:
         ends = zip(self.stations[:-1], self.stations[1:], parts, strict=True)
         inner = [np.linspace(a, b, k, endpoint=False) for a, b, k in ends]
         return np.concatenate([*inner, self.stations[-1:]])
-
-    def inward(self, crossing: int) -> float:
-        """Direction along x of a cross member's flanges: toward the middle of the frame."""
-        middle = self.stations[[0, -1]].mean()
-        return float(np.sign(middle - self.stations[crossing]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,21 +175,25 @@ class Frame:
 
 def planes(values: Mapping[str, Any]) -> dict[str, float]:
     """Cross members' planes and cab mounts by x in m, from front to rear."""
-    front = values["front_overhang"]
-    reach = values["cab_mount_distance"]
+    front, reach = values["front_overhang"], values["cab_mount_distance"]
+    # The outermost cross members end with the rails.
+    half = values["cross_width"] / 2.0
     return {
-        "front end": front,
+        "front end": front - half,
         "front cab mounts": values["cab_place"] + reach,
         "front axle": 0.0,
         "rear cab mounts": values["cab_place"] - reach,
         "gearbox": -values["gearbox_distance"],
         "rear axle": -values["wheelbase"],
-        "rear end": front - values["frame_length"],
+        "rear end": front - values["frame_length"] + half,
     }
 
 
 def layout(values: Mapping[str, Any]) -> Layout:
-    """Layout from the parameters; every plane but the front mounts' has a cross member."""
+    """Layout from the parameters; every plane but the front mounts' has a cross member.
+
+    All sections are as high as the rails: their middle lines meet.
+    """
     places = list(planes(values).values())
     parts = [int(np.ceil((a - b) / BAY - 1e-9)) for a, b in pairwise(places)]
     numbers = np.concatenate([[0], np.cumsum(parts)])
@@ -167,14 +203,13 @@ def layout(values: Mapping[str, Any]) -> Layout:
     ]
     thickness, depth = values["rail_thickness"], values["rail_depth"] - values["rail_thickness"]
     rail = Channel(depth, values["rail_flange"] - thickness / 2.0, thickness)
-    thin = values["cross_thickness"]
     return Layout(
         stations=np.concatenate([*between, places[-1:]]),
         crossings=tuple(int(n) for n in np.delete(numbers, 1)),
         spacing=values["rail_spacing"],
         height=values["frame_height"],
         rail=rail,
-        cross=Channel(depth, values["cross_flange"] - thin / 2.0, thin),
+        cross=Box(depth, values["cross_width"], values["cross_thickness"]),
         modulus=values["modulus"],
         poisson_ratio=values["poisson_ratio"],
         density=values["density"],

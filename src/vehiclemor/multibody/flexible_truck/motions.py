@@ -17,8 +17,10 @@ CAB, AXLES = 3, 4
 class Motions:
     """Motion of points as rows over s (N,): sections of the rails, cab, axles."""
 
-    def __init__(self, ladder: Layout) -> None:
+    def __init__(self, ladder: Layout, held: tuple[float, float]) -> None:
         self.ladder = ladder
+        # Planes x at which the frame holds what rests on it, see `body`.
+        self.held = held
         self.size = 12 * len(ladder.stations) + CAB + AXLES
         self.identity = np.eye(self.size)
 
@@ -40,10 +42,26 @@ class Motions:
             motion += weight * moved(mean, np.array([x - stations[station], 0.0, 0.0]))
         return motion
 
-    def point(self, place: np.ndarray) -> np.ndarray:
-        """Motion (6, N) of a point on a rigid bracket across both rails."""
+    def body(self, place: np.ndarray) -> np.ndarray:
+        """Displacement (3, N) of a point of what rests on the frame.
+
+        Bodies and platform are rigid in their plane: along, across and in yaw they follow the
+        frame at the axles, whose roll and pitch move them by their height.  Their heights follow
+        the rails under them.
+        """
         x, y, z = place
-        return moved(self.plane(x), np.array([0.0, y, z - self.ladder.height]))
+        front, rear = self.held
+        up = np.array([0.0, 0.0, z - self.ladder.height])
+        ahead, behind = (moved(self.plane(plane), up) for plane in (front, rear))
+        share = (front - x) / (front - rear)
+        yaw = (ahead[1] - behind[1]) / (front - rear)
+        return np.array(
+            [
+                (ahead[0] + behind[0]) / 2.0 - y * yaw,
+                (1.0 - share) * ahead[1] + share * behind[1],
+                moved(self.plane(x), np.array([0.0, y, 0.0]))[2],
+            ]
+        )
 
     @property
     def cab(self) -> np.ndarray:
@@ -55,7 +73,7 @@ class Motions:
         return self.identity[-2:] if rear else self.identity[-AXLES:-2]
 
     def rigid(self, centre: np.ndarray, cab: np.ndarray) -> np.ndarray:
-        """Rows s (N, 6) where all that is sprung moves as one body about a centre; the axles rest."""
+        """Rows s (N, 6) where all that is sprung moves as one body; the axles rest."""
         found = np.zeros((self.size, 6))
         places = [
             np.array([x, y, self.ladder.height])
@@ -81,8 +99,8 @@ def points_of_the_rest(x: np.ndarray, body: np.ndarray) -> tuple[np.ndarray, np.
     """Point masses (points,) in kg and places (points, 3) relative to the sprung centre.
 
     Four points a station, upper and lower, left and right.  Their masses are quadratic in x, their
-    heights linear but for one distance, so that mass, centre and inertia are those of `body`
-    (6, 6): the inertia matrix about the sprung centre of what is neither frame nor cab; `x` (stations,) is
+    heights linear but for one distance.  Their mass, centre and inertia are those of `body` (6, 6):
+    the inertia matrix about the sprung centre of what is neither frame nor cab.  `x` (stations,) is
     relative to that centre.
     """
     ends = np.concatenate([x[:1], (x[1:] + x[:-1]) / 2.0, x[-1:]])

@@ -83,7 +83,7 @@ PARAMETERS = {
     "rail_depth": Declared("m", above=0.0, at_most=1.0),
     "rail_flange": Declared("m", above=0.0, at_most=0.5),
     "rail_thickness": _SHEET,
-    "cross_flange": Declared("m", above=0.0, at_most=0.5),
+    "cross_width": Declared("m", above=0.0, at_most=0.5),
     "cross_thickness": _SHEET,
     "front_overhang": shared.LENGTH,
     "frame_length": shared.LENGTH,

@@ -4,9 +4,9 @@ Coordinates are those of the frame's nodes, then heave, pitch and roll of the ca
 the front and of the rear axle.  All of them are zero where springs and tires carry nothing.
 
 The sprung mass that is neither frame nor cab is spread along the frame, and so is the payload, as
-point masses on rigid brackets that rest on both rails: they follow the rails' mean and their
-difference in height.  Springs and dampers act on one rail, at the end of a rigid arm.  Nothing but
-the axles' planes holds the truck along, across and in yaw: soft springs at its centre do.
+point masses on rigid brackets across both rails, see `Motions.body`.  Springs and dampers act on
+one rail, at the end of a rigid arm.  Nothing on the road holds the truck along, across and in yaw:
+soft springs at the sprung centre do.
 """
 
 from __future__ import annotations
@@ -49,17 +49,16 @@ def check(values: Mapping[str, Any]) -> None:
         raise InputError(f"shell_size is {size:g} m; allowed: 0 for beams, or from {FINEST} m on")
     if not values["shortest_length"] < values["longest_length"]:
         raise GeometryError("the springs' shortest_length is not below their longest_length")
-    for thin, wide in (("rail_thickness", "rail_flange"), ("cross_thickness", "cross_flange")):
-        if not values[thin] < min(values[wide], values["rail_depth"]):
-            raise GeometryError(f"{thin} {values[thin]:g} m is not below {wide} and rail_depth")
+    if not values["rail_thickness"] < min(values["rail_flange"], values["rail_depth"]):
+        raise GeometryError("rail_thickness is not below rail_flange and rail_depth")
     if not 2.0 * values["rail_flange"] < values["rail_spacing"]:
         raise GeometryError("the rails' flanges overlap: rail_flange is above half rail_spacing")
     places = planes(values)
     for (name, x), (behind, further) in pairwise(places.items()):
         if not x > further:
             raise GeometryError(f"the frame's {name} ({x:g} m) is not ahead of its {behind}")
-    front, rear = -values["platform_front"], -values["platform_rear"]
-    if not front > rear >= places["rear end"] - 1e-9:
+    end = values["frame_length"] - values["front_overhang"]
+    if not values["platform_front"] < values["platform_rear"] <= end + 1e-9:
         raise GeometryError("the platform must end behind its front, and not behind the frame")
 
 
@@ -100,7 +99,7 @@ def _unladen(given: tuple[tuple[str, tuple[float, ...]], ...]) -> _Truck:
     # s = spread q, as `Motions` has it.
     spread = csc_array(block_diag([meshed.sections, free]))
     none = csc_array((CAB + AXLES,) * 2)
-    motions = Motions(ladder)
+    motions = Motions(ladder, (0.0, -v["wheelbase"]))
     mass, load = _cab_and_axles(motions, v)
     brackets, bracket_load = _brackets(motions, v, meshed, mass)
     payload, payload_load = _payload(motions, v)
@@ -128,7 +127,10 @@ def _unladen(given: tuple[tuple[str, tuple[float, ...]], ...]) -> _Truck:
 
 
 def _meshed(ladder: Layout, v: Mapping[str, Any]) -> Frame:
-    from vehiclemor.multibody.flexible_truck import beams
+    from vehiclemor.multibody.flexible_truck import beams, shells
+
+    if v["shell_size"]:
+        return shells.frame(ladder, v["shell_size"])
 
     return beams.frame(ladder, int(v["elements_per_bay"]))
 
@@ -211,14 +213,16 @@ def _points(
     motions: Motions, gravity: float, masses: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mass (N, N) and weight (N,) of point masses (points,) at places (points, 3)."""
-    rows = np.array([motions.point(place)[:3] for place in places])
+    rows = np.array([motions.body(place) for place in places])
     mass = np.einsum("p,pki,pkj->ij", masses, rows, rows, optimize=True)
     return mass, -gravity * masses @ rows[:, 2]
 
 
 def _held(motions: Motions, v: Mapping[str, Any]) -> np.ndarray:
     """Stiffness (N, N) of the soft springs at the sprung centre: along, across and in yaw."""
-    rows = motions.point(_centre(v))[[0, 1, 5]]
+    centre, ahead = _centre(v), np.array([1.0, 0.0, 0.0])
+    along, across, _ = motions.body(centre)
+    rows = np.array([along, across, motions.body(centre + ahead)[1] - across])
     inertias = np.array([v["sprung_mass"], v["sprung_mass"], v["yaw_inertia"]])
     return (rows.T * (inertias * (2.0 * np.pi * v["hold_frequency"]) ** 2)) @ rows
 
@@ -252,7 +256,7 @@ def _outputs(
     heave, pitch, roll = motions.cab
     half = v["platform_width"] / 2.0
     corners = [
-        motions.point(np.array([-v[f"platform_{end}"], side * half, v["platform_height"]]))[2]
+        motions.body(np.array([-v[f"platform_{end}"], side * half, v["platform_height"]]))[2]
         for end in ("front", "rear")
         for side in (1.0, -1.0)
     ]
