@@ -58,7 +58,7 @@ def _shape(expression: sp.Basic, shapes: Mapping[sp.Symbol, str]) -> str:
     if isinstance(expression, sp.Symbol):
         return shapes.get(expression, "")
     if not expression.args:
-        return str(abs(cast("sp.Number", expression)))
+        return str(abs(expression)) if isinstance(expression, sp.Number) else str(expression)
     parts = sorted(part for a in expression.args if (part := _shape(a, shapes)) != "1")
     if len(parts) == 1 and isinstance(expression, sp.Mul):
         return parts[0]

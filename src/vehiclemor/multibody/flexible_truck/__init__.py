@@ -1,0 +1,1 @@
+"""Truck on a flexible ladder frame: ride over rough roads."""
