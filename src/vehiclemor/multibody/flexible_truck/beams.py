@@ -9,6 +9,7 @@ half a cross member's width of the rails at either end.
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -114,7 +115,7 @@ def frame(layout: Layout, elements_per_bay: int) -> Frame:
     nodes = [np.array([x, y, layout.height]) for x in lines for y in layout.sides]
     numbers = np.arange(len(nodes)).reshape(-1, 2)
     left = np.array([0.0, -1.0, 0.0])
-    groups = [
+    groups: list[tuple[np.ndarray, Channel | Box, np.ndarray]] = [
         (np.stack([row[:-1], row[1:]], axis=1), layout.rail, sign * left)
         for row, sign in zip(numbers.T, (1.0, -1.0), strict=True)
     ]
@@ -162,17 +163,25 @@ def frame(layout: Layout, elements_per_bay: int) -> Frame:
 
 
 def _strains(layout: Layout, lines: np.ndarray, numbers: np.ndarray, size: int) -> csc_array:
-    """Axial strains at the corners of web and flange: that of the web's middle and curvature."""
+    """Axial strains at the corners of web and flange, by the section's forces at the place."""
     from scipy.sparse import csc_array, lil_array
 
-    rows = lil_array((4 * len(layout.gauges), size))
+    rail, rows = layout.rail, lil_array((4 * len(layout.gauges), size))
     for number, x in enumerate(layout.gauges):
         front, rear = around(lines, x)
-        length = lines[front] - lines[rear]
-        for side in range(2):
-            for flange, z in enumerate((0.5 * layout.rail.height, -0.5 * layout.rail.height)):
-                row = 4 * number + 2 * side + flange
-                for line, sign in ((front, 1.0 / length), (rear, -1.0 / length)):
-                    node = 6 * numbers[line, side]
-                    rows[row, node], rows[row, node + 4] = sign, sign * z
+        # Two elements, half of each, where the place is a node.
+        for element, side, upper in product(range(front, rear), range(2), range(2)):
+            ends = lines[element + 1], lines[element]
+            length, along = ends[1] - ends[0], (2.0 * x - sum(ends)) / (ends[1] - ends[0])
+            slope = rail.upright / (rail.shear_areas[0] * length**2)
+            bend = 3.0 * along / (1.0 + 24.0 * (1.0 + layout.poisson_ratio) * slope)
+            z, weight = (upper - 0.5) * -rail.height / length, 1.0 / (rear - front)
+            offset = rail.shear_centre * -np.sign(layout.sides[side])
+            for end, sign in enumerate((-1.0, 1.0)):
+                node, row = 6 * numbers[element + 1 - end, side], 4 * number + 2 * side + upper
+                lift = weight * z * bend * 2.0 * sign / length
+                rows[row, node] += weight * sign / length
+                rows[row, node + 2] += lift
+                rows[row, node + 3] += lift * offset
+                rows[row, node + 4] += weight * z * (sign + bend)
     return csc_array(rows)

@@ -138,8 +138,11 @@ class Layout:
 
     @cached_property
     def gauges(self) -> np.ndarray:
-        """Places x of the strains in m."""
-        return np.array([self.stations[k : k + 2].mean() for k in GAUGED])
+        """Places x of the strains in m: in the middle between cross members' webs and stations."""
+        half = np.zeros(len(self.stations))
+        half[list(self.crossings)] = self.cross.width / 2.0
+        clear = np.array([self.stations - half, self.stations + half])
+        return np.array([(clear[0, k] + clear[1, k + 1]) / 2.0 for k in GAUGED])
 
     def lines(self, parts: list[int]) -> np.ndarray:
         """Places x of a mesh that divides every bay into some parts."""
@@ -163,7 +166,7 @@ class Frame:
         station, left and right, at the middle of the web.
     strains
         (20, n): axial strains at the corners of web and flange, by place, left and right, upper
-        and lower; over the element, or the two, around the place.
+        and lower; shells have that of the element, or the two, around the place.
     """
 
     mass: csc_array

@@ -91,7 +91,7 @@ class _Truck:
 def _unladen(given: tuple[tuple[str, tuple[float, ...]], ...]) -> _Truck:
     from scipy.sparse import block_diag, csc_array, eye_array
 
-    v: dict[str, Any] = {n: np.array(x) if len(x) > 1 else float(x[0]) for n, x in given}
+    v: dict[str, Any] = {n: np.array(x) if len(x) > 1 else sum(x) for n, x in given}
     check(v)
     ladder = layout(v)
     meshed = _meshed(ladder, v)
