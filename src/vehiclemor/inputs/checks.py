@@ -7,7 +7,7 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import extent_of, first_beyond, kept
+from vehiclemor.inputs.polynomials import extent_of, first_beyond, kept, recorded_inputs
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
@@ -50,11 +50,18 @@ def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
     ranges = [definition.validity.get(q.name, anything) for q in definition.inputs]
     if all(bounds == anything for bounds in ranges):
         return
-    extent, (low, high) = extent_of(maneuver), np.array(ranges).T
-    outside = np.flatnonzero((extent.low < low) | (extent.high > high))
-    if len(outside):
+    low, high = np.array(ranges).T
+    if definition.kind == "structural":
+        # A road has too many waves to be taken between output times.
+        times, values = recorded_inputs(maneuver)
+        beyond = (values < low) | (values > high)
+        outside, since = np.flatnonzero(beyond.any(axis=0)), times[beyond.argmax(axis=0)]
+    else:
+        extent = extent_of(maneuver)
+        outside = np.flatnonzero((extent.low < low) | (extent.high > high))
         however_quick = np.full((2, len(low)), np.inf)
-        since = first_beyond(maneuver, np.vstack([low, high, however_quick]))
+        since = first_beyond(maneuver, np.vstack([low, high, however_quick])) if len(outside) else low
+    if len(outside):
         j = outside[since[outside].argmin()]
         name, unit = definition.inputs[j].name, definition.inputs[j].unit
         value = maneuver.at(since[j : j + 1])[0, j]

@@ -1,6 +1,6 @@
 """Structures: sparse matrices of linear elastic bodies, and ports through which forces act.
 
-    M q'' + (E + d K) q' + K q = load + B f(w, w', u),   w = B' q
+    M q'' + (W W' + d K) q' + K q = load + B f(w, w', u),   w = B' q
 
 Springs, dampers and tires act between few points.  Their forces f are the law of the ports, which
 is declared as other equations are; all else are arrays.
@@ -30,8 +30,8 @@ class Structure:
         M and K (n, n), symmetric; K without what acts at the ports.
     damping_time
         d in s, of damping that is proportional to K.
-    damping
-        E (n, n), all other damping; few of its entries are not zero.
+    dampers
+        W (n, k): few linear dampers, by their deflections times the root of their rates.
     ports
         B (n, p): deflections of the ports are w = B' q.
     load
@@ -43,7 +43,7 @@ class Structure:
     mass: csc_array
     stiffness: csc_array
     damping_time: float
-    damping: csc_array
+    dampers: csc_array
     ports: csc_array
     load: np.ndarray
     outputs: tuple[csc_array, csc_array, csc_array, csc_array]

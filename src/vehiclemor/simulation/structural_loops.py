@@ -1,11 +1,13 @@
 """The time loop of structures, compiled: one sparse solution and a few port forces a step.
 
 Generalised-alpha method of J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993), 371-375.  With
-k = d e - alpha_f q, products with K follow from the factored matrix S = c_m M + c_d E + kappa K:
+k = d e - alpha_f q, products with K follow from the matrix S = c_m M + c_d W W' + kappa K:
 
-    q_next = k / kappa + S^-1 (M m + E e) + S^-1 B ((1 - alpha_f) f_next + alpha_f f)
+    q_next = k / kappa + S^-1 (M m + W W'e) + S^-1 B ((1 - alpha_f) f_next + alpha_f f)
 
-where m, e and k are combinations of q, q' and q''.  Newton's method runs in the port forces alone.
+where m, e and k are combinations of q, q' and q''.  R = S without its dampers W is factored: of a
+structure in modal coordinates it is diagonal.  What the dampers add follows by the formula of
+Sherman, Morrison and Woodbury; Newton's method runs in the port forces alone.
 """
 
 import math
@@ -25,8 +27,9 @@ from vehiclemor.codegen.loop_types import (
 FINISHED, NOT_FINITE, NO_CONVERGENCE = range(3)
 # Places of the counts of a run.
 STEPS, PORT_EVALUATIONS, LINEAR_SOLVES = range(3)
-# Newton's method ends where no force changes by more than this part of the largest static one.
-CLOSE = 1e-10
+# Newton's method ends with a step in which no force changes by more than this part of the largest
+# static one: what is left then is of the order of its square.
+CLOSE = 1e-6
 MOST_ITERATIONS = 40
 # Rows of the state: coordinates, rates, accelerations.
 Q, V, A = range(3)
@@ -102,14 +105,16 @@ class Marching(NamedTuple):
 
     Attributes
     ----------
-    mass, damping, factor, ports
-        M, E, L of S = L D L' without its diagonal, and B; rows and columns in the order of L.
+    mass, factor, ports
+        M, L of R = L D L' without its diagonal, B and W side by side; rows in the order of L.
     pivots
         Diagonal (n,) of D, inverted.
     response
-        S^-1 B (n, p).
+        S^-1 B and R^-1 W, by rows (p + k, n).
     compliance
         B' S^-1 B (1 - alpha_f), (p, p).
+    kept, taken
+        I - T W'R^-1 W and T = c_d (I + c_d W'R^-1 W)^-1, (k, k).
     weights
         Coefficients of the method.
     law
@@ -123,12 +128,13 @@ class Marching(NamedTuple):
     """
 
     mass: Columns
-    damping: Columns
     factor: Columns
     ports: Columns
     pivots: Vector
     response: Matrix
     compliance: Matrix
+    kept: Matrix
+    taken: Matrix
     weights: Weights
     law: IntVector
     constants: Vector
@@ -205,11 +211,12 @@ def port_forces(system, ports, inputs, scratch, square, result):
         next_force[i] = ports[FORCE, i]
     for iteration in range(1, MOST_ITERATIONS + 1):
         for i in range(p):
-            moved = 0.0
-            for j in range(p):
-                moved += system.compliance[i, j] * next_force[j]
-            scratch[i] = free[i] + moved
-            scratch[p + i] = ports[FREE_RATE, i] + slope * moved
+            scratch[i] = 0.0
+        for j in range(p):
+            add_row(system.compliance[j], next_force[j], scratch[:p])
+        for i in range(p):
+            scratch[p + i] = ports[FREE_RATE, i] + slope * scratch[i]
+            scratch[i] += free[i]
         law(system, scratch, scratch[p:], inputs, scratch[2 * p :], result)
         # (I - (f_w + slope f_w') P) step = law - force
         for i in range(p):
@@ -278,64 +285,71 @@ def advance(system, state, ports, work, inputs, buffers, counts):
     """One step of the state and of what is known at the ports; one of the reasons above."""
     scratch, square, result = buffers
     n, p, w = state.shape[1], len(system.compliance), system.weights
-    mixed, damped, solved = work[0], work[1], work[2]
+    mixed, damped, solved, beside = work[0], work[1], work[2], work[3]
     q, v, a = state[Q], state[V], state[A]
     for i in range(n):
         e = w.damped_position * q[i] - w.damped_rate * v[i] - w.damped_acceleration * a[i]
         k = w.damping_time * e - w.before * q[i]
-        mixed[i] = w.mass_position * q[i] + w.mass_rate * v[i] + w.mass_acceleration * a[i] - w.mass_share * k
+        m = w.mass_position * q[i] + w.mass_rate * v[i] + w.mass_acceleration * a[i]
+        mixed[i] = m - w.mass_share * k
         damped[i] = e - w.damping_share * k
-        # Until it is solved for, what stands beside the solution.
+        beside[i] = w.stiffness_share * k
         solved[i] = 0.0
-        work[3, i] = w.stiffness_share * k
     add_product(system.mass, mixed, solved)
-    add_product(system.damping, damped, solved)
     solve(system, solved)
+    for k in range(len(system.taken)):
+        scratch[k] = column_product(system.ports, p + k, damped)
+        scratch[len(system.taken) + k] = column_product(system.ports, p + k, solved)
     for i in range(n):
-        solved[i] += work[3, i]
+        solved[i] += beside[i]
+    for k in range(len(system.taken)):
+        factor = 0.0
+        for j in range(len(system.taken)):
+            factor += system.kept[k, j] * scratch[j]
+            factor -= system.taken[k, j] * scratch[len(system.taken) + j]
+        add_row(system.response[p + k], factor, solved)
     for i in range(p):
-        free = column_product(system.ports, i, solved)
-        for j in range(p):
-            free += w.earlier * system.compliance[i, j] * ports[FORCE, j]
-        ports[FREE, i] = free
-        ports[FREE_RATE, i] = next_rate(w, free - ports[DEFLECTION, i], ports[RATE, i], ports[ACCELERATION, i])
+        ports[FREE, i] = column_product(system.ports, i, solved)
+    for j in range(p):
+        add_row(system.compliance[j], w.earlier * ports[FORCE, j], ports[FREE])
+    for i in range(p):
+        change = ports[FREE, i] - ports[DEFLECTION, i]
+        ports[FREE_RATE, i] = next_rate(w, change, ports[RATE, i], ports[ACCELERATION, i])
     iterations = port_forces(system, ports, inputs, scratch, square, result)
     counts[STEPS] += 1
     counts[LINEAR_SOLVES] += 1
     counts[PORT_EVALUATIONS] += abs(iterations)
+    for j in range(p):
+        force = w.after * ports[NEXT_FORCE, j] + w.before * ports[FORCE, j]
+        add_row(system.response[j], force, solved)
+        add_row(system.compliance[j], ports[NEXT_FORCE, j], ports[FREE])
+    move(w, q, v, a, solved)
+    move(w, ports[DEFLECTION], ports[RATE], ports[ACCELERATION], ports[FREE])
     for i in range(p):
-        ports[STEP, i] = w.after * ports[NEXT_FORCE, i] + w.before * ports[FORCE, i]
-    for i in range(n):
-        total = solved[i]
-        for j in range(p):
-            total += system.response[i, j] * ports[STEP, j]
-        change = total - q[i]
-        rate, acceleration = v[i], a[i]
-        v[i] = next_rate(w, change, rate, acceleration)
-        a[i] = next_acceleration(w, change, rate, acceleration)
-        q[i] = total
-    for i in range(p):
-        total = ports[FREE, i]
-        for j in range(p):
-            total += system.compliance[i, j] * ports[NEXT_FORCE, j]
-        change = total - ports[DEFLECTION, i]
-        rate, acceleration = ports[RATE, i], ports[ACCELERATION, i]
-        ports[RATE, i] = next_rate(w, change, rate, acceleration)
-        ports[ACCELERATION, i] = next_acceleration(w, change, rate, acceleration)
-        ports[DEFLECTION, i], ports[FORCE, i] = total, ports[NEXT_FORCE, i]
+        ports[FORCE, i] = ports[NEXT_FORCE, i]
     if iterations < 0:
         return NO_CONVERGENCE
     return FINISHED if math.isfinite(q[0]) else NOT_FINITE
 
 
+def add_row(row, factor, total):
+    """Add a row times a factor."""
+    for i in range(len(total)):
+        total[i] += factor * row[i]
+
+
+def move(w, q, v, a, ends):
+    """Replace coordinates, rates and accelerations by those at the end of a step."""
+    for i in range(len(q)):
+        change, rate, acceleration = ends[i] - q[i], v[i], a[i]
+        v[i] = next_rate(w, change, rate, acceleration)
+        a[i] = w.change * change - w.change_rate * rate - w.change_acceleration * acceleration
+        q[i] = ends[i]
+
+
 def next_rate(w, change, rate, acceleration):
     """Rate at the end of a step in which a coordinate changes so much."""
     return w.slope * change + w.rate_rate * rate + w.rate_acceleration * acceleration
-
-
-def next_acceleration(w, change, rate, acceleration):
-    """Acceleration at the end of such a step."""
-    return w.change * change - w.change_rate * rate - w.change_acceleration * acceleration
 
 
 def march(
@@ -354,13 +368,13 @@ def march(
     `states` has rows.  Gives one of the reasons above; samples that are not reached stay as they
     are.
     """
-    n, p = state.shape[1], len(system.compliance)
+    n, p, dampers = state.shape[1], len(system.compliance), len(system.taken)
     work = matrix(buffer, 0, WORK_ROWS, n)
     ports = matrix(buffer, WORK_ROWS * n, PORT_ROWS, p)
     first = WORK_ROWS * n + PORT_ROWS * p
-    scratch = vector(buffer, first, 4 * p)
-    square = matrix(buffer, first + 4 * p, p, p + 1)
-    result = matrix(buffer, first + 4 * p + p * (p + 1), p, 3)
+    square = matrix(buffer, first, p, p + 1)
+    result = matrix(buffer, first + p * (p + 1), p, 3)
+    scratch = vector(buffer, first + p * (p + 4), 4 * p + 2 * dampers)
     buffers = scratch, square, result
     begin_ports(system, state, ports, inputs[0], scratch, result)
     for sample in range(len(histories)):

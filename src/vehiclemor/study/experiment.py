@@ -72,8 +72,12 @@ def make_experiment(
     """An experiment with present kernels, parameters and source; settings are complete ones."""
     if keep != "errors" and len(test) != 1:
         raise ValueError(f"{keep} are kept of one test scenario, not of {len(test)}")
-    if any(scenario.parameters != test[0].parameters for scenario in test):
-        raise InputError("the scenarios of a test set have several parameters; a test is of one model")
+    online = model.definition.online
+    fixed = {tuple(pair for pair in s.parameters if pair[0] not in online) for s in test}
+    if len(fixed) > 1:
+        raise InputError(
+            "the scenarios of a test set have several parameters; a test is of one model"
+        )
     return Experiment(
         model.name,
         model.kernel_hash,

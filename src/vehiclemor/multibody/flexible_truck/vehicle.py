@@ -58,6 +58,9 @@ def check(values: Mapping[str, Any]) -> None:
         if not x > further:
             raise GeometryError(f"the frame's {name} ({x:g} m) is not ahead of its {behind}")
     end = values["frame_length"] - values["front_overhang"]
+    time = values["frame_damping_ratio"] / (np.pi * values["frame_damping_frequency"])
+    if values["cab_mount_damping"] < time * values["cab_mount_stiffness"]:
+        raise GeometryError("the cab's mounts must damp at least as much as the frame for their stiffness")
     if not values["platform_front"] < values["platform_rear"] <= end + 1e-9:
         raise GeometryError("the platform must end behind its front, and not behind the frame")
 
@@ -71,7 +74,7 @@ def structure(values: Mapping[str, Any]) -> Structure:
         truck.structure.mass + payload * truck.payload,
         truck.structure.stiffness,
         truck.structure.damping_time,
-        truck.structure.damping,
+        truck.structure.dampers,
         truck.structure.ports,
         truck.structure.load + payload * truck.payload_load,
         truck.structure.outputs,
@@ -118,7 +121,7 @@ def _unladen(given: tuple[tuple[str, tuple[float, ...]], ...]) -> _Truck:
         mass=csc_array(block_diag([meshed.mass, none])) + on_nodes(mass + brackets),
         stiffness=csc_array(block_diag([meshed.stiffness, none])) + on_nodes(held),
         damping_time=time,
-        damping=on_nodes(damped * mounts.T @ mounts),
+        dampers=csc_array(spread.T @ csc_array(np.sqrt(damped) * mounts.T)),
         ports=csc_array(spread.T @ csc_array(ports.T)),
         load=np.append(frame_load, np.zeros(CAB + AXLES)) + spread.T @ (load + bracket_load),
         outputs=outputs,

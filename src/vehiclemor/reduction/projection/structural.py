@@ -1,6 +1,6 @@
 """Structures in a basis: Galerkin projection of their matrices, ports and outputs.
 
-q = V z about the static state, so M z'' + (E + d K) z' + K z = B f holds with V'MV in the place of
+q = V z about the static state, so M z'' + (W W' + d K) z' + K z = B f holds with V'MV in the place of
 M and so on; the law of the ports stays what it is.  Coordinates are turned so that V'MV is the
 identity and V'KV diagonal (K.-J. Bathe, Finite Element Procedures, 2014, chapter 10): what is left
 to solve in a step has few entries.
@@ -68,8 +68,8 @@ def projected(structure: Structure, basis: np.ndarray) -> tuple[Structure, np.nd
         mass=csc_array(eye_array(r)),
         stiffness=csc_array(np.diag(squares)),
         damping_time=structure.damping_time,
-        damping=csc_array(within(structure.damping, vectors)),
-        ports=csc_array(structure.ports.T @ vectors).T.tocsc(),
+        dampers=csc_array((structure.dampers.T @ vectors).T),
+        ports=csc_array((structure.ports.T @ vectors).T),
         load=np.zeros(r),
         outputs=(
             *(csc_array(c @ vectors) for c in (positions, rates, accelerations)),
@@ -192,7 +192,8 @@ class ReducedStructure(ShortRepr):
         s, r = self._first.structure, len(state) // 2
         elastic = s.stiffness @ (state[:r] + s.damping_time * state[r:])
         force = s.ports @ self._forces(state, inputs)[:, 0]
-        return np.concatenate([state[r:], force - elastic - s.damping @ state[r:]])
+        damped = s.dampers @ (s.dampers.T @ state[r:])
+        return np.concatenate([state[r:], force - elastic - damped])
 
     def outputs(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, outputs) of states (samples, 2 r) at inputs (samples, inputs)."""
@@ -217,8 +218,8 @@ class ReducedStructure(ShortRepr):
         if by == "state":
             slopes = self._forces(state, inputs)
             force = np.hstack([slopes[:, 1, None] * ports.T, slopes[:, 2, None] * ports.T])
-            elastic = s.stiffness.toarray()
-            linear = np.hstack([-elastic, -s.damping_time * elastic - s.damping.toarray()])
+            elastic, damped = s.stiffness.toarray(), (s.dampers @ s.dampers.T).toarray()
+            linear = np.hstack([-elastic, -s.damping_time * elastic - damped])
             rate = np.hstack([np.zeros((r, r)), np.eye(r)])
         else:
             x = np.concatenate(
