@@ -105,6 +105,19 @@ def test_a_short_beam_bends_and_shears_and_a_shaft_twists_as_in_closed_form():
     assert moved[3] == pytest.approx(load * length / (shear_modulus * section.torsion))
 
 
+def test_a_rail_stays_straight_under_a_load_at_its_centroid_and_its_shear_centre():
+    section, along = frame.Channel(0.243, 0.0765, 0.007), np.array([[-1.0, 0.0, 0.0]])
+    inward = np.array([0.0, -1.0, 0.0])
+    centre, shear = section.centroid * inward, section.shear_centre * inward
+    moves = beams._at_nodes(along, centre, shear)[0]
+    stiff = beams.matrices(np.array([2.0]), section, *STEEL)[0][0]
+    flexibility = np.linalg.inv((moves.T @ stiff @ moves)[6:, 6:])
+    axial = motions.moved(np.eye(6), centre).T @ [1e5, 0, 0, 0, 0, 0]
+    lifting = motions.moved(np.eye(6), shear).T @ [0, 0, 1e3, 0, 0, 0]
+    np.testing.assert_allclose((flexibility @ axial)[[1, 2, 3, 4, 5]], 0.0, atol=1e-12)
+    np.testing.assert_allclose((flexibility @ lifting)[[0, 1, 3, 5]], 0.0, atol=1e-12)
+
+
 def test_a_simply_supported_plate_of_shells_has_the_frequencies_of_kirchhoff():
     pytest.importorskip("pyfe3d")
     a, b, thin, count = 1.0, 0.7, 0.004, 40
@@ -114,6 +127,7 @@ def test_a_simply_supported_plate_of_shells_has_the_frequencies_of_kirchhoff():
     mesh = plates.mesh()
     mass, stiffness = shells.assembled(mesh, *STEEL)
     px, py, _ = mesh[0].T
+    assert mass[2::6, 2::6].sum() == pytest.approx(STEEL[2] * a * b * thin)
     free = np.zeros((len(px), 6), bool)
     free[:, 2:5] = True
     edge_x, edge_y = (px < 1e-9) | (px > a - 1e-9), (py < 1e-9) | (py > b - 1e-9)
@@ -207,6 +221,34 @@ def test_mass_centre_and_inertia_are_chronos(mesh):
     assert added[1, 5] == pytest.approx(3000 * x)
     assert added[3, 3] == pytest.approx(3000 * (2.4**2 / 12 + z**2))
     assert added[5, 5] == pytest.approx(3000 * ((2.4**2 + 5.0**2) / 12 + x**2))
+
+
+@pytest.mark.parametrize("mesh", [{}, {"shell_size": 0.35}])
+def test_a_rigid_motion_gives_outputs_and_deflections_by_geometry(mesh):
+    if mesh:
+        pytest.importorskip("pyfe3d")
+    v, structure = values(**mesh), truck(**mesh)
+    u = rigid_motions(v, structure)
+    _, _, heave, roll, pitch, _ = move = np.array([0.1, 0.2, 0.3, 0.01, 0.02, 0.03])
+    q = u @ move
+
+    def height(x, y):
+        return heave + roll * y - pitch * (x + v["sprung_distance"])
+
+    q[-4:] = height(0.0, 0.0), roll, height(-v["wheelbase"], 0.0), roll
+    corners = [(x, y) for x in (-1.2, -6.2) for y in (1.2, -1.2)]
+    expected = [height(0.0, 0.5), *(height(*corner) for corner in corners), *[0] * 10]
+    expected += [pitch, roll, *[0] * 29]
+    np.testing.assert_allclose(structure.outputs[0] @ q, expected, atol=1e-9)
+    wheels = [height(x, y) for x in (0.0, -4.5) for y in (1.035, -1.035)]
+    np.testing.assert_allclose(structure.ports.T @ q, [*[0] * 8, *wheels], atol=1e-9)
+    for matrix in structure.outputs[1:3]:
+        assert np.count_nonzero(np.abs(matrix @ q) > 1e-9) == 5
+    rails = motions.Motions(frame.layout(v), (0.0, -v["wheelbase"]))
+    centre, place = np.array([-1.748, 0.0, 0.744]), np.array([-2.0, 0.7, 1.5])
+    cab = np.array([v["cab_place"], 0.0, v["cab_height"]])
+    expected = motions.moved(np.eye(6), place - centre)[:3]
+    np.testing.assert_allclose(rails.body(place) @ rails.rigid(centre, cab), expected, atol=1e-12)
 
 
 def test_payload_changes_mass_and_load_alone():
