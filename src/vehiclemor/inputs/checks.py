@@ -60,7 +60,9 @@ def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
         extent = extent_of(maneuver)
         outside = np.flatnonzero((extent.low < low) | (extent.high > high))
         however_quick = np.full((2, len(low)), np.inf)
-        since = first_beyond(maneuver, np.vstack([low, high, however_quick])) if len(outside) else low
+        since = (
+            first_beyond(maneuver, np.vstack([low, high, however_quick])) if len(outside) else low
+        )
     if len(outside):
         j = outside[since[outside].argmin()]
         name, unit = definition.inputs[j].name, definition.inputs[j].unit

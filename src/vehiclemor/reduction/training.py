@@ -69,6 +69,7 @@ def difference(model: Model, other: Model) -> str:
     differing = (
         name
         for name, value in model.parameters.values().items()
-        if name not in (*OF_STARTS, *model.definition.online) and not np.array_equal(value, others[name])
+        if name not in (*OF_STARTS, *model.definition.online)
+        and not np.array_equal(value, others[name])
     )
     return next(differing, "")

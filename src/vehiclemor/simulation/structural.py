@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
-from vehiclemor.simulation.structural_loops import Columns, Marching, Weights
+from vehiclemor.simulation.structural_loops import Blocks, Columns, Marching, Weights
 from vehiclemor.simulation.trajectory import (
     STRUCTURAL_COUNTS,
     Names,
@@ -51,6 +52,8 @@ REASONS = {
 }
 # Runs whose step sizes are kept.
 MOST_RUNS = 1024
+# Numbers stored for each that is not zero, and columns, in a block of a factor.
+WASTE, WIDEST = 1.3, 32
 # Changes of port forces (N) at which a static state counts as found.
 STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 100
 
@@ -170,7 +173,7 @@ class StructuralSystem:
         cq, cv, ca, cf = s.outputs
         return Marching(
             mass=columns_of(mass),
-            factor=columns_of(without_diagonal(factor.L)),
+            factor=blocks_of(factor.L),
             ports=columns_of(beside),
             pivots=1.0 / factor.U.diagonal(),
             response=np.ascontiguousarray(response.T),
@@ -329,11 +332,45 @@ def factored(matrix: Any, order: str = "NATURAL") -> Any:
         raise GeometryError(f"the matrices of the structure are singular ({error})") from None
 
 
-def without_diagonal(low: Any) -> Any:
-    """A matrix without its diagonal."""
-    from scipy.sparse import tril
+def blocks_of(low: Any) -> Blocks:
+    """A lower triangular matrix in blocks of columns, as loops take it.
 
-    return tril(low, -1)
+    Neighbours share a block if that stores few zeros: long columns are quicker than few numbers.
+    """
+    low = low.tocsc()
+    low.sort_indices()
+    first, rows, n = low.indptr.tolist(), low.indices.astype(np.int64), low.shape[0]
+    columns, below, begin = [0], list[np.ndarray](), 0
+    wanted = rows[1 : first[1]]
+    for j in range(1, n + 1):
+        together = wanted[:0]
+        if j < n:
+            own = rows[first[j] + 1 : first[j + 1]]
+            together = np.union1d(wanted[wanted > j], own)
+            width = j + 1 - begin
+            stored = width * (width + 1) // 2 + width * len(together)
+            if stored <= WASTE * (first[j + 1] - first[begin]) and width <= WIDEST:
+                wanted = together
+                continue
+            together = own
+        columns.append(j)
+        below.append(wanted)
+        begin, wanted = j, together
+    parts = []
+    for (begin, end), others in zip(pairwise(columns), below, strict=True):
+        width = end - begin
+        block = np.zeros((width, width + len(others)))
+        for k in range(width):
+            here = slice(first[begin + k], first[begin + k + 1])
+            inside = rows[here] - begin
+            far = width + np.searchsorted(others, rows[here])
+            block[k, np.where(inside < width, inside, far)] = low.data[here]
+        parts.append(block.ravel())
+    places, row_places = (
+        np.cumsum([0, *map(len, part)]).astype(np.int64) for part in (parts, below)
+    )
+    numbers = np.array(columns, dtype=np.int64)
+    return Blocks(numbers, np.concatenate(below), row_places, np.concatenate(parts), places)
 
 
 @cache
@@ -456,7 +493,9 @@ class StructuralModel(Model):
         left = min(first[: len(limited)], default=len(times))
         if left < len(times):
             name = limited[first.index(left)]
-            failure = left_validity(self.definition, name, columns[left, first.index(left)], times[left])
+            failure = left_validity(
+                self.definition, name, columns[left, first.index(left)], times[left]
+            )
             histories[left:] = np.nan
         run = Trajectory.of(
             times=times,

@@ -34,7 +34,7 @@ MOST_ITERATIONS = 40
 # Rows of the state: coordinates, rates, accelerations.
 Q, V, A = range(3)
 # Rows of the work space.
-WORK_ROWS = 4
+WORK_ROWS = 5
 # Rows of what is known at the ports.
 DEFLECTION, RATE, ACCELERATION, FORCE, NEXT_FORCE, FREE, FREE_RATE, STEP = range(8)
 PORT_ROWS = 8
@@ -56,6 +56,26 @@ class Columns(NamedTuple):
     pieces: IntVector
     rows: IntVector
     values: Vector
+
+
+class Blocks(NamedTuple):
+    """A lower triangular matrix in blocks of neighbouring columns with the same rows below them.
+
+    Attributes
+    ----------
+    columns
+        First column of each block and, last, their number (blocks + 1,).
+    rows, row_places
+        Rows below the blocks, and where those of each begin (blocks + 1,).
+    values, places
+        Columns of the blocks, triangle and rows below, and where those of each begin (blocks + 1,).
+    """
+
+    columns: IntVector
+    rows: IntVector
+    row_places: IntVector
+    values: Vector
+    places: IntVector
 
 
 class Weights(NamedTuple):
@@ -128,7 +148,7 @@ class Marching(NamedTuple):
     """
 
     mass: Columns
-    factor: Columns
+    factor: Blocks
     ports: Columns
     pivots: Vector
     response: Matrix
@@ -177,17 +197,87 @@ def column_product(a, j, x):
     return total
 
 
-def solve(system, x):
-    """Solve S x = b in place, S = L D L'."""
-    low, n = system.factor, len(x)
-    for j in range(n):
-        factor = x[j]
-        for piece in range(low.pieces[j], low.pieces[j + 1]):
-            row, first = low.rows[2 * piece], low.rows[2 * piece + 1]
-            for k in range(low.rows[2 * piece + 3] - first):
-                x[row + k] -= low.values[first + k] * factor
-    for j in range(n - 1, -1, -1):
-        x[j] = x[j] * system.pivots[j] - column_product(low, j, x)
+def solve(low, pivots, x, gathered):
+    """Solve L D L' x = b in place; `pivots` are inverse, `gathered` (n,) is scratch space."""
+    blocks = len(low.columns) - 1
+    for number in range(blocks):
+        block, rows, own = part(low, number, x)
+        width, below = len(own), gathered[: len(rows)]
+        for k in range(width - 1):
+            column, factor = block[k], own[k]
+            for i in range(k + 1, width):
+                own[i] -= column[i] * factor
+        for i in range(len(rows)):
+            below[i] = 0.0
+        add_columns(block, width, own, below)
+        for i in range(len(rows)):
+            x[rows[i]] -= below[i]
+    for i in range(len(x)):
+        x[i] *= pivots[i]
+    for number in range(blocks - 1, -1, -1):
+        block, rows, own = part(low, number, x)
+        width, below = len(own), gathered[: len(rows)]
+        for i in range(len(rows)):
+            below[i] = x[rows[i]]
+        subtract_products(block, width, below, own)
+        for k in range(width - 1, -1, -1):
+            column, total = block[k], own[k]
+            for i in range(k + 1, width):
+                total -= column[i] * own[i]
+            own[k] = total
+
+
+def part(low, number, x):
+    """Columns of a block, rows below it, and its entries of x."""
+    first, end = low.columns[number], low.columns[number + 1]
+    rows = low.rows[low.row_places[number] : low.row_places[number + 1]]
+    width, place = end - first, low.places[number]
+    return matrix(low.values, place, width, width + len(rows)), rows, x[first:end]
+
+
+def add_columns(block, skipped, x, total):
+    """Add columns, without their first entries, times entries of x, four at a time."""
+    width, height, k = len(block), len(total), 0
+    while k + 3 < width:
+        a, b, c, d = block[k], block[k + 1], block[k + 2], block[k + 3]
+        a, b, c, d = a[skipped:], b[skipped:], c[skipped:], d[skipped:]
+        f, g, p, q = x[k], x[k + 1], x[k + 2], x[k + 3]
+        for i in range(height):
+            total[i] += (a[i] * f + b[i] * g) + (c[i] * p + d[i] * q)
+        k += 4
+    while k < width:
+        a, f = block[k][skipped:], x[k]
+        for i in range(height):
+            total[i] += a[i] * f
+        k += 1
+
+
+def subtract_products(block, skipped, given, x):
+    """Subtract products of such columns with a vector from entries of x, four at a time."""
+    width, height, k = len(block), len(given), 0
+    while k + 3 < width:
+        a, b, c, d = block[k], block[k + 1], block[k + 2], block[k + 3]
+        a, b, c, d = a[skipped:], b[skipped:], c[skipped:], d[skipped:]
+        f = g = p = q = 0.0
+        for i in range(height):
+            f += a[i] * given[i]
+            g += b[i] * given[i]
+            p += c[i] * given[i]
+            q += d[i] * given[i]
+        x[k] -= f
+        x[k + 1] -= g
+        x[k + 2] -= p
+        x[k + 3] -= q
+        k += 4
+    while k < width:
+        a, f, g = block[k][skipped:], 0.0, 0.0
+        for i in range(height // 2):
+            f += a[2 * i] * given[2 * i]
+            g += a[2 * i + 1] * given[2 * i + 1]
+        if height % 2:
+            f += a[height - 1] * given[height - 1]
+        x[k] -= f + g
+        k += 1
 
 
 def law(system, deflections, rates, inputs, x, result):
@@ -296,7 +386,7 @@ def advance(system, state, ports, work, inputs, buffers, counts):
         beside[i] = w.stiffness_share * k
         solved[i] = 0.0
     add_product(system.mass, mixed, solved)
-    solve(system, solved)
+    solve(system.factor, system.pivots, solved, work[4])
     for k in range(len(system.taken)):
         scratch[k] = column_product(system.ports, p + k, damped)
         scratch[len(system.taken) + k] = column_product(system.ports, p + k, solved)

@@ -60,7 +60,9 @@ def check(values: Mapping[str, Any]) -> None:
     end = values["frame_length"] - values["front_overhang"]
     time = values["frame_damping_ratio"] / (np.pi * values["frame_damping_frequency"])
     if values["cab_mount_damping"] < time * values["cab_mount_stiffness"]:
-        raise GeometryError("the cab's mounts must damp at least as much as the frame for their stiffness")
+        raise GeometryError(
+            "the cab's mounts must damp at least as much as the frame for their stiffness"
+        )
     if not values["platform_front"] < values["platform_rear"] <= end + 1e-9:
         raise GeometryError("the platform must end behind its front, and not behind the frame")
 

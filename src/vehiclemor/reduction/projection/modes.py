@@ -38,7 +38,9 @@ def fixed_modes(model: StructuralModel, highest: float) -> tuple[np.ndarray, np.
     n, p = structure.ports.shape
     # In a matrix of like sizes pivots stay where the factors are sparse.
     size = float(np.abs(structure.stiffness.diagonal()).mean())
-    held = block_array([[structure.stiffness, size * structure.ports], [size * structure.ports.T, None]])
+    held = block_array(
+        [[structure.stiffness, size * structure.ports], [size * structure.ports.T, None]]
+    )
     factor = splu(held.tocsc())
     units = np.vstack([np.zeros((n, p)), size * np.eye(p)])
     shapes = factor.solve(units)[:n]

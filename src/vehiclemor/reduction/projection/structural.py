@@ -222,9 +222,7 @@ class ReducedStructure(ShortRepr):
             linear = np.hstack([-elastic, -s.damping_time * elastic - damped])
             rate = np.hstack([np.zeros((r, r)), np.eye(r)])
         else:
-            x = np.concatenate(
-                [law.static[0] + ports.T @ state[:r], ports.T @ state[r:]]
-            )
+            x = np.concatenate([law.static[0] + ports.T @ state[:r], ports.T @ state[r:]])
             arrays = x, inputs, law.constants
             found = partial(law.kernels, "port_forces", arrays, 3 * p, PLACES["inputs"])
             force, linear = found.reshape(p, 3, -1)[:, 0], np.zeros((r, len(inputs)))
