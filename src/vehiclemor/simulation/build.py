@@ -143,7 +143,8 @@ def _structural(
     definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
 ) -> StructuralModel:
     """A model of sparse matrices and a port law; the matrices are made when they are needed."""
-    from vehiclemor.simulation.structural import STRUCTURAL_LOOPS, StructuralModel
+    from vehiclemor.simulation.structural import StructuralModel
+    from vehiclemor.simulation.structural_system import STRUCTURAL_LOOPS
 
     with blamed(f"model {definition.name!r}: check", definition.check):
         definition.check(values_of(definition, parameters.flat()))

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.simulation.structural import StructuralModel, factored
+from vehiclemor.simulation.sparse_factors import factored
+from vehiclemor.simulation.structural import StructuralModel
 
 # Modes that are looked for at first.
 FIRST_MODES = 16

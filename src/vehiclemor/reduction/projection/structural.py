@@ -1,7 +1,7 @@
 """Structures in a basis: Galerkin projection of their matrices, ports and outputs.
 
-q = V z about the static state, so M z'' + (W W' + d K) z' + K z = B f holds with V'MV in the place of
-M and so on; the law of the ports stays what it is.  Coordinates are turned so that V'MV is the
+q = V z about the static state: M z'' + (W W' + d K) z' + K z = B f holds with V'MV in the place
+of M and so on; the law of the ports stays what it is.  Coordinates are turned so that V'MV is the
 identity and V'KV diagonal (K.-J. Bathe, Finite Element Procedures, 2014, chapter 10): what is left
 to solve in a step has few entries.
 """
@@ -32,8 +32,8 @@ from vehiclemor.simulation.structural import (
     USUAL,
     Periods,
     StructuralModel,
-    StructuralSystem,
 )
+from vehiclemor.simulation.structural_system import StructuralSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory
 from vehiclemor.sizes import require
 
@@ -122,7 +122,7 @@ class ReducedStructure(ShortRepr):
         law, mass = self.model.system.law, self.model.system.structure.mass
         systems = tuple(StructuralSystem(structure, law) for structure, _ in self._modes)
         vectors = [modes for _, modes in self._modes]
-        pairs = zip(vectors, vectors[1:], strict=False)
+        pairs = pairwise(vectors)
         passed = tuple(after.T @ (mass @ before) for before, after in pairs)
         return Periods(systems, self.edges, passed)
 

@@ -1,0 +1,167 @@
+"""Structures with the law of their ports, full or reduced, as the time loop takes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.multibody.structure import Structure
+from vehiclemor.simulation import structural_loops as compiled
+from vehiclemor.simulation.paths import address_of
+from vehiclemor.simulation.sparse_factors import blocks_of, columns_of, factored, ordering
+from vehiclemor.simulation.structural_loops import Marching, Weights
+
+STRUCTURAL_LOOPS = ("simulation.sparse_loops", "simulation.structural_loops")
+# Spectral radius of the method at infinity.
+DAMPED = 0.8
+
+
+def weights_of(h: float, damping_time: float) -> tuple[Weights, tuple[float, float, float]]:
+    """Coefficients for a step of h s, and those of M, E and K in the matrix of a step."""
+    a_m, a_f = (2.0 * DAMPED - 1.0) / (DAMPED + 1.0), DAMPED / (DAMPED + 1.0)
+    beta, gamma = 0.25 * (1.0 - a_m + a_f) ** 2, 0.5 - a_m + a_f
+    slope, after = gamma / (beta * h), 1.0 - a_f
+    rate_rate, rate_acceleration = 1.0 - gamma / beta, h * (1.0 - 0.5 * gamma / beta)
+    of_mass, of_damping = (1.0 - a_m) / (beta * h * h), after * slope
+    of_stiffness = after + of_damping * damping_time
+    weights = Weights(
+        slope=slope,
+        rate_rate=rate_rate,
+        rate_acceleration=rate_acceleration,
+        change=1.0 / (beta * h * h),
+        change_rate=1.0 / (beta * h),
+        change_acceleration=0.5 / beta - 1.0,
+        mass_position=of_mass,
+        mass_rate=(1.0 - a_m) / (beta * h),
+        mass_acceleration=(1.0 - a_m) * (0.5 / beta - 1.0) - a_m,
+        damped_position=of_damping,
+        damped_rate=after * rate_rate + a_f,
+        damped_acceleration=after * rate_acceleration,
+        mass_share=of_mass / of_stiffness,
+        damping_share=of_damping / of_stiffness,
+        stiffness_share=1.0 / of_stiffness,
+        after=after,
+        before=a_f,
+        earlier=a_f / after,
+        damping_time=damping_time,
+    )
+    return weights, (of_mass, of_damping, of_stiffness)
+
+
+@dataclass(frozen=True, eq=False)
+class PortLaw:
+    """Forces of the ports, as equations declare them, about a static state.
+
+    Attributes
+    ----------
+    kernels, constants
+        Of the equations.
+    static
+        Deflections and forces (2, p) at the static state.
+    """
+
+    kernels: Any
+    constants: np.ndarray
+    static: np.ndarray
+
+    def at(self, deflections: np.ndarray, rates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Forces (p,) beyond the static ones and derivatives by deflections and rates, (p, 3)."""
+        x = np.concatenate([self.static[0] + deflections, rates])
+        found = np.empty((len(deflections), 3))
+        self.kernels.call("port_forces", x, np.ascontiguousarray(inputs), self.constants, found)
+        found[:, 0] -= self.static[1]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class StructuralSystem:
+    """A structure with the law of its ports, full or reduced, as the time loop takes it.
+
+    Coordinates are those of the motion about the static state.
+    """
+
+    structure: Structure
+    law: PortLaw
+    _marching: dict[float, Ready] = field(default_factory=dict)
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        """Order (n,) of the coordinates in which factors of the matrices stay sparse."""
+        return ordering(self.structure.mass + self.structure.stiffness)
+
+    def marching(self, h: float) -> Ready:
+        """The structure with a step size in s; its matrix is factored once."""
+        found = self._marching.get(h)
+        if found is None:
+            # A step whose error is estimated needs two.
+            if len(self._marching) > 3:
+                self._marching.pop(next(iter(self._marching)), None)
+            found = self._marching[h] = ready(self._prepared(h))
+        return found
+
+    def _prepared(self, h: float) -> Marching:
+        from scipy.sparse import hstack
+
+        s, order = self.structure, self.order
+        weights, (of_mass, of_damping, of_stiffness) = weights_of(h, s.damping_time)
+        mass, stiffness = (m[order][:, order] for m in (s.mass, s.stiffness))
+        factor, p = factored(of_mass * mass + of_stiffness * stiffness), s.ports.shape[1]
+        beside = hstack([s.ports, s.dampers]).tocsr()[order]
+        response = factor.solve(beside.toarray())
+        coupled = beside.T @ response
+        damped = coupled[p:, p:]
+        taken = of_damping * np.linalg.inv(np.eye(len(damped)) + of_damping * damped)
+        response[:, :p] -= response[:, p:] @ (taken @ coupled[p:, :p])
+        compliance = weights.after * (coupled[:p, :p] - coupled[:p, p:] @ taken @ coupled[p:, :p])
+        cq, cv, ca, cf = s.outputs
+        return Marching(
+            mass=columns_of(mass),
+            factor=blocks_of(factor.L),
+            ports=columns_of(beside),
+            pivots=1.0 / factor.U.diagonal(),
+            response=np.ascontiguousarray(response.T),
+            compliance=np.ascontiguousarray(0.5 * (compliance + compliance.T)),
+            kept=np.eye(len(damped)) - taken @ damped,
+            taken=taken,
+            weights=weights,
+            law=np.array([address_of(self.law.kernels, "port_forces")], dtype=np.int64),
+            constants=self.law.constants,
+            static=np.ascontiguousarray(self.law.static),
+            positions=columns_of(cq.tocsc()[:, order].T),
+            rates=columns_of(cv.tocsc()[:, order].T),
+            accelerations=columns_of(ca.tocsc()[:, order].T),
+            forces=columns_of(cf.T),
+        )
+
+    def march(
+        self, state: np.ndarray, inputs: np.ndarray, h: float, every: int, recorded: bool = False
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+        """A run in steps of h s from a state (3, n): coordinates, rates and accelerations.
+
+        Inputs (steps + 1, inputs) are those at all steps.  Gives outputs (samples, outputs) and
+        coordinates (samples, n), none unless recorded, at every so many steps; counts; and why it
+        has ended.  The state becomes the last one.
+        """
+        (_, n), p, samples = state.shape, self.law.static.shape[1], (len(inputs) - 1) // every + 1
+        histories = np.full((samples, self.structure.outputs[0].shape[0]), np.nan)
+        states = np.full((samples if recorded else 0, n), np.nan)
+        scratch = p * (p + 8) + 2 * self.structure.dampers.shape[1]
+        buffer = np.empty(compiled.WORK_ROWS * n + compiled.PORT_ROWS * p + scratch)
+        counts, order = np.zeros(3, dtype=np.int64), self.order
+        moved = np.ascontiguousarray(state[:, order])
+        arguments = moved, inputs, every, histories, states, buffer, counts
+        reason = structural_loop()(self.marching(h), *arguments)
+        state[:, order] = moved
+        if recorded:
+            states[:, order] = states.copy()
+        return histories, states, counts, reason
+
+
+@cache
+def structural_loop() -> Loop:
+    """The time loop of all structures."""
+    return loops(STRUCTURAL_LOOPS, ("march",))["march"]
