@@ -26,6 +26,8 @@ from vehiclemor.study.plans.protocol import FULL_ORDER
 
 Row = dict[str, Any]
 Part = str | Table
+# Measure of an error -> how it is printed.
+MEASURES = {"max": "largest", "rms": "RMS", "relative": "RMS of its range"}
 
 
 def comparison_text(what: str, rows: pd.DataFrame, folder: Path, every: bool = False) -> str:
@@ -295,7 +297,7 @@ def _winner_parts(
     """What validation has chosen: its targets, and its errors beside their bounds."""
     reached = [row | _judged(row) | {"target": row["item"]} for row in targets]
     for row in bounds:
-        kind = "largest" if row["measure"] == "max" else "RMS"
+        kind = MEASURES[row["measure"]]
         row["output"] = f"{row['item'].replace('_', ' ')}, {kind}"
     columns = {"target": Column(f"target for {winner['label']}")}
     columns |= {name: column(name) for name in ("limit", "measured", "word", "reason")}

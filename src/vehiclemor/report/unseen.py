@@ -18,7 +18,7 @@ import xarray as xr
 from vehiclemor.report.findings import NOT_COMPARABLE, OWN, judged, scatter
 from vehiclemor.report.labels import unit_of
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.plans.choice import outcomes
+from vehiclemor.study.plans.choice import errors_by, outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.results import judged_part, judged_set
 from vehiclemor.study.plans.study_file import SpeedTarget, StudyFile
@@ -97,7 +97,7 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: S
         "offline_seconds": float(part["offline_seconds"]),
     }
     for name, (output, measure) in error_columns(protocol).items():
-        errors: Any = part[f"{measure}_error"].sel(output=output).to_series()
+        errors: Any = errors_by(part, output, measure).to_series()
         # Of the runs that have come to their end.
         errors = errors[np.isfinite(errors)]
         row |= {f"worst_{name}": float(errors.max()), f"most_{name}": float(errors.quantile(0.99))}

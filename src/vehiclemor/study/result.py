@@ -168,8 +168,9 @@ def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
             "rms_error": rms(error),
             "max_error": max_abs(error),
             "signal_range": signal_range(full.outputs),
-            "rms_coordinate_error": rms(run.coordinates - full.coordinates),
         }
+        if model.coordinates:
+            found["rms_coordinate_error"] = rms(run.coordinates - full.coordinates)
         if model.speeds:
             found["rms_speed_error"] = rms(run.speeds - full.speeds)
     return found

@@ -123,7 +123,8 @@ def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protoc
 
 
 def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protocol:
-    model, straight = build(definition.model), definition.straight
+    model = build(definition.model, overrides=definition.parameters)
+    straight = definition.straight
     outputs = [*definition.bounds, *definition.reported, *definition.sensitive]
     for output in [*outputs, straight.output] if straight else outputs:
         choice(f"output of {model.name}", output, model.outputs)

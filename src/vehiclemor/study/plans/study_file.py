@@ -25,7 +25,7 @@ SEED, MOST_SEED = 20261122, 2**63 - 1
 SETS = ("training", "validation", "test", "outside")
 DRAWN = ("drawn", "drawn_outside")
 # Keys that go without bounds alone, and with bounds alone; and of a method.
-OF_GRIDS = ("grid", "sampling", "maneuver", "start", "training_set", "parameters", "keep")
+OF_GRIDS = ("grid", "sampling", "maneuver", "start", "training_set", "keep")
 OF_TESTS = (
     *(*SETS[1:], *DRAWN, "version", "seed", "reported", "sensitive"),
     *("targets", "failure_rate", "flagged_misses", "straight"),
@@ -88,10 +88,15 @@ Settings = dict[str, int | float | str]
 
 
 class Bound(FileSchema):
-    """Largest allowed error of an output: its RMS, or its largest absolute value."""
+    """Largest allowed error of an output.
 
-    measure: Literal["rms", "max"]
-    bound: float = Field(gt=0.0, allow_inf_nan=False, description="in the output's unit")
+    It is the error's RMS, its largest absolute value, or its RMS as part of the output's range.
+    """
+
+    measure: Literal["rms", "max", "relative"]
+    bound: float = Field(
+        gt=0.0, allow_inf_nan=False, description="in the output's unit, or 1 where it is relative"
+    )
     reason: str = Field("ours", min_length=1, description="where the number comes from")
 
 
