@@ -20,6 +20,7 @@ from vehiclemor.report.labels import of_kind, timing_cases
 from vehiclemor.report.printed_numbers import CLAIMS, TIMING, compared, number_criterion
 from vehiclemor.report.published import Claim, Number, load_published
 from vehiclemor.report.spectrum import spectrum_table
+from vehiclemor.report.sizes import size_rows
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
@@ -148,6 +149,9 @@ def study_comparison(
     """
     rows: list[Row] = []
     for dataset in run_studies(study, folder, jobs, seed=seed).values():
+        if "mesh" in dataset.dims:
+            rows += size_rows(dataset)
+            continue
         rows += protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
     return pd.DataFrame(rows)
 
