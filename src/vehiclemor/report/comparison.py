@@ -19,8 +19,8 @@ from vehiclemor.report.frames import frame, grid_rows
 from vehiclemor.report.labels import of_kind, timing_cases
 from vehiclemor.report.printed_numbers import CLAIMS, TIMING, compared, number_criterion
 from vehiclemor.report.published import Claim, Number, load_published
-from vehiclemor.report.spectrum import spectrum_table
 from vehiclemor.report.sizes import size_rows
+from vehiclemor.report.spectrum import spectrum_table
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build

@@ -11,7 +11,7 @@ from pydantic import Field
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost
-from vehiclemor.reduction.settings import Settings, StructuralTolerance
+from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.structural import USUAL, StructuralModel
@@ -25,6 +25,7 @@ class CoarseMeshSettings(Settings):
         "elements_per_bay = 1, shell_size = 0", description="parameters of the mesh, as in TOML"
     )
     tolerance: StructuralTolerance = USUAL
+    step_size: StructuralStep = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,7 @@ class CoarseMesh:
     model: StructuralModel
     mesh: str
     tolerance: float
+    step_size: float
     offline: OfflineCost
 
     def check_sizes(self) -> None:
@@ -61,7 +63,7 @@ class CoarseMesh:
     ) -> Trajectory:
         """A run at the maneuver's output times."""
         self.model.start(start)
-        return self.coarse.run(maneuver, None, self.tolerance, outputs)
+        return self.coarse.run(maneuver, None, self.tolerance, outputs, step=self.step_size)
 
     def best_approximation(self, states: object) -> None:
         """There is no subspace."""
@@ -83,7 +85,7 @@ def check(model: StructuralModel, settings: CoarseMeshSettings) -> None:
 
 def fit(model: StructuralModel, training: Training, settings: CoarseMeshSettings) -> CoarseMesh:
     """Nothing is fitted, and no training run is looked at."""
-    return CoarseMesh(model, settings.mesh, settings.tolerance, OfflineCost())
+    return CoarseMesh(model, settings.mesh, settings.tolerance, settings.step_size, OfflineCost())
 
 
 METHOD = Method(

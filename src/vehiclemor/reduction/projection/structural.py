@@ -21,7 +21,7 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.structure import Structure
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.projection.bases import RankTolerance
-from vehiclemor.reduction.settings import Settings, StructuralTolerance
+from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
@@ -46,6 +46,7 @@ class StructuralSettings(Settings):
     """What all reductions of structures share."""
 
     tolerance: StructuralTolerance = USUAL
+    step_size: StructuralStep = 0.0
 
 
 def projected(structure: Structure, basis: np.ndarray) -> tuple[Structure, np.ndarray]:
@@ -93,6 +94,8 @@ class ReducedStructure(ShortRepr):
         Times in s at which the next period begins.
     offline, tolerance
         Cost of making it; error by the step size, as of the full model.
+    step_size
+        In s, in the place of the tolerance; 0: by that.
     """
 
     model: StructuralModel
@@ -100,6 +103,7 @@ class ReducedStructure(ShortRepr):
     edges: tuple[float, ...]
     offline: OfflineCost
     tolerance: float
+    step_size: float = 0.0
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if there is no basis of the model's coordinates for each period."""
@@ -135,7 +139,7 @@ class ReducedStructure(ShortRepr):
     ) -> Trajectory:
         """A run at the maneuver's output times."""
         self.model.start(start)
-        return self.model.run(maneuver, self.periods, self.tolerance, outputs)
+        return self.model.run(maneuver, self.periods, self.tolerance, outputs, step=self.step_size)
 
     def best_approximation(self, states: np.ndarray) -> None:
         """Runs have no coordinates to project."""
@@ -256,7 +260,8 @@ def reduced(
     """The structure in its bases; offline cost from `began` (`time.process_time()`) on."""
     modes = tuple(projected(model.system.structure, basis)[1] for basis in bases)
     cost = OfflineCost(time.process_time() - began, evaluations)
-    return ReducedStructure(model, modes, tuple(map(float, edges)), cost, settings.tolerance)
+    edges = tuple(map(float, edges))
+    return ReducedStructure(model, modes, edges, cost, settings.tolerance, settings.step_size)
 
 
 class StructuralPodSettings(StructuralSettings):

@@ -26,7 +26,7 @@ def figure_size(results: Results) -> Figure:
     The three models of the paper stand beside the truck.  Hollow marks: the reduced model.
     """
     (dataset,) = results.values()
-    figure, axes = theme.panels(1, 2, (7.2, 3.6), layout="constrained")
+    figure, axes = theme.panels(1, 2, (7.2, 3.6))
     left, right = axes[0]
     n, kinds = dataset["coordinates_of_mesh"].values, dataset["kind"].values
     full = dataset["seconds_median"].sel(label=FULL).values

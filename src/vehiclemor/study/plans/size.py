@@ -64,7 +64,7 @@ def _measured(name: str, study: StudyFile, meshes: Sequence[Model], folder: Path
     assert size is not None
     chosen = component("maneuver", study.maneuver).perturbed(size.frequency, size.amplitude)
     with one_thread():
-        references = [_reference(model, chosen, folder) for model in meshes]
+        references = [_reference(model, chosen, size.step, folder) for model in meshes]
         fits = [_fits(study, model) for model in meshes]
         beside = [(strongest_full(model), rom(model)) for model in size.beside]
         labels = [FULL, *(entry.label or entry.method for entry in study.methods)]
@@ -123,18 +123,18 @@ def _kind(mesh: Mapping[str, float]) -> str:
     return next(iter(mesh))
 
 
-def _reference(model: Model, maneuver: Maneuver, folder: Path) -> xr.Dataset:
+def _reference(model: Any, maneuver: Maneuver, step: float, folder: Path) -> xr.Dataset:
     """Stored full-order outputs of a run; they do not depend on the machine."""
     import xarray as xr
 
     parameters = json.dumps({k: e.value for k, e in model.parameters.entries.items()})
     parts = model.kernel_hash, code_digest(model.name, "full_order", {}), parameters
-    run = maneuver.name, maneuver.frequency_factor, maneuver.amplitude_factor
+    run = maneuver.name, maneuver.frequency_factor, maneuver.amplitude_factor, step
     key = hashlib.sha256(json.dumps([parts, run]).encode()).hexdigest()[:16]
 
     def make() -> xr.Dataset:
         tell(f"full order of {model.name}, n = {model.size}", 0, 1)
-        found = model.run(maneuver)
+        found = model.run(maneuver, step=step)
         table = {"outputs": (("time", "output"), found.outputs), "steps": found.counts["steps"]}
         labels = {"time": found.times, "output": list(model.outputs)}
         about = attributes(f"full order of {model.name}", model.kernel_hash)
@@ -156,7 +156,8 @@ def _fits(study: StudyFile, model: Model) -> list[ReducedOrderModel | None]:
             found.append(None)
             continue
         tell(f"{label} of {model.name}, n = {model.size}", 0, 1)
-        settings = validated(method, model.kind, entry.settings, entry.preset)
+        own = {"step_size": study.size.step, **entry.settings}
+        settings = validated(method, model.kind, own, entry.preset)
         reduced = fitted(method, model, runs, settings)
         found.append(ReducedOrderModel(model, entry.method, settings.model_dump(), (), reduced))
     return found
@@ -177,7 +178,7 @@ def _timed(
     for row, (model, fits) in enumerate(models):
         short = n[row] > size.whole
         run, factor = (begun, maneuver.duration / size.window) if short else (maneuver, 1.0)
-        calls[row, 0] = partial(model.run, run), factor
+        calls[row, 0] = partial(model.run, run, step=size.step), factor
         for column, reduced in enumerate(fits, start=1):
             if reduced is not None:
                 calls[row, column] = partial(reduced.simulate, maneuver), 1.0

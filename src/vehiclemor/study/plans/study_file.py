@@ -230,6 +230,7 @@ class Size(FileSchema):
     )
     frequency: float = Field(1.0, gt=0.0, description="factor of the maneuver")
     amplitude: float = Field(1.0, description="factor of the maneuver")
+    step: float = Field(1e-3, gt=0.0, description="s, the same of all runs")
     whole: int = Field(1000, description="coordinates up to which full order is timed over the run")
     window: float = Field(1.0, gt=0.0, description="s of the run, over which it is timed beyond")
     up_to: dict[str, int] = _table("label -> coordinates of the largest mesh that it is made of")
