@@ -109,7 +109,7 @@ class Periods:
             if recorded:
                 states[first : end + 1] = part[1]
             first = end
-        return histories, states, sum(part[2] for part in parts), parts[-1][3]
+        return histories, states, np.sum([part[2] for part in parts], axis=0), parts[-1][3]
 
     def steps(self, maneuver: Maneuver, tolerance: float) -> int:
         """Steps between output times, so many that outputs are as accurate as asked for.

@@ -5,7 +5,9 @@ Whoever wants a cheaper model of a structure can make larger elements.
 
 import tomllib
 from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import InputError
@@ -51,7 +53,7 @@ class CoarseMesh:
         """The model on the coarse mesh."""
         found = self.__dict__.get("_coarse")
         if found is None:
-            found = self.__dict__["_coarse"] = reparametrised(self.model, parameters(self.mesh))
+            found = self.__dict__["_coarse"] = on_mesh(self.model, self.mesh)
         return found
 
     def for_model(self, model: StructuralModel) -> "CoarseMesh":
@@ -65,9 +67,14 @@ class CoarseMesh:
         self.model.start(start)
         return self.coarse.run(maneuver, None, self.tolerance, outputs, step=self.step_size)
 
-    def best_approximation(self, states: object) -> None:
+    def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace."""
         del states
+
+
+def on_mesh(model: StructuralModel, mesh: str) -> Any:
+    """The model on a mesh; `InputError` if there is no such mesh."""
+    return reparametrised(model, parameters(mesh))
 
 
 def parameters(mesh: str) -> dict[str, float]:
@@ -80,7 +87,7 @@ def parameters(mesh: str) -> dict[str, float]:
 
 def check(model: StructuralModel, settings: CoarseMeshSettings) -> None:
     """Raise `InputError` if the mesh is none."""
-    reparametrised(model, parameters(settings.mesh))
+    on_mesh(model, settings.mesh)
 
 
 def fit(model: StructuralModel, training: Training, settings: CoarseMeshSettings) -> CoarseMesh:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -165,7 +165,7 @@ class FullOrderStructure(FullOrder):
 
 
 def fit(
-    model: Model,
+    model: Any,
     training: Training,
     settings: AlgebraicSettings | DynamicSettings | StructuralSettings,
 ) -> FullOrder:

@@ -73,7 +73,9 @@ def projected(structure: Structure, basis: np.ndarray) -> tuple[Structure, np.nd
         ports=csc_array((structure.ports.T @ vectors).T),
         load=np.zeros(r),
         outputs=(
-            *(csc_array(c @ vectors) for c in (positions, rates, accelerations)),
+            csc_array(positions @ vectors),
+            csc_array(rates @ vectors),
+            csc_array(accelerations @ vectors),
             forces,
         ),
     )
@@ -111,7 +113,7 @@ class ReducedStructure(ShortRepr):
         require(len(self.bases) == len(self.edges) + 1 > 0, "edges")
         require(all(basis.ndim == 2 and len(basis) == n for basis in self.bases), "bases")
 
-    @cached_property
+    @property
     def order(self) -> int:
         """Largest number of reduced coordinates in any period."""
         return max(basis.shape[1] for basis in self.bases)
@@ -255,13 +257,13 @@ def reduced(
     settings: StructuralSettings,
     began: float,
     evaluations: int = 0,
-    edges: Sequence[float] = (),
+    edges: Sequence[float] | np.ndarray = (),
 ) -> ReducedStructure:
     """The structure in its bases; offline cost from `began` (`time.process_time()`) on."""
     modes = tuple(projected(model.system.structure, basis)[1] for basis in bases)
     cost = OfflineCost(time.process_time() - began, evaluations)
-    edges = tuple(map(float, edges))
-    return ReducedStructure(model, modes, edges, cost, settings.tolerance, settings.step_size)
+    ends = tuple(map(float, edges))
+    return ReducedStructure(model, modes, ends, cost, settings.tolerance, settings.step_size)
 
 
 class StructuralPodSettings(StructuralSettings):
@@ -288,7 +290,8 @@ def fit_windows(
     """
     began, evaluations, parts = time.process_time(), 0, []
     for run in training:
-        recorded = run.model.run(run.maneuver, recorded=True)
+        full: Any = run.model
+        recorded = full.run(run.maneuver, recorded=True)
         evaluations += recorded.counts["port_evaluations"]
         parts.append((recorded.times, recorded.coordinates))
     bases = []

@@ -28,7 +28,6 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import fitted, validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.study.plans.loading import content_hash
 from vehiclemor.study.plans.study_file import StudyFile
@@ -48,7 +47,7 @@ ROUNDS = 5
 def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
     """Times and errors on the dimensions `mesh`, `label` and `group`; stored, as are its runs."""
     assert study.size is not None
-    meshes = [build(study.model, overrides=mesh) for mesh in study.size.meshes]
+    meshes: list[Any] = [build(study.model, overrides=mesh) for mesh in study.size.meshes]
     codes = [code_digest(study.model, e.method, dict(e.settings)) for e in study.methods]
     content = [study.model_dump_json(), *codes, meshes[0].kernel_hash, machine(), ROUNDS]
     text = json.dumps([*content, compiler_identity()])
@@ -57,7 +56,7 @@ def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
     return stored(combined_path(folder, name), "size", key, make, content=content_hash(study))
 
 
-def _measured(name: str, study: StudyFile, meshes: Sequence[Model], folder: Path) -> xr.Dataset:
+def _measured(name: str, study: StudyFile, meshes: Sequence[Any], folder: Path) -> xr.Dataset:
     import xarray as xr
 
     size = study.size
@@ -143,7 +142,7 @@ def _reference(model: Any, maneuver: Maneuver, step: float, folder: Path) -> xr.
     return stored(folder / "references" / f"{key}.nc", "reference", key, make)
 
 
-def _fits(study: StudyFile, model: Model) -> list[ReducedOrderModel | None]:
+def _fits(study: StudyFile, model: Any) -> list[ReducedOrderModel | None]:
     """Every method of a study fitted to a mesh; none where the mesh is larger than it is made."""
     assert study.size is not None
     found: list[ReducedOrderModel | None] = []
@@ -166,7 +165,7 @@ def _fits(study: StudyFile, model: Model) -> list[ReducedOrderModel | None]:
 def _timed(
     name: str,
     size: Any,
-    models: Sequence[tuple[Model, list[ReducedOrderModel | None]]],
+    models: Sequence[tuple[Any, list[ReducedOrderModel | None]]],
     beside: Sequence[tuple[ReducedOrderModel, ReducedOrderModel]],
     maneuver: Maneuver,
     n: Sequence[int],
