@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,6 +48,8 @@ def size_rows(dataset: xr.Dataset) -> Iterator[Row]:
                 "seconds": time,
                 "gain_mesh": float(full[place] / time),
                 "offline_seconds": float(own["offline"]),
+                "growth_full": growth(dataset, str(dataset["kind"].values[place]), FULL),
+                "growth": growth(dataset, str(dataset["kind"].values[place]), label),
                 "break_even": float(own["offline"] / saved) if saved > 0.0 else np.nan,
             }
             for group in GROUPS:
@@ -91,15 +93,16 @@ def growth(dataset: xr.Dataset, kind: str, label: str) -> float:
     return float(np.polyfit(np.log(n[chosen]), np.log(seconds[chosen]), 1)[0])
 
 
-def growth_text(dataset: xr.Dataset) -> str:
-    """Growth of the time with the number of coordinates, by kind of mesh, in one line."""
+def growth_text(rows: Sequence[Row]) -> str:
+    """Growth of the times with the number of coordinates, by kind of mesh, in one sentence."""
+    found = {
+        row["mesh_kind"]: row for row in reversed(rows) if row["growth_full"] == row["growth_full"]
+    }
     parts = [
-        f"{word}: full n^{growth(dataset, kind, FULL):.2f}, "
-        f"Craig-Bampton n^{growth(dataset, kind, 'Craig-Bampton'):.2f}"
-        for kind, (word, _) in KINDS.items()
-        if "Craig-Bampton" in dataset["label"].values
+        f"{KINDS[kind][0]}: full n^{row['growth_full']:.2f}, {row['label']} n^{row['growth']:.2f}"
+        for kind, row in sorted(found.items())
     ]
-    return "; ".join(parts)
+    return f"Times grow with the number n of coordinates ({'; '.join(parts)})."
 
 
 COSTS = {
