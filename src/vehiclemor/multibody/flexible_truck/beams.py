@@ -33,15 +33,15 @@ def matrices(
     modulus, poisson_ratio, density = material
     shear_modulus = modulus / (2.0 * (1.0 + poisson_ratio))
     stiffness, mass = np.zeros((2, len(lengths), 12, 12))
-    l = lengths[:, None, None]  # noqa: E741
+    length = lengths[:, None, None]
     polar = section.upright + section.sideways
     for row, rigidity, inertia in (
         (0, modulus * section.area, density * section.area),
         (3, shear_modulus * section.torsion, density * polar),
     ):
         own = (slice(None), *np.ix_([row, row + 6], [row, row + 6]))
-        stiffness[own] = rigidity / l * [[1, -1], [-1, 1]]
-        mass[own] = inertia * l / 6.0 * [[2, 1], [1, 2]]
+        stiffness[own] = rigidity / length * [[1, -1], [-1, 1]]
+        mass[own] = inertia * length / 6.0 * [[2, 1], [1, 2]]
     # A slope about y lowers the far end.
     for rows, second_moment, shear_area, sign in (
         ([2, 4, 8, 10], section.upright, section.shear_areas[0], -1.0),
@@ -49,11 +49,11 @@ def matrices(
     ):
         own = (slice(None), *np.ix_(rows, rows))
         rigidity = modulus * second_moment
-        shear = 12.0 * rigidity / (shear_modulus * shear_area * l**2)
-        slopes = np.where([False, True, False, True], sign * l, 1.0)
+        shear = 12.0 * rigidity / (shear_modulus * shear_area * length**2)
+        slopes = np.where([False, True, False, True], sign * length, 1.0)
         scale = slopes * slopes.swapaxes(1, 2)
-        stiffness[own] = rigidity / (l**3 * (1.0 + shear)) * scale * (BENDING + shear * SHEAR)
-        mass[own] = density * section.area * l / 420.0 * scale * INERTIA
+        stiffness[own] = rigidity / (length**3 * (1.0 + shear)) * scale * (BENDING + shear * SHEAR)
+        mass[own] = density * section.area * length / 420.0 * scale * INERTIA
     return stiffness, mass
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ BAY = 0.7
 SAME = 1e-6
 
 
-class Section(NamedTuple):
+class Section:
     """Thin-walled section of one web, a C, or of two, a box; lengths of its middle line in m.
 
     Formulas: Young and Budynas, *Roark's Formulas for Stress and Strain* (7th ed.), tables A.1,
@@ -37,34 +37,23 @@ class Section(NamedTuple):
         Torsion constant in m4: St. Venant's of a C, Bredt's of a box.
     """
 
-    height: float
-    width: float
-    thickness: float
-    area: float
-    shear_areas: tuple[float, float]
-    centroid: float
-    shear_centre: float
-    upright: float
-    sideways: float
-    torsion: float
+    def __init__(self, h: float, b: float, t: float, webs: int) -> None:
+        self.height, self.width, self.thickness = h, b, t
+        self.area = t * (webs * h + 2.0 * b)
+        self.centroid = t * (b**2 + (webs - 1) * h * b) / self.area
+        self.upright = t * h**2 * (webs * h / 12.0 + b / 2.0)
+        about_web = t * (2.0 * b**3 / 3.0 + (webs - 1) * h * b**2)
+        self.sideways = about_web - self.area * self.centroid**2
+        if webs == 1:
+            self.shear_centre = -3.0 * b**2 / (6.0 * b + h)
+            self.shear_areas = t * h, 5.0 / 3.0 * t * b
+            self.torsion = t**2 * self.area / 3.0
+        else:
+            self.shear_centre = b / 2.0
+            self.shear_areas = 2.0 * t * h, 2.0 * t * b
+            self.torsion = 2.0 * t * (h * b) ** 2 / (h + b)
 
 
-def section(h: float, b: float, t: float, webs: int) -> Section:
-    """Section from height, width and thickness, with one web or two."""
-    area, box = t * (webs * h + 2.0 * b), webs == 2
-    centroid = t * (b**2 + (webs - 1) * h * b) / area
-    return Section(
-        *(h, b, t, area),
-        shear_areas=(webs * t * h, (2.0 if box else 5.0 / 3.0) * t * b),
-        centroid=centroid,
-        shear_centre=b / 2.0 if box else -3.0 * b**2 / (6.0 * b + h),
-        upright=t * h**2 * (webs * h / 12.0 + b / 2.0),
-        sideways=t * (2.0 * b**3 / 3.0 + (webs - 1) * h * b**2) - area * centroid**2,
-        torsion=2.0 * t * (h * b) ** 2 / (h + b) if box else t**2 * area / 3.0,
-    )
-
-
-@dataclass(frozen=True)
 class Layout:
     """Geometry and material of the ladder: two rails, a cross member in every plane but one.
 
@@ -74,6 +63,10 @@ class Layout:
         x (stations,) in m, from front to rear.
     planes
         Numbers of the stations of axles, cab mounts, gearbox and ends.
+    crossings
+        Numbers of the stations with a cross member.
+    gauged
+        Numbers of five bays with strains: next to axles and gearbox, and between.
     sides, height
         y (2,) of the left and the right rail's web, and z of its middle; in m.
     rail, cross
@@ -82,24 +75,20 @@ class Layout:
         Modulus in N/m2, Poisson's ratio, density in kg/m3.
     """
 
-    stations: np.ndarray
-    planes: dict[str, int]
-    sides: np.ndarray
-    height: float
-    rail: Section
-    cross: Section
-    material: tuple[float, float, float]
-
-    @property
-    def crossings(self) -> list[int]:
-        """Numbers of the stations with a cross member."""
-        return [n for name, n in self.planes.items() if name != "front cab mounts"]
-
-    @property
-    def gauged(self) -> list[int]:
-        """Numbers of five bays with strains: next to axles and gearbox, and between."""
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        places = planes(values)
+        parts = np.ceil(-np.diff(list(places.values())) / BAY - 1e-9).astype(int)
+        self.stations = divided(list(places.values()), parts)
+        self.planes = dict(zip(places, [0, *np.cumsum(parts).tolist()], strict=True))
+        self.crossings = [n for name, n in self.planes.items() if name != "front cab mounts"]
         front, gearbox, rear = (self.planes[n] for n in ("front axle", "gearbox", "rear axle"))
-        return [front, gearbox - 1, (gearbox + rear - 1) // 2, rear - 1, rear]
+        self.gauged = [front, gearbox - 1, (gearbox + rear - 1) // 2, rear - 1, rear]
+        self.sides = np.array([0.5, -0.5]) * values["rail_spacing"]
+        self.height = values["frame_height"]
+        thick, depth = values["rail_thickness"], values["rail_depth"] - values["rail_thickness"]
+        self.rail = Section(depth, values["rail_flange"] - thick / 2.0, thick, webs=1)
+        self.cross = Section(depth, values["cross_width"], values["cross_thickness"], webs=2)
+        self.material = values["modulus"], values["poisson_ratio"], values["density"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,23 +130,6 @@ def planes(values: Mapping[str, Any]) -> dict[str, float]:
         "rear axle": -values["wheelbase"],
         "rear end": front - values["frame_length"] + half,
     }
-
-
-def layout(values: Mapping[str, Any]) -> Layout:
-    """Layout from the parameters."""
-    places = planes(values)
-    parts = np.ceil(-np.diff(list(places.values())) / BAY - 1e-9).astype(int)
-    numbers = [0, *np.cumsum(parts).tolist()]
-    thickness, depth = values["rail_thickness"], values["rail_depth"] - values["rail_thickness"]
-    return Layout(
-        stations=divided(list(places.values()), parts),
-        planes=dict(zip(places, numbers, strict=True)),
-        sides=np.array([0.5, -0.5]) * values["rail_spacing"],
-        height=values["frame_height"],
-        rail=section(depth, values["rail_flange"] - thickness / 2.0, thickness, webs=1),
-        cross=section(depth, values["cross_width"], values["cross_thickness"], webs=2),
-        material=(values["modulus"], values["poisson_ratio"], values["density"]),
-    )
 
 
 def divided(corners: Sequence[float] | np.ndarray, parts: np.ndarray) -> np.ndarray:

@@ -26,9 +26,11 @@ class Motions:
     cab
         Heave, pitch and roll (3, N).
     axles
-        Heave and roll (2, 2, N) of the front and of the rear axle.
+        Heave and roll (2, N) of the front and of the rear axle by name.
     middles
         Displacements along, across and upward and roll (stations, 4, N) of both rails together.
+    pitch, roll, twist, yaw
+        Angles (N,) of the frame between the axles; roll is the mean, twist front less rear.
     """
 
     def __init__(self, ladder: Layout) -> None:
@@ -36,15 +38,32 @@ class Motions:
         size = 12 * len(ladder.stations) + OTHERS
         rows = np.eye(size)
         self.rails = rows[:-OTHERS].reshape(-1, 2, 6, size)
-        self.cab, self.axles = rows[-OTHERS:-4], rows[-4:].reshape(2, 2, size)
+        self.cab, self.axles = rows[-OTHERS:-4], {"front": rows[-4:-2], "rear": rows[-2:]}
         left, right = self.rails[:, 0], self.rails[:, 1]
         self.middles = (left + right)[:, :4] / 2.0
         self.middles[:, 3] = (left[:, 2] - right[:, 2]) / (ladder.sides[0] - ladder.sides[1])
         at = [ladder.planes["front axle"], ladder.planes["rear axle"]]
         self.front, self.rear = self.middles[at]
         self.ahead, self.behind = ladder.stations[at]
-        self.pitch = (self.rear[2] - self.front[2]) / (self.ahead - self.behind)
-        self.yaw = (self.front[1] - self.rear[1]) / (self.ahead - self.behind)
+        change, length = self.front - self.rear, self.ahead - self.behind
+        self.pitch, self.yaw = -change[2] / length, change[1] / length
+        self.roll, self.twist = (self.front[3] + self.rear[3]) / 2.0, change[3]
+
+    def rail(self, plane: str, y: float) -> np.ndarray:
+        """Height (N,) of the rail in a plane, at the end of a rigid arm that reaches y (m)."""
+        side = int(y < 0.0)
+        motion = self.rails[self.ladder.planes[plane], side]
+        return motion[2] + (y - self.ladder.sides[side]) * motion[3]
+
+    def axle(self, end: str, y: float) -> np.ndarray:
+        """Height (N,) of an axle at y (m)."""
+        heave, roll = self.axles[end]
+        return heave + y * roll
+
+    def in_cab(self, x: float, y: float) -> np.ndarray:
+        """Height (N,) of the cab at x and y (m) from its centre."""
+        heave, pitch, roll = self.cab
+        return heave + y * roll - x * pitch
 
     def body(self, places: np.ndarray) -> np.ndarray:
         """Displacements (points, 3, N) of points (points, 3) of what rests on the frame.

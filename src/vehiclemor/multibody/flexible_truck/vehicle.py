@@ -21,7 +21,7 @@ import numpy as np
 
 from vehiclemor.exceptions import GeometryError, InputError
 from vehiclemor.multibody.flexible_truck import beams, shells
-from vehiclemor.multibody.flexible_truck.frame import layout, levers, planes
+from vehiclemor.multibody.flexible_truck.frame import Layout, levers, planes
 from vehiclemor.multibody.flexible_truck.motions import OTHERS, Motions, block
 from vehiclemor.multibody.flexible_truck.quantities import ENDS, OUTPUTS, STRAINS
 from vehiclemor.multibody.structure import Structure
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 # Finest mesh of shells (m): there are no more elements than a bay of beams can have.
 FINEST = 0.02
 AXES = ("roll", "pitch", "yaw")
+# Left and right.
+SIDES = (1.0, -1.0)
 
 
 def check(values: Mapping[str, Any]) -> None:
@@ -66,7 +68,7 @@ def damping_time(values: Mapping[str, Any]) -> float:
 
 def structure(values: Mapping[str, Any]) -> Structure:
     """Matrices of the truck; another payload needs no new frame."""
-    given = {name: tuple(x) if np.ndim(x) else float(x) for name, x in values.items()}
+    given: dict[str, Any] = {n: tuple(x) if np.ndim(x) else float(x) for n, x in values.items()}
     payload = given.pop("payload")
     truck, added, upward = _unladen(tuple(given.items()))
     mass = truck.mass + payload * added
@@ -79,16 +81,18 @@ def _unladen(given: tuple[tuple[str, Any], ...]) -> tuple[Structure, csc_array, 
     from scipy.sparse import block_diag, csc_array, eye_array
 
     v = dict(given)
-    ladder = layout(v)
-    if v["shell_size"]:
-        frame = shells.frame(ladder, v["shell_size"])
-    else:
-        frame = beams.frame(ladder, int(v["elements_per_bay"]))
+    ladder = Layout(v)
+    size, parts = v["shell_size"], int(v["elements_per_bay"])
+    frame = shells.frame(ladder, size) if size else beams.frame(ladder, parts)
     # s = spread q, as `Motions` has it.
     spread = csc_array(block_diag([frame.sections, eye_array(OTHERS)]))
     size = 6 * len(frame.nodes) + OTHERS
     for matrix, rows in ((frame.mass, size), (frame.stiffness, size), (frame.strains, STRAINS)):
         matrix.resize(rows, size)
+
+    def on_nodes(rows: list[np.ndarray]) -> csc_array:
+        """Motions (k, n) by the coordinates from those by s."""
+        return csc_array(csc_array(np.array(rows)) @ spread)
 
     def weighted(rows: np.ndarray, weights: Any) -> csc_array:
         """Matrix (n, n) of masses or springs by the motions (k, N) they take part in."""
@@ -100,42 +104,42 @@ def _unladen(given: tuple[tuple[str, Any], ...]) -> tuple[Structure, csc_array, 
 
     moving = Motions(ladder)
     centre = np.array([-v["sprung_distance"], 0.0, v["sprung_height"]])
-    along, across, _ = moving.body(centre[None])[0]
-    sprung = [v["sprung_mass"]] * 3 + [v[f"{axis}_inertia"] for axis in AXES]
-    hold = np.array([sprung[0], sprung[0], sprung[-1]]) * (2.0 * np.pi * v["hold_frequency"]) ** 2
-    mounts, time = _mounts(moving, v), damping_time(v)
-    damped = v["cab_mount_damping"] - time * v["cab_mount_stiffness"]
-    # Motion of all that is sprung as one body, about its centre.
     cab = np.array([v["cab_place"], 0.0, v["cab_height"]])
+    # Motion of all that is sprung as one body, about its centre.
     rigid = np.zeros((size, 6))
     rigid[:-OTHERS] = np.concatenate(levers(frame.nodes - centre))
     rigid[-OTHERS:-4] = levers((cab - centre)[None])[0, [2, 4, 3]]
-    mass = frame.mass + weighted(*_cab(moving, v))
-    mass += points(*_rest(np.diag(sprung) - rigid.T @ mass @ rigid, centre))
-    mass += weighted(
-        np.concatenate(moving.axles),
-        [v[f"{end}_axle_{kind}"] for end in ENDS for kind in ("mass", "inertia")],
-    )
     upward = rigid[:, 2].copy()
     upward[[-4, -2]] = 1.0
-    front, rear = moving.front, moving.rear
-    ports = csc_array(spread.T @ csc_array(_ports(moving, v).T))
+    sprung = [v["sprung_mass"]] * 3 + [v[f"{axis}_inertia"] for axis in AXES]
+    axles = [v[f"{end}_axle_{kind}"] for end in ENDS for kind in ("mass", "inertia")]
+    mass = frame.mass + weighted(*_cab(moving, v))
+    mass += points(*_rest(np.diag(sprung) - rigid.T @ mass @ rigid, centre))
+    mass += weighted(np.concatenate(list(moving.axles.values())), axles)
+    along, across, _ = moving.body(centre[None])[0]
+    hold = np.array([sprung[0], sprung[0], sprung[-1]]) * (2.0 * np.pi * v["hold_frequency"]) ** 2
+    reaches = zip(ENDS, (v["cab_mount_distance"], -v["cab_mount_distance"]), strict=True)
+    mounts = np.array(
+        [
+            moving.in_cab(x, y) - moving.rail(f"{end} cab mounts", y)
+            for end, x in reaches
+            for y in ladder.sides
+        ]
+    )
+    stiffness = frame.stiffness + weighted(mounts, [v["cab_mount_stiffness"]] * 4)
+    stiffness += weighted(np.array([along, across, moving.yaw]), hold)
+    time = damping_time(v)
+    damped = v["cab_mount_damping"] - time * v["cab_mount_stiffness"]
+    ports = on_nodes(_ports(moving, v))
+    heights, angles = _heights(moving, v), [moving.pitch, moving.roll, moving.twist]
     truck = Structure(
         mass=mass,
-        stiffness=frame.stiffness
-        + weighted(mounts, [v["cab_mount_stiffness"]] * 4)
-        + weighted(np.array([along, across, moving.yaw]), hold),
+        stiffness=stiffness,
         damping_time=time,
-        dampers=csc_array(spread.T @ csc_array(np.sqrt(damped) * mounts.T)),
-        ports=ports,
+        dampers=csc_array(np.sqrt(damped) * on_nodes(list(mounts)).T),
+        ports=csc_array(ports.T),
         load=np.zeros(size),
-        outputs=_outputs(
-            csc_array(_heights(moving, v)) @ spread,
-            csc_array(np.array([moving.pitch, front[3] / 2.0 + rear[3] / 2.0, front[3] - rear[3]]))
-            @ spread,
-            ports,
-            frame.strains,
-        ),
+        outputs=_outputs(on_nodes(heights), on_nodes(angles), ports, frame.strains),
     )
     front, rear = v["platform_front"], v["platform_rear"]
     shares, places = block(np.array([rear - front, v["platform_width"], 0.0]) / 2.0)
@@ -168,48 +172,23 @@ def _rest(body: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return mass * shares, centre + first / mass + places @ axes.T
 
 
-def _mounts(moving: Motions, v: Mapping[str, Any]) -> np.ndarray:
-    """Lengthening (4, N) of the cab's mounts, which stand on the rails."""
-    heave, pitch, roll = moving.cab
-    return np.array(
-        [
-            heave + y * roll - reach * pitch - moving.rails[moving.ladder.planes[plane], side, 2]
-            for plane, reach in (
-                ("front cab mounts", v["cab_mount_distance"]),
-                ("rear cab mounts", -v["cab_mount_distance"]),
-            )
-            for side, y in enumerate(moving.ladder.sides)
-        ]
-    )
-
-
-def _ports(moving: Motions, v: Mapping[str, Any]) -> np.ndarray:
+def _ports(moving: Motions, v: Mapping[str, Any]) -> list[np.ndarray]:
     """Deflections (12, N) of the ports: compressions of springs and dampers, wheels' heights."""
-    rows = []
-    for kind in ("spring", "damper"):
-        for end, (heave, roll) in zip(ENDS, moving.axles, strict=True):
-            rails = moving.rails[moving.ladder.planes[f"{end} axle"]]
-            for y, rail in zip(moving.ladder.sides, rails, strict=True):
-                place = np.copysign(v[f"{end}_{kind}_offset"], y)
-                rows.append(heave + place * roll - rail[2] - (place - y) * rail[3])
-    offsets = v["wheel_offset"], -v["wheel_offset"]
-    return np.array([*rows, *(heave + y * roll for heave, roll in moving.axles for y in offsets)])
+    kinds = [(kind, end, side) for kind in ("spring", "damper") for end in ENDS for side in SIDES]
+    places = [(end, side * v[f"{end}_{kind}_offset"]) for kind, end, side in kinds]
+    pressed = [moving.axle(end, y) - moving.rail(f"{end} axle", y) for end, y in places]
+    return pressed + [moving.axle(e, side * v["wheel_offset"]) for e in ENDS for side in SIDES]
 
 
-def _heights(moving: Motions, v: Mapping[str, Any]) -> np.ndarray:
+def _heights(moving: Motions, v: Mapping[str, Any]) -> list[np.ndarray]:
     """Heights (5, N) of the driver's place and of the platform's corners."""
-    (x, y, _), (heave, pitch, roll), half = v["driver"], moving.cab, v["platform_width"] / 2.0
-    corners = [
-        (-v[f"platform_{end}"], side, v["platform_height"])
-        for end in ENDS
-        for side in (half, -half)
-    ]
-    driver = heave + y * roll - (x - v["cab_place"]) * pitch
-    return np.array([driver, *moving.body(np.array(corners))[:, 2]])
+    (x, y, _), half, level = v["driver"], v["platform_width"] / 2.0, v["platform_height"]
+    corners = [(-v[f"platform_{end}"], side * half, level) for end in ENDS for side in SIDES]
+    return [moving.in_cab(x - v["cab_place"], y), *moving.body(np.array(corners))[:, 2]]
 
 
 def _outputs(
-    heights: np.ndarray, angles: np.ndarray, ports: csc_array, strains: csc_array
+    heights: csc_array, angles: csc_array, ports: csc_array, strains: csc_array
 ) -> tuple[csc_array, csc_array, csc_array, csc_array]:
     """Cq, Cv, Ca and Cf in the order of `OUTPUTS`."""
     from scipy.sparse import csc_array, eye_array
@@ -223,7 +202,7 @@ def _outputs(
     return (
         placed(heights, "driver_height")
         + placed(angles, "pitch")
-        + placed(ports.T[:4], "deflection_FL")
+        + placed(ports[:4], "deflection_FL")
         + placed(strains, "strain_1"),
         placed(heights, "driver_speed"),
         placed(heights, "driver_acceleration"),
