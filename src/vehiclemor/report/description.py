@@ -27,9 +27,10 @@ KINDS = {
     "ae": "algebraic equations Phi(q; u) = 0",
     "ode": "ordinary differential equations x' = f(x, u)",
     "dae": "differential equations with constraints, stabilised",
+    "structural": "sparse matrices M q'' + D q' + K q = g + B f(B' q, B' q', u)",
 }
 UNKNOWN = "known once the model has been simulated"
-QUANTITIES = ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints")
+QUANTITIES = ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints", "ports")
 # Values of an axis that are printed.
 SHOWN = 40
 
@@ -66,7 +67,7 @@ def _model(
     # Initial conditions, as far as they are known without deriving the model.
     if model := build_derived(name):
         starts = list(model.starts)
-    elif definition.kind == "ae":
+    elif definition.kind in ("ae", "structural"):
         starts = [DESIGN_START]
     else:
         starts = [UNKNOWN] if definition.solved else list(definition.starts(parameters.values()))
