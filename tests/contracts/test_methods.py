@@ -162,7 +162,8 @@ def test_every_preset_simulates_the_nominal_maneuver(pair):
 
 
 def test_matched_training_comes_near_the_full_order(pair):
-    if pair.model.kind != "ae" and pair.name in ROUGH:
+    structure = pair.model.kind == "structural"
+    if pair.model.kind in ("ode", "dae") and pair.name in ROUGH:
         pytest.skip("not near a lane change: a finding, no defect")
     run, full = pair.run(pair.fit()), pair.model.simulate(pair.maneuver)
     size = full.outputs.max(axis=0) - full.outputs.min(axis=0)
@@ -176,6 +177,9 @@ def test_matched_training_comes_near_the_full_order(pair):
     fast = ("vertical_speed", "_FL", "_FR", "_RL", "_RR", "_drift")
     if pair.name in ("slow_manifold", "guarded"):
         fast = (*fast, "pitch", "longitudinal_speed")
+    if structure and pair.name in ("pod", "fixed_basis"):
+        # Nor do twenty vectors of motion hold accelerations and strains.
+        bound, fast = 0.1, ("_acceleration",)
     chosen = moving & np.array([not name.endswith(fast) for name in pair.model.outputs])
     assert np.all(error[chosen] < bound * size[chosen])
 
