@@ -3,6 +3,7 @@
 import copy
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -271,7 +272,7 @@ def _steps_of_a_structure(reduced, maneuver, run, dt):
     zero, path = maneuver.hold == "zero", []
     inputs = maneuver.for_inputs(run.model.inputs).at(run.times)
     state = reduced.begin("equilibrium", inputs[0])
-    for u, ends in zip(inputs, inputs[1:], strict=False):
+    for u, ends in pairwise(inputs):
         path.append(reduced.outputs(state[None], u[None])[0])
         state = reduced.step(state, u, dt, 0.0, None if zero else ends)
     error = np.abs(path - run.outputs[:-1]).max(axis=0)

@@ -1,4 +1,4 @@
-"""Reduced structures: modes, bases, steps and slopes are right; they are kept, moved and trusted."""
+"""Reduced structures: their modes, bases, steps and slopes; what they keep, and how far they go."""
 
 import json
 from dataclasses import replace
@@ -67,7 +67,9 @@ def test_frequencies_come_down_to_those_of_the_full_structure(model):
     system, before, errors, full = model.system, np.full(3, np.inf), [], None
     exact = squares(system.structure, system.law, model)[:3]
     for highest in (20.0, 50.0, 90.0, 1e5):
-        rom = vm.reduce(model, "craig_bampton", training=[signal()], highest=highest, tolerance=1e-4)
+        rom = vm.reduce(
+            model, "craig_bampton", training=[signal()], highest=highest, tolerance=1e-4
+        )
         first = rom.reduced.periods.systems[0]
         found = squares(first.structure, first.law, model)[:3]
         assert (exact * (1.0 - 1e-9) <= found).all()
@@ -279,6 +281,6 @@ def test_structures_are_not_exported_and_start_from_rest_alone(small, tmp_path):
     with pytest.raises(InputError, match="unknown start 'dropped'"):
         small.state("dropped")
     for wrong in (vm.maneuver("lane_change"), signal(0.4)):
-        with pytest.raises(InputError, match="input|z is") as error:
+        with pytest.raises(InputError, match=r"input|z is") as error:
             small.simulate(wrong)
         assert "\n" not in str(error.value)

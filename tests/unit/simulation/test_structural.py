@@ -58,7 +58,7 @@ def truck():
 def test_a_run_is_that_of_another_integrator_and_of_second_order(chain):
     # Also where the tire leaves the road, at times that are no multiples of a step.
     for size, tight in ((0.02, 3e-7), (0.1, 2e-4)):
-        model, given = chain(), signal(size)
+        model, given = chain(masses=6.0), signal(size)
         mass, damping, stiffness, ports, law, (rest, held) = dense(model)
         complete, n = whole(given, model), model.size
 
@@ -68,7 +68,7 @@ def test_a_run_is_that_of_another_integrator_and_of_second_order(chain):
             force = law(rest + ports.T @ q, ports.T @ v, u.at(np.array([t]))[0]) - held
             return np.r_[v, (ports @ force - stiffness @ q - damping @ v) / np.diag(mass)]
 
-        how = {"rtol": 1e-10, "atol": 1e-12, "t_eval": complete.times, "max_step": 2e-3}
+        how = {"rtol": 1e-8, "atol": 1e-11, "t_eval": complete.times}
         x = solve_ivp(rates, (0.0, 1.0), np.zeros(2 * n), "DOP853", **how).y
         slopes = [rates(t, s) for t, s in zip(complete.times, x.T, strict=True)]
         expected = np.column_stack([x[n - 1], x[-1], np.array(slopes)[:, -1]])
@@ -141,23 +141,6 @@ def test_energy_stays_where_nothing_takes_it_and_goes_where_dampers_do(chain):
     assert left(1e-3, damping=100.0) < 0.5
     assert left(1e-3, rate=100.0) < 0.5
     assert 0.0 < left(1e-3, damping_time=0.02) < 0.9
-
-
-def test_what_is_at_rest_stays_and_a_run_does_not_depend_on_how_it_is_cut(chain, truck):
-    for model in (chain(), truck):
-        names = "road_FL" if model is truck else "z"
-        quiet = vm.Signal.from_samples([0.0, 0.2], [0.0, 0.0], inputs=[names], hold="cubic")
-        run = model.run(quiet)
-        loads = np.array([name.startswith("Fz") for name in model.outputs])
-        assert np.ptp(run.outputs[:, loads], axis=0).max() < 1e-6
-        assert np.abs(run.outputs[:, ~loads]).max() < 1e-9
-    model = chain()
-    inputs, state = whole(signal(), model).at(1e-3 * np.arange(1001)), np.zeros((3, 12))
-    at_once, whole_state = model.system.march(state, inputs, 1e-3, 10)[0], state.copy()
-    state[:] = 0.0
-    parts = [model.system.march(state, inputs[k : k + 501], 1e-3, 10)[0] for k in (0, 500)]
-    np.testing.assert_allclose(state, whole_state, rtol=1e-7, atol=1e-9)
-    np.testing.assert_allclose(parts[1][1:], at_once[51:], rtol=1e-6, atol=1e-7)
 
 
 # Matrices
@@ -241,15 +224,13 @@ def test_what_diverges_is_a_recorded_result(chain):
     assert (run.status, run.finished) == ("diverged", False)
     assert run.message == "top is -0.2469 at t = 0.91 s; the model holds from -0.2 to 0.2"
     np.testing.assert_array_equal(np.isfinite(run.outputs).all(axis=1), run.times < 0.905)
-    with pytest.raises(ConvergenceError, match="standing_chain: top is -0.2469") as error:
+    with pytest.raises(ConvergenceError, match=r"standing_chain: top is -0\.2469") as error:
         model.simulate(signal(0.1, 2.0), tolerance=3e-3)
     np.testing.assert_array_equal(error.value.trajectory.outputs, run.outputs)
     run = chain(hardening=-2e7).run(signal(0.1, 2.0))
     assert run.status == "diverged"
     assert run.message == "no convergence of the port forces at t = 0.42 s"
     np.testing.assert_array_equal(np.isfinite(run.outputs).all(axis=1), run.times < 0.415)
-
-
 
 
 def nothing(times, *_):
