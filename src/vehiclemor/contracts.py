@@ -19,6 +19,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build, check_equations
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.structural import StructuralModel
 from vehiclemor.simulation.trajectory import FINISHED
 
 
@@ -34,10 +35,11 @@ def check_model(name: str) -> None:
     """A model has named quantities with units, and its nominal run can be simulated.
 
     A kinematic model closes its loops along that run, and its Jacobian is that of its residual; a
-    dynamic model has finite derivatives.
+    dynamic model has finite derivatives; a structure has symmetric matrices of fitting sizes and
+    stands, and the derivatives of its port forces are theirs.
     """
     model, definition = build(name), _definition(name)
-    for kind in ("coordinates", "speeds", "inputs", "outputs"):
+    for kind in ("coordinates", "speeds", "inputs", "outputs", "ports"):
         quantities = getattr(definition, kind)
         assert all(q.unit and q.long_name for q in quantities), f"{name}: unit or meaning missing"
     try:
@@ -50,6 +52,8 @@ def check_model(name: str) -> None:
     assert maneuver.inputs == inputs, f"{name}: its maneuver gives other inputs"
     if isinstance(model, AlgebraicModel):
         _check_algebraic(model, maneuver)
+    elif isinstance(model, StructuralModel):
+        _check_structural(model, maneuver)
     else:
         _check_dynamic(model, maneuver)
 
@@ -89,6 +93,37 @@ def _check_dynamic(model: Any, maneuver: Maneuver) -> None:
         assert np.isfinite(history).all(), f"{name}: the nominal run is not finite"
 
 
+def _check_structural(model: StructuralModel, maneuver: Maneuver) -> None:
+    name, structure = model.name, model.system.structure
+    n, p, k = model.size, len(model.definition.ports), len(model.outputs)
+    expected = {"mass": (n, n), "stiffness": (n, n), "ports": (n, p)}
+    for matrix, shape in expected.items():
+        assert getattr(structure, matrix).shape == shape, f"{name}: wrong shape of {matrix}"
+    assert structure.dampers.shape[0] == n, f"{name}: wrong shape of dampers"
+    shapes = [matrix.shape for matrix in structure.outputs]
+    assert shapes == [(k, n), (k, n), (k, n), (k, p)], f"{name}: wrong shapes of outputs"
+    for matrix in (structure.mass, structure.stiffness):
+        apart = abs(matrix - matrix.T).max()
+        assert apart <= 1e-9 * abs(matrix).max(), f"{name}: mass or stiffness is not symmetric"
+    law = model.system.law
+    assert np.isfinite(law.static).all(), f"{name}: its static state is not finite"
+    trajectory = model.simulate(maneuver)
+    assert trajectory.status == "ok", f"{name}: the nominal run is {trajectory.status}"
+    assert trajectory.outputs.shape == (len(trajectory.times), k), f"{name}: wrong shape of outputs"
+    assert np.isfinite(trajectory.outputs).all(), f"{name}: the nominal run is not finite"
+    # Near the static state, and where no force has a kink at rest.
+    w, rates, u = 1e-3 * np.cos(np.arange(p)), 0.1 + 0.01 * np.arange(p), trajectory.inputs[-1]
+    steps = {1: (1e-7, 0.0), 2: (0.0, 1e-7)}
+    found = law.at(w, rates, u)
+    for column, (moved, quicker) in steps.items():
+        for port in np.eye(p):
+            ends = [law.at(w + s * moved * port, rates + s * quicker * port, u) for s in (1, -1)]
+            difference = (ends[0][:, 0] - ends[1][:, 0]) / 2e-7
+            error = np.abs(difference - found[:, column] * port).max()
+            bound = 1e-5 * max(1.0, np.abs(found[:, column]).max())
+            assert error < bound, f"{name}: a derivative of port forces is off by {error:.1e}"
+
+
 def check_method(name: str, model_name: str) -> None:
     """A method declares its settings, and gives complete, repeatable trajectories.
 
@@ -118,9 +153,11 @@ def check_method(name: str, model_name: str) -> None:
                 raise AssertionError(f"{where}: {error}") from None
             assert first.status in (*FINISHED, "diverged"), f"{where}: status {first.status!r}"
             if first.finished:
-                assert np.isfinite(first.states).all(), f"{where}: finished, but not finite"
+                for history in (first.states, first.outputs):
+                    assert np.isfinite(history).all(), f"{where}: finished, but not finite"
             assert set(first.counts) == set(model.counts), f"{where}: counts are incomplete"
-            same = np.array_equal(first.states, again.states, equal_nan=True)
+            histories = [np.hstack((run.states, run.outputs)) for run in (first, again)]
+            same = np.array_equal(*histories, equal_nan=True)
             assert same, f"{where}: two runs differ"
             assert first.counts == again.counts, f"{where}: the counts of two runs differ"
             assert reduced.order >= 0, f"{where}: negative rank"

@@ -25,6 +25,7 @@ version = "1"
 [project.entry-points."vehiclemor.methods"]
 interpolation = "handbook_method:METHOD"
 """
+TRUCK = "flexible_truck"
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
 
 
@@ -33,6 +34,27 @@ KINEMATIC = [name for name in names("model") if component("model", name).kind ==
 @pytest.mark.parametrize("name", names("method"))
 def test_registered_methods_pass_also_on_a_small_model(model, name):
     contracts.check_method(name, model)
+
+
+@pytest.mark.parametrize("name", ["craig_bampton", "pod"])
+def test_registered_methods_pass_on_a_structure(name):
+    contracts.check_method(name, TRUCK)
+
+
+@pytest.mark.parametrize(
+    ("alter", "message"),
+    [
+        (lambda s: replace(s, stiffness=s.stiffness + s.ports @ s.ports[::-1].T), "not symmetric"),
+        (lambda s: replace(s, outputs=tuple(c[1:] for c in s.outputs)), "wrong shapes of outputs"),
+        (lambda s: replace(s, dampers=s.dampers[1:]), "wrong shape of dampers"),
+    ],
+)
+def test_a_broken_structure_is_named(monkeypatch, alter, message):
+    model = vm.model(TRUCK)
+    definition = replace(model.definition, structure=lambda v: alter(model.definition.structure(v)))
+    monkeypatch.setattr(contracts, "build", lambda _: replace(model, definition=definition))
+    with pytest.raises(AssertionError, match=message):
+        contracts.check_model(TRUCK)
 
 
 @pytest.mark.usefixtures("plug_in_package")

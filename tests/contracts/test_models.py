@@ -7,8 +7,8 @@ from vehiclemor.contracts import check_model
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.build import build
 
-OF_FORCES = {"N", "N m", "N/m", "N/rad", "N s/m", "kg", "kg m^2"}
-SI_UNITS = {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "1", "1/s", *OF_FORCES}
+OF_FORCES = {"N", "N m", "N/m", "N/m^2", "N/rad", "N s/m", "kg", "kg m^2", "kg/m^3"}
+SI_UNITS = {"m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "1", "1/s", "Hz", "s/m", *OF_FORCES}
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
 
 
@@ -19,7 +19,7 @@ def test_a_model_keeps_its_contract_and_names_units_and_sources(name):
     for text in (definition.summary, *(entry.description for entry in entries.values())):
         assert text
         assert "\n" not in text
-    for kind in ("coordinates", "speeds", "inputs", "outputs", "equations"):
+    for kind in ("coordinates", "speeds", "inputs", "outputs", "equations", "ports"):
         quantities = getattr(definition, kind)
         assert len({quantity.name for quantity in quantities}) == len(quantities)
         assert all(quantity.name.isidentifier() for quantity in quantities)

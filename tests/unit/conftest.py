@@ -1,4 +1,4 @@
-"""Fixtures of the unit tests: a plug-in model of standard problems."""
+"""Fixtures of the unit tests: plug-in models with known solutions."""
 
 from importlib.metadata import EntryPoint
 
@@ -8,13 +8,10 @@ from vehiclemor import registry
 from vehiclemor.simulation.build import build as built
 
 
-@pytest.fixture(scope="session")
-def standard():
-    """Builder of the standard problems: parameter values -> model."""
-    entry = EntryPoint(
-        "standard_problems", "tests.unit.standard_problems:DEFINITION", "vehiclemor.models"
-    )
-    known = {**registry._entries("model"), "standard_problems": entry}
+def builder(name):
+    """Builder of a model of the tests: parameter values -> model."""
+    entry = EntryPoint(name, f"tests.unit.{name}:DEFINITION", "vehiclemor.models")
+    known = {**registry._entries("model"), name: entry}
     real = registry._entries
 
     def build(**values):
@@ -22,6 +19,18 @@ def standard():
             patch.setattr(
                 registry, "_entries", lambda kind: known if kind == "model" else real(kind)
             )
-            return built("standard_problems", overrides=values)
+            return built(name, overrides=values)
 
     return build
+
+
+@pytest.fixture(scope="session")
+def standard():
+    """Builder of the standard problems."""
+    return builder("standard_problems")
+
+
+@pytest.fixture(scope="session")
+def chain():
+    """Builder of the standing chain, a structure."""
+    return builder("standing_chain")

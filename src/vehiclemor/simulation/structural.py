@@ -16,6 +16,7 @@ from vehiclemor.multibody.structure import Structure
 from vehiclemor.registry import choice
 from vehiclemor.simulation import structural_loops as compiled
 from vehiclemor.simulation.checks import (
+    check_positive,
     checked_inputs,
     left_validity,
     lifted_wheels,
@@ -104,10 +105,11 @@ class Periods:
         states = np.full((samples if recorded else 0, parts[0][1].shape[1]), np.nan)
         first = 0
         for part, end in zip(parts, ends, strict=False):
-            # The sample on an edge is of the later period.
-            histories[first : end + 1] = part[0]
+            # The sample on an edge is of the period before: accelerations there follow from two.
+            begin = first + (first > 0)
+            histories[begin : end + 1] = part[0][begin - first :]
             if recorded:
-                states[first : end + 1] = part[1]
+                states[begin : end + 1] = part[1][begin - first :]
             first = end
         return histories, states, np.sum([part[2] for part in parts], axis=0), parts[-1][3]
 
@@ -232,8 +234,10 @@ class StructuralModel(Model):
             If the run leaves the model's range of validity.
         """
         choice("solver", SOLVER if solver is None else solver, (SOLVER,))
+        tolerance = TIGHT if tolerance is None else tolerance
+        check_positive("tolerance", tolerance)
         self.start(start)
-        found = self.run(maneuver, None, TIGHT if tolerance is None else tolerance, outputs)
+        found = self.run(maneuver, None, tolerance, outputs)
         if found.status != "ok":
             raise ConvergenceError(f"{self.name}: {found.message}", found)
         return found if times is None else found.chosen(times=times)

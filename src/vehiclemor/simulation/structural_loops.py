@@ -8,6 +8,9 @@ k = d e - alpha_f q, products with K follow from the matrix S = c_m M + c_d W W'
 where m, e and k are combinations of q, q' and q''.  R = S without its dampers W is factored: of a
 structure in modal coordinates it is diagonal.  What the dampers add follows by the formula of
 Sherman, Morrison and Woodbury; Newton's method runs in the port forces alone.
+
+The method's q'' is of first order, that of alpha_f - alpha_m steps before (M. Arnold, O. Bruls,
+Multibody Syst. Dyn. 18 (2007), 185-202); outputs are of second order.
 """
 
 import math
@@ -60,6 +63,8 @@ class Weights(NamedTuple):
         1 - alpha_f, alpha_f, alpha_f / (1 - alpha_f).
     damping_time
         d of the structure.
+    lag
+        alpha_f - alpha_m: accelerations of the method are those so many steps before.
     """
 
     slope: Float
@@ -81,6 +86,7 @@ class Weights(NamedTuple):
     before: Float
     earlier: Float
     damping_time: Float
+    lag: Float
 
 
 class Marching(NamedTuple):
@@ -198,12 +204,22 @@ def eliminate(a, size):
         a[k, size] = total / a[k, k]
 
 
-def write_outputs(system, state, forces, row):
-    """Outputs of a state; the forces are those beyond the static ones."""
+def write_accelerations(system, state, row):
+    """Part of the outputs that accelerations are, as the method has them."""
+    for j in range(len(row)):
+        row[j] = column_product(system.accelerations, j, state[A])
+
+
+def write_outputs(system, state, forces, before, row):
+    """Outputs of a state; the forces are those beyond the static ones.
+
+    Accelerations lag: `before` is what a step before they were, from which they are extrapolated.
+    """
     for j in range(len(row)):
         total = column_product(system.positions, j, state[Q])
         total += column_product(system.rates, j, state[V])
-        total += column_product(system.accelerations, j, state[A])
+        lagging = column_product(system.accelerations, j, state[A])
+        total += lagging + system.weights.lag * (lagging - before[j])
         total += column_product(system.forces, j, forces)
         row[j] = total + column_product(system.forces, j, system.static[1])
 
@@ -313,15 +329,20 @@ def march(
     square = matrix(buffer, first, p, p + 1)
     result = matrix(buffer, first + p * (p + 1), p, 3)
     scratch = vector(buffer, first + p * (p + 4), 4 * p + 2 * dampers)
+    before = vector(buffer, first + p * (p + 8) + 2 * dampers, histories.shape[1])
     buffers = scratch, square, result
+    write_accelerations(system, state, before)
     begin_ports(system, state, ports, inputs[0], scratch, result)
     for sample in range(len(histories)):
-        write_outputs(system, state, ports[FORCE], histories[sample])
+        write_outputs(system, state, ports[FORCE], before, histories[sample])
         if len(states):
             for i in range(n):
                 states[sample, i] = state[Q, i]
         if sample + 1 < len(histories):
-            for step in range(sample * every + 1, (sample + 1) * every + 1):
+            last = (sample + 1) * every
+            for step in range(sample * every + 1, last + 1):
+                if step == last:
+                    write_accelerations(system, state, before)
                 reason = advance(system, state, ports, work, inputs[step], buffers, counts)
                 if reason != FINISHED:
                     return reason

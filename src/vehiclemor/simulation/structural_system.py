@@ -48,6 +48,7 @@ def weights_of(h: float, damping_time: float) -> tuple[Weights, tuple[float, flo
         before=a_f,
         earlier=a_f / after,
         damping_time=damping_time,
+        lag=a_f - a_m,
     )
     return weights, (of_mass, of_damping, of_stiffness)
 
@@ -149,7 +150,7 @@ class StructuralSystem:
         (_, n), p, samples = state.shape, self.law.static.shape[1], (len(inputs) - 1) // every + 1
         histories = np.full((samples, self.structure.outputs[0].shape[0]), np.nan)
         states = np.full((samples if recorded else 0, n), np.nan)
-        scratch = p * (p + 8) + 2 * self.structure.dampers.shape[1]
+        scratch = p * (p + 8) + 2 * self.structure.dampers.shape[1] + histories.shape[1]
         buffer = np.empty(compiled.WORK_ROWS * n + compiled.PORT_ROWS * p + scratch)
         counts, order = np.zeros(3, dtype=np.int64), self.order
         moved = np.ascontiguousarray(state[:, order])

@@ -1,6 +1,6 @@
 """The same vehicle on another mesh, at full order: the null model of structures.
 
-Whoever wants a cheaper model of a structure can make larger elements.
+A cheaper model of a structure is had by larger elements, too.
 """
 
 import tomllib

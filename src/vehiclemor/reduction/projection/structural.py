@@ -147,6 +147,11 @@ class ReducedStructure(ShortRepr):
         """Runs have no coordinates to project."""
         del states
 
+
+@dataclass(frozen=True, eq=False)
+class SteppedStructure(ReducedStructure):
+    """A structure in one basis, which is a function of its states too."""
+
     @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the modal coordinates and, after them, of their rates."""
@@ -155,8 +160,6 @@ class ReducedStructure(ShortRepr):
 
     @property
     def _first(self) -> StructuralSystem:
-        if self.edges:
-            raise InputError("with several control periods there are whole runs alone")
         return self.periods.systems[0]
 
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
@@ -173,7 +176,10 @@ class ReducedStructure(ShortRepr):
         time: float = 0.0,
         next_inputs: np.ndarray | None = None,
     ) -> np.ndarray:
-        """State (2 r,) after dt s, in equal steps of a millisecond at most."""
+        """State (2 r,) after dt s, in equal steps of a millisecond at most.
+
+        A state has no accelerations of the method, so each call begins it anew: of first order.
+        """
         check_positive("dt", dt)
         count = max(int(np.ceil(dt / FIRST_STEP - 1e-9)), 1)
         ends = inputs if next_inputs is None else next_inputs
@@ -262,8 +268,9 @@ def reduced(
     """The structure in its bases; offline cost from `began` (`time.process_time()`) on."""
     modes = tuple(projected(model.system.structure, basis)[1] for basis in bases)
     cost = OfflineCost(time.process_time() - began, evaluations)
+    kind = SteppedStructure if len(modes) == 1 else ReducedStructure
     ends = tuple(map(float, edges))
-    return ReducedStructure(model, modes, ends, cost, settings.tolerance, settings.step_size)
+    return kind(model, modes, ends, cost, settings.tolerance, settings.step_size)
 
 
 class StructuralPodSettings(StructuralSettings):

@@ -1,0 +1,286 @@
+"""Reduced structures: their modes, bases, steps and slopes; what they keep, and how far they go."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+import vehiclemor as vm
+from vehiclemor.exceptions import InputError
+from vehiclemor.reduction.projection.structural import ReducedStructure
+from vehiclemor.simulation.structural import relative_error
+
+TRUCK = "flexible_truck"
+HEIGHTS = ("road_FL", "road_FR", "road_RL", "road_RR")
+ROAD, SHORT = vm.road("C", 3), {"tolerance": 1e-2}
+
+
+def signal(size=0.02, duration=1.0, rate=4.0):
+    def height(t):
+        return size * np.sin(rate * np.pi * t) * np.sin(0.5 * np.pi * t) ** 2
+
+    return vm.Signal.from_function(height, duration, inputs=["z"], output_step=0.01)
+
+
+def bumps(size=0.02, duration=1.0):
+    """Heights under the wheels of the truck."""
+    times = np.linspace(0.0, duration, 201)
+    paths = [size * np.sin(0.5 * np.pi * times) ** 2 * np.sin(f * times) for f in (9, 11, 13, 15)]
+    u = np.column_stack(paths)
+    return vm.Signal.from_samples(times, u, "cubic", inputs=HEIGHTS, output_step=0.01)
+
+
+@pytest.fixture(scope="module")
+def model(chain):
+    return chain()
+
+
+@cache
+def truck():
+    return vm.model(TRUCK)
+
+
+def error_of(rom, given, full=None):
+    full = rom.model.simulate(given, tolerance=1e-4) if full is None else full
+    run = rom.simulate(given)
+    assert run.status == "ok"
+    return relative_error(run.outputs, full.outputs)
+
+
+# Bases
+
+
+def squares(structure, law, model):
+    """Squared natural frequencies on springs and tires at the static state, small ones first."""
+    rest = np.zeros(law.static.shape[1])
+    slopes = -law.at(rest, rest, np.zeros(len(model.inputs)))[:, 1]
+    mass, stiffness, ports = (
+        m.toarray() for m in (structure.mass, structure.stiffness, structure.ports)
+    )
+    return eigh(stiffness + ports * slopes @ ports.T, mass, eigvals_only=True)
+
+
+def test_frequencies_come_down_to_those_of_the_full_structure(model):
+    system, before, errors, full = model.system, np.full(3, np.inf), [], None
+    exact = squares(system.structure, system.law, model)[:3]
+    for highest in (20.0, 50.0, 90.0, 1e5):
+        rom = vm.reduce(
+            model, "craig_bampton", training=[signal()], highest=highest, tolerance=1e-4
+        )
+        first = rom.reduced.periods.systems[0]
+        found = squares(first.structure, first.law, model)[:3]
+        assert (exact * (1.0 - 1e-9) <= found).all()
+        assert (found <= before * (1.0 + 1e-9)).all()
+        before, full = found, full or model.simulate(signal(), tolerance=1e-4)
+        errors.append(error_of(rom, signal(), full))
+    np.testing.assert_allclose(before, exact, rtol=1e-9)
+    # All modes are the whole space: the full order.
+    assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2]
+    assert errors[-1] < 1e-7
+    assert rom.reduced.order == model.size
+
+
+def test_modes_of_the_truck_are_those_of_dense_matrices():
+    structure, law = truck().system.structure, truck().system.law
+    rom = vm.reduce(truck(), "modal_truncation", training=[bumps()], highest=15.0)
+    exact = squares(structure, law, truck())
+    kept = exact < (2.0 * np.pi * 15.0) ** 2
+    assert rom.reduced.order == kept.sum() > 10
+    first = rom.reduced.periods.systems[0]
+    found = squares(first.structure, first.law, truck())
+    np.testing.assert_allclose(found, exact[kept], rtol=1e-6, atol=1e-6)
+
+
+def test_more_vectors_of_pod_are_better_until_they_are_all(model):
+    trained, test, errors = signal(), signal(0.018, rate=5.0), []
+    full = model.simulate(test, tolerance=1e-4)
+    for rank in (1, 2, 4, 8):
+        rom = vm.reduce(model, "fixed_basis", training=[trained], rank=rank, tolerance=1e-4)
+        errors.append(relative_error(rom.simulate(test).outputs, full.outputs))
+    assert errors[0] > 2 * errors[1] > 4 * errors[2] > 8 * errors[3]
+    any_basis = np.random.default_rng(0).standard_normal((model.size, model.size))
+    exact = replace(rom.reduced, bases=(any_basis,), tolerance=1e-4)
+    assert relative_error(exact.simulate(test, "equilibrium").outputs, full.outputs) < 1e-7
+
+
+def test_control_periods_hand_over_what_moves(model):
+    run = model.run(signal())
+    how = {"training": [signal()], "tolerance": 3e-3}
+    periods = vm.reduce(model, "pod", rank=8, control_period=0.25, **how)
+    assert periods.reduced.edges == pytest.approx((0.25, 0.5, 0.75))
+    found = periods.simulate(signal())
+    assert relative_error(found.outputs, run.outputs) < 1e-3
+    # Whole spaces of other vectors one after another, between output times too: nothing is lost.
+    rng, n = np.random.default_rng(1), model.size
+    bases = tuple(rng.standard_normal((n, n)) for _ in range(3))
+    cut = ReducedStructure(model, bases, (0.3, 0.7), periods.reduced.offline, 3e-3)
+    whole = cut.simulate(signal(), "equilibrium")
+    np.testing.assert_allclose(whole.outputs, run.outputs, rtol=1e-5, atol=1e-6)
+    assert periods.states == ()
+    with pytest.raises(InputError, match="pod has no state: it gives whole runs alone"):
+        periods.state()
+
+
+def test_replay_is_the_training_run_nearest(model):
+    trained = [signal(), signal(0.01)]
+    rom = vm.reduce(model, "replay", training=trained)
+    run = rom.simulate(signal(0.011))
+    np.testing.assert_array_equal(run.outputs, model.simulate(trained[1]).outputs)
+    assert (rom.reduced.order, run.counts["steps"]) == (0, 0)
+
+
+# States
+
+
+@pytest.fixture(scope="module")
+def small(model):
+    return vm.reduce(model, "craig_bampton", training=[signal()], highest=60.0, tolerance=1e-4)
+
+
+def test_steps_are_the_run_and_states_have_its_outputs(small):
+    given = signal(0.06)
+    run, complete = small.simulate(given), given.for_inputs(small.inputs)
+    inputs = complete.at(1e-3 * np.arange(1001))
+    state, path = small.state(), [small.state()]
+    for k in range(1000):
+        state = small.step(state, inputs[k], 1e-3, 1e-3 * k, inputs[k + 1])
+        path.append(state)
+    found = small.outputs(np.array(path[::10]), inputs[::10])
+    assert relative_error(found, run.outputs) < 1e-3
+    # One long step is as many of a millisecond, held or linear.
+    at_once = small.step(state, inputs[-1], 5e-3)
+    for _ in range(5):
+        state = small.step(state, inputs[-1], 1e-3)
+    np.testing.assert_allclose(at_once, state, rtol=5e-3, atol=1e-5)
+    # The last mass is the output's.
+    assert small.full_state(state, inputs[-1])[-1] == pytest.approx(
+        small.outputs(state, inputs[-1])[0], abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("by", ["state", "inputs"])
+@pytest.mark.parametrize("of", ["rhs", "outputs"])
+def test_slopes_are_those_of_differences(small, by, of):
+    state, u = small.state(), np.array([0.01, 0.1])
+    for _ in range(50):
+        state = small.step(state, u, 1e-3)
+    function, at = (small.rhs if of == "rhs" else small.outputs), [state, u]
+    found, columns = small.jacobian(state, u, by, of), []
+    place = ("state", "inputs").index(by)
+    for unit in np.eye(len(at[place])):
+        ends = [at.copy(), at.copy()]
+        for end, h in zip(ends, (1e-5, -1e-5), strict=True):
+            end[place] = at[place] + h * unit
+        columns.append((function(*ends[0]) - function(*ends[1])) / 2e-5)
+    difference = np.column_stack(columns)
+    np.testing.assert_allclose(found, difference, rtol=1e-5, atol=1e-6 * np.abs(found).max())
+    with pytest.raises(InputError, match="have no parameters"):
+        small.jacobian(state, u, "stiffness")
+
+
+# In use
+
+
+def test_a_saved_truck_is_the_same_to_the_bit_and_so_are_many_runs(tmp_path):
+    rom = vm.reduce(truck(), "craig_bampton", training=[bumps()], highest=30.0, **SHORT)
+    again, runs = vm.load(rom.save(tmp_path / "truck.nc")), [bumps(0.01), bumps(0.02)]
+    alone = [rom.simulate(given).outputs for given in runs]
+    np.testing.assert_array_equal([again.simulate(given).outputs for given in runs], alone)
+    for jobs in (1, 2):
+        found = vm.simulate_many(again, runs, jobs=jobs)
+        np.testing.assert_array_equal(found["values"], alone)
+    loaded = vm.simulate_many(rom, runs, parameters={"payload": [0.0, 4000.0]})
+    for given, payload, values in zip(runs, (0.0, 4000.0), loaded["values"], strict=True):
+        other = rom.for_parameters({"payload": payload}).simulate(given)
+        np.testing.assert_array_equal(values, other.outputs)
+
+
+def test_another_payload_keeps_the_basis_and_other_parameters_make_anew(model):
+    heavy = {"payload": 30.0}
+    for method, settings in (("craig_bampton", {"highest": 60.0}), ("fixed_basis", {"rank": 5})):
+        rom = vm.reduce(model, method, training=[signal()], tolerance=1e-4, **settings)
+        other = rom.for_parameters(heavy)
+        assert other.reduced.bases is rom.reduced.bases
+        assert other.parameters["payload"] == 30.0
+        full = other.model.simulate(signal(), tolerance=1e-4)
+        apart = relative_error(rom.simulate(signal()).outputs, full.outputs)
+        assert apart > 20.0 * error_of(other, signal(), full)
+        anew = vm.reduce(other.model, method, training=[signal()], tolerance=1e-4, **settings)
+        assert error_of(other, signal(), full) < 2.0 * error_of(anew, signal(), full) + 1e-3
+    with pytest.raises(InputError, match="fixed_basis is trained on runs of one model"):
+        rom.for_parameters({"stiffness": 3e4})
+    other = vm.reduce(model, "craig_bampton", training=[signal()]).for_parameters({"chain": 2e5})
+    assert error_of(other, signal()) < 0.01
+
+
+def test_a_rougher_road_than_trained_is_not_trusted():
+    rom = vm.reduce(truck(), "craig_bampton", training=[bumps()], highest=30.0, **SHORT)
+    assert rom.simulate(bumps()).status == "ok"
+    for rougher in (bumps(0.022), vm.road("E", 3)):
+        run = rom.simulate(rougher)
+        assert run.status == "untrusted"
+        assert "is beyond its known range" in run.message
+        assert np.isfinite(run.outputs).all()
+    assert rom.trust(rom.state(), np.full(8, 0.1)).reason.startswith("input road_")
+    assert "road_FL is 0.6; the model holds" in rom.trust(rom.state(), np.full(8, 0.6)).reason
+
+
+def test_a_coarse_mesh_is_the_model_with_that_mesh():
+    mesh = "elements_per_bay = 1, shell_size = 0"
+    fine = vm.model(TRUCK, {"elements_per_bay": 2.0})
+    rom = vm.reduce(fine, "coarse_mesh", training=[bumps()], mesh=mesh)
+    coarse = vm.model(TRUCK, {"elements_per_bay": 1.0})
+    assert rom.reduced.order == coarse.size < fine.size
+    np.testing.assert_array_equal(rom.simulate(bumps()).outputs, coarse.run(bumps()).outputs)
+    loaded = rom.for_parameters({"payload": 100.0}).simulate(bumps())
+    both = vm.model(TRUCK, {"elements_per_bay": 1.0, "payload": 100.0})
+    np.testing.assert_array_equal(loaded.outputs, both.run(bumps()).outputs)
+
+
+def test_a_simulation_is_a_labelled_dataset():
+    found = vm.simulate(TRUCK, "craig_bampton", maneuver=bumps(), highest=60.0)
+    assert found["status"].item() == "ok"
+    assert found["outputs"].shape == (101, len(truck().outputs))
+    assert found["steps"].item() > 0
+    assert json.loads(found.attrs["configuration"])["settings"]["highest"] == 60.0
+    part = found["rms_error"] / found["signal_range"]
+    assert (part < 0.02).all()
+    assert part.sel(output="driver_height") > 0.0
+
+
+WRONG = [
+    ("craig_bampton", {"highest": 1e-3}, "no mode is below 0.001 Hz: the first has"),
+    ("craig_bampton", {"highest": 0.0}, "highest is 0; it must be above 0"),
+    ("craig_bampton", {"highest": np.nan}, "highest"),
+    ("modal_truncation", {"highest": 1e-4}, "no mode is below 0.0001 Hz: the first has"),
+    ("fixed_basis", {"rank": 0}, "rank is 0; it must be at least 1"),
+    ("pod", {"control_period": 0.01}, "control_period is below 0.1 s"),
+    ("full_order", {"tolerance": 1e9}, "tolerance"),
+    ("slow_manifold", {}, "flexible_truck is of kind structural"),
+    ("coarse_mesh", {"mesh": "elements_per_bay = 1.5"}, "elements_per_bay is 1.5"),
+    ("coarse_mesh", {"mesh": "elements_per_bay"}, "coarse_mesh: mesh: "),
+    ("coarse_mesh", {"mesh": "wheels = 3"}, "wheels"),
+]
+
+
+@pytest.mark.parametrize(("method", "settings", "words"), WRONG)
+def test_what_cannot_be_reduced_is_refused_in_one_line(method, settings, words):
+    with pytest.raises(InputError, match=words) as error:
+        vm.reduce(truck(), method, training=[bumps()], **settings)
+    assert "\n" not in str(error.value)
+
+
+def test_structures_are_not_exported_and_start_from_rest_alone(small, tmp_path):
+    for target in ("c", "fmu"):
+        with pytest.raises(InputError, match="can't be exported: its equations are no") as error:
+            vm.export(small, target, tmp_path / target)
+        assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="unknown start 'dropped'"):
+        small.state("dropped")
+    for wrong in (vm.maneuver("lane_change"), signal(0.4)):
+        with pytest.raises(InputError, match=r"input|z is") as error:
+            small.simulate(wrong)
+        assert "\n" not in str(error.value)

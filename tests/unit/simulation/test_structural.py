@@ -1,0 +1,262 @@
+"""Structures: runs are those of other integrators and of textbook formulas; static states stand."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import root
+from scipy.sparse import csc_array, eye_array, random_array
+from scipy.sparse.linalg import spsolve
+
+import vehiclemor as vm
+from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
+from vehiclemor.inputs.maneuver import Maneuver, smooth
+from vehiclemor.simulation.sparse_factors import blocks_of, factored
+from vehiclemor.simulation.sparse_loops import solve
+from vehiclemor.simulation.structural import Periods, relative_error
+from vehiclemor.simulation.structural_system import weights_of
+
+TRUCK, HEIGHTS = "flexible_truck", ("road_FL", "road_FR", "road_RL", "road_RR")
+# Nothing takes energy away, and the tire, which is one-sided and damped, is gone.
+CONSERVATIVE = {"damping": 0.0, "rate": 0.0, "damping_time": 0.0, "tire": 1e-9}
+
+
+def bump(size):
+    """Heights (m) of the road that begin and end in a parabola."""
+    return lambda t: size * np.sin(4.0 * np.pi * t) * np.sin(0.5 * np.pi * t) ** 2
+
+
+def signal(size=0.02, duration=1.0):
+    return vm.Signal.from_function(bump(size), duration, inputs=["z"], output_step=0.01)
+
+
+def whole(signal, model):
+    return signal.for_inputs(model.inputs)
+
+
+def dense(model):
+    """M, damping and stiffness of a chain, its ports and its law, written down anew."""
+    s, p = model.system.structure, model.parameters.values()
+    mass, stiffness, ports = (m.toarray() for m in (s.mass, s.stiffness, s.ports))
+    damping = s.damping_time * stiffness + (s.dampers @ s.dampers.T).toarray()
+
+    def law(w, rate, u):
+        pressed = p["tire"] * (u[0] - w[1] + 1e-3 * (u[1] - rate[1]))
+        spring = p["stiffness"] * w[0] + p["hardening"] * w[0] ** 3 + p["damping"] * rate[0]
+        return np.array([-spring, max(pressed, 0.0)])
+
+    return mass, damping, stiffness, ports, law, model.system.law.static
+
+
+@pytest.fixture(scope="module")
+def truck():
+    return vm.model(TRUCK)
+
+
+# The law of motion
+
+
+def test_a_run_is_that_of_another_integrator_and_of_second_order(chain):
+    # Also where the tire leaves the road, at times that are no multiples of a step.
+    for size, tight in ((0.02, 3e-7), (0.1, 2e-4)):
+        model, given = chain(masses=6.0), signal(size)
+        mass, damping, stiffness, ports, law, (rest, held) = dense(model)
+        complete, n = whole(given, model), model.size
+
+        def rates(t, x, n=n, u=complete, parts=(mass, damping, stiffness, ports, law, rest, held)):
+            mass, damping, stiffness, ports, law, rest, held = parts
+            q, v = x[:n], x[n:]
+            force = law(rest + ports.T @ q, ports.T @ v, u.at(np.array([t]))[0]) - held
+            return np.r_[v, (ports @ force - stiffness @ q - damping @ v) / np.diag(mass)]
+
+        how = {"rtol": 1e-8, "atol": 1e-11, "t_eval": complete.times}
+        x = solve_ivp(rates, (0.0, 1.0), np.zeros(2 * n), "DOP853", **how).y
+        slopes = [rates(t, s) for t, s in zip(complete.times, x.T, strict=True)]
+        expected = np.column_stack([x[n - 1], x[-1], np.array(slopes)[:, -1]])
+        errors = []
+        for every in (20, 40, 320):
+            found = Periods((model.system,)).steps_of(complete, every, 101)[0]
+            errors.append(relative_error(found[:, :3], expected))
+        assert errors[-1] < tight
+        if size < 0.1:
+            # Heights, speeds and accelerations alike.
+            assert 3.8 < errors[0] / errors[1] < 4.2
+        else:
+            remark = model.run(given).remark
+            lifted = 0.01 * np.flatnonzero(found[:, 3] == 0.0)[0]
+            assert remark == f"off the ground for a time: A (first at {lifted:.4g} s)"
+
+
+def test_each_step_is_the_textbooks_with_all_matrices_dense(chain):
+    model, h, steps = chain(rate=4000.0), 2e-3, 60
+    m, c, k, b, law, (rest, held) = dense(model)
+    inputs = whole(signal(0.06), model).at(h * np.arange(steps + 1))
+    # Chung and Hulbert's parameters for a spectral radius of 0.8 at infinity.
+    a_m, a_f = 0.6 / 1.8, 0.8 / 1.8
+    gamma, beta = 0.5 - a_m + a_f, 0.25 * (1.0 - a_m + a_f) ** 2
+    q, v, a = np.zeros((3, model.size))
+    force = law(rest, 0.0 * rest, inputs[0]) - held
+    for u in inputs[1:]:
+
+        def at_the_end(a_next, q=q, v=v, a=a):
+            q_next = q + h * v + h**2 * ((0.5 - beta) * a + beta * a_next)
+            return q_next, v + h * ((1.0 - gamma) * a + gamma * a_next)
+
+        def residual(a_next, q=q, v=v, a=a, force=force, u=u, at_the_end=at_the_end):
+            q_next, v_next = at_the_end(a_next)
+            f = (1.0 - a_f) * (law(rest + b.T @ q_next, b.T @ v_next, u) - held) + a_f * force
+            moved, rate = (1.0 - a_f) * q_next + a_f * q, (1.0 - a_f) * v_next + a_f * v
+            return m @ ((1.0 - a_m) * a_next + a_m * a) + c @ rate + k @ moved - b @ f
+
+        a_next = root(residual, a, tol=1e-13).x
+        (q, v), a = at_the_end(a_next), a_next
+        force = law(rest + b.T @ q, b.T @ v, u) - held
+    state = np.zeros((3, model.size))
+    assert model.system.march(state, inputs, h, 1)[3] == 0
+    for found, expected in zip(state, (q, v, a), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-8 * np.abs(expected).max())
+
+
+def test_energy_stays_where_nothing_takes_it_and_goes_where_dampers_do(chain):
+    def left(h, **values):
+        model = chain(**(CONSERVATIVE | values))
+        mass, _, stiffness, ports, _, (rest, held) = dense(model)
+        p, state = model.parameters.values(), np.zeros((3, model.size))
+
+        def energy():
+            w = (rest + ports.T @ state[0])[0]
+            spring = 0.5 * p["stiffness"] * w**2 + 0.25 * p["hardening"] * w**4
+            spring += held @ ports.T @ state[0]
+            return 0.5 * (state[1] @ mass @ state[1] + state[0] @ stiffness @ state[0]) + spring
+
+        rest_energy = energy()
+        state[1] = 0.3
+        before = energy()
+        inputs = np.zeros((round(4.0 / h) + 1, 2))
+        assert model.system.march(state, inputs, h, 1)[3] == 0
+        return (energy() - rest_energy) / (before - rest_energy)
+
+    # The method damps high modes: little of that is left with small steps.
+    lost = [1.0 - left(h) for h in (1e-3, 5e-4, 2.5e-4)]
+    assert 0.0 < lost[2] < lost[1] / 4.0 < lost[0] / 16.0 < 1e-3
+    assert left(1e-3, damping=100.0) < 0.5
+    assert left(1e-3, rate=100.0) < 0.5
+    assert 0.0 < left(1e-3, damping_time=0.02) < 0.9
+
+
+# Matrices
+
+
+def test_blocks_of_factors_solve_as_another_solver_does(truck):
+    rng = np.random.default_rng(4)
+    sparse = random_array((150, 150), density=0.03, rng=rng)
+    shells = vm.model(TRUCK, {"shell_size": 0.5}).system.structure
+    _, (of_mass, _, of_stiffness) = weights_of(1e-3, shells.damping_time)
+    for matrix in (
+        csc_array(sparse @ sparse.T + eye_array(150)),
+        csc_array(of_mass * shells.mass + of_stiffness * shells.stiffness),
+    ):
+        order = np.argsort(factored(matrix, "MMD_AT_PLUS_A").perm_c)
+        factor, b = factored(matrix[order][:, order]), rng.standard_normal(matrix.shape[0])
+        x, blocks = b[order], blocks_of(factor.L)
+        assert np.diff(blocks.columns).max() > 3
+        solve(blocks, 1.0 / factor.U.diagonal(), x, np.empty_like(x))
+        expected = spsolve(matrix, b)[order]
+        np.testing.assert_allclose(x, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_a_static_state_is_that_of_a_direct_solution(chain, truck):
+    for model in (chain(), truck):
+        s, (w, force) = model.system.structure, model.system.law.static
+        # Springs of 1 kN/m, taken off again, hold what the structure itself does not.
+        held = csc_array(s.stiffness + 1e3 * s.ports @ s.ports.T)
+        q = spsolve(held, s.load + s.ports @ (force + 1e3 * w))
+        np.testing.assert_allclose(s.ports.T @ q, w, rtol=0, atol=1e-8)
+        still = model.system.law.at(0.0 * w, 0.0 * w, np.zeros(len(model.inputs)))
+        assert np.abs(still[:, 0]).max() < 1e-9
+    p, (w, force) = chain().parameters.values(), chain().system.law.static
+    # A chain of 981 N on two springs, that on top of the tire stretched by what it carries.
+    assert force.sum() == pytest.approx(981.0, rel=1e-9)
+    assert w[1] == pytest.approx(-force[1] / p["tire"], rel=1e-9)
+    own = p["stiffness"] * -w[0] + p["hardening"] * -(w[0] ** 3)
+    assert own == pytest.approx(force[0], rel=1e-9)
+    loads = truck.system.law.static[1, 8:]
+    p = truck.parameters.values()
+    masses = ("sprung_mass", "front_axle_mass", "rear_axle_mass", "payload")
+    weight = p["gravity"] * sum(p[name] for name in masses)
+    assert loads.sum() == pytest.approx(weight, rel=1e-9)
+    with pytest.raises(GeometryError, match="standing_chain finds no static state"):
+        chain(stiffness=-1.0, hardening=0.0, tire=-1.0, chain=1e9).run(signal())
+
+
+# Runs
+
+
+def test_the_step_that_is_chosen_meets_the_tolerance(chain):
+    model, steps = chain(), []
+    complete = whole(signal(), model)
+    exact = Periods((model.system,)).steps_of(complete, 640, 101)[0]
+    for tolerance in (1e-2, 1e-3, 1e-4, 1e-5):
+        run = model.simulate(signal(), tolerance=tolerance)
+        assert relative_error(run.outputs, exact) < tolerance
+        steps.append(run.counts["steps"])
+    assert steps == sorted(steps)
+    assert steps[-1] >= 4 * steps[0]
+
+
+def test_the_same_on_both_sides_moves_the_truck_the_same_on_both_sides(truck):
+    times = np.linspace(0.0, 1.5, 301)
+    front, rear = bump(0.02)(times), bump(0.02)(np.maximum(times - 0.2, 0.0))
+    heights = np.column_stack([front, front, rear, rear])
+    given = vm.Signal.from_samples(times, heights, "cubic", inputs=HEIGHTS, output_step=0.01)
+    run = truck.simulate(given)
+    for name in truck.outputs:
+        if name.endswith(("_FL", "_RL")):
+            other = run[name[:-1] + "R"]
+            np.testing.assert_allclose(run[name], other, atol=1e-7 * np.abs(other).max())
+            assert np.ptp(other) > 1e-3
+    assert max(np.ptp(run["roll"]), np.ptp(run["twist"])) < 1e-8 < np.ptp(run["pitch"])
+
+
+def test_what_diverges_is_a_recorded_result(chain):
+    # A spring that softens.
+    model = chain(hardening=-3e6)
+    run = model.run(signal(0.1, 2.0))
+    assert (run.status, run.finished) == ("diverged", False)
+    assert run.message == "top is -0.2469 at t = 0.91 s; the model holds from -0.2 to 0.2"
+    np.testing.assert_array_equal(np.isfinite(run.outputs).all(axis=1), run.times < 0.905)
+    with pytest.raises(ConvergenceError, match=r"standing_chain: top is -0\.2469") as error:
+        model.simulate(signal(0.1, 2.0), tolerance=3e-3)
+    np.testing.assert_array_equal(error.value.trajectory.outputs, run.outputs)
+    run = chain(hardening=-2e7).run(signal(0.1, 2.0))
+    assert run.status == "diverged"
+    assert run.message == "no convergence of the port forces at t = 0.42 s"
+    np.testing.assert_array_equal(np.isfinite(run.outputs).all(axis=1), run.times < 0.415)
+
+
+def nothing(times, *_):
+    return np.full((len(times), 2), np.nan)
+
+
+NOWHERE = Maneuver("nowhere", "", nothing, ("z", "z_dot"), 1.0, 101, smooth)
+WRONG = [
+    ({"maneuver": "lane_change"}, "delta"),
+    ({"maneuver": signal(0.4)}, "z is .* holds from -0.3 to 0.3"),
+    ({"maneuver": NOWHERE}, "input z is not finite at t = 0 s"),
+    ({"start": "dropped"}, "unknown start 'dropped'; standing_chain has equilibrium"),
+    ({"start": [0.0]}, "start"),
+    ({"solver": "dopri5"}, "solver 'dopri5'"),
+    ({"tolerance": np.nan}, "tolerance"),
+    ({"tolerance": -1.0}, "tolerance"),
+    ({"outputs": ["bottom"]}, "bottom"),
+    ({"times": [0.005]}, "0.005 s is no output time"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "words"), WRONG)
+def test_wrong_input_is_told_in_one_line(chain, wrong, words):
+    given = {"maneuver": signal()} | wrong
+    if isinstance(given["maneuver"], str):
+        given["maneuver"] = vm.maneuver(given["maneuver"])
+    with pytest.raises(InputError, match=words) as error:
+        chain().simulate(**given)
+    assert "\n" not in str(error.value)
