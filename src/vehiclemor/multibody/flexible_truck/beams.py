@@ -3,8 +3,8 @@
 Timoshenko's stiffness with St. Venant's torsion, consistent mass of the cubic shape functions
 (Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 5.6 and 11.4).  Axial forces act at
 the centroid, transverse ones at the shear centre; the nodes stand on the webs.  Left out: warping,
-which stiffens open sections in torsion, the rotary inertia of bending, and
-half a cross member's width of the rails at either end.
+which stiffens open sections in torsion, the rotary inertia of bending, and half a cross member's
+width of the rails at either end.
 """
 
 from __future__ import annotations

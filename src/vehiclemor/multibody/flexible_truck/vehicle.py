@@ -118,15 +118,10 @@ def _unladen(given: tuple[tuple[str, Any], ...]) -> tuple[Structure, csc_array, 
     mass += weighted(np.concatenate(list(moving.axles.values())), axles)
     along, across, _ = moving.body(centre[None])[0]
     hold = np.array([sprung[0], sprung[0], sprung[-1]]) * (2.0 * np.pi * v["hold_frequency"]) ** 2
-    reaches = zip(ENDS, (v["cab_mount_distance"], -v["cab_mount_distance"]), strict=True)
-    mounts = np.array(
-        [
-            moving.in_cab(x, y) - moving.rail(f"{end} cab mounts", y)
-            for end, x in reaches
-            for y in ladder.sides
-        ]
-    )
-    stiffness = frame.stiffness + weighted(mounts, [v["cab_mount_stiffness"]] * 4)
+    reach = v["cab_mount_distance"]
+    feet = [(end, x, y) for end, x in zip(ENDS, (reach, -reach), strict=True) for y in ladder.sides]
+    mounts = [moving.in_cab(x, y) - moving.rail(f"{end} cab mounts", y) for end, x, y in feet]
+    stiffness = frame.stiffness + weighted(np.array(mounts), [v["cab_mount_stiffness"]] * 4)
     stiffness += weighted(np.array([along, across, moving.yaw]), hold)
     time = damping_time(v)
     damped = v["cab_mount_damping"] - time * v["cab_mount_stiffness"]
@@ -136,7 +131,7 @@ def _unladen(given: tuple[tuple[str, Any], ...]) -> tuple[Structure, csc_array, 
         mass=mass,
         stiffness=stiffness,
         damping_time=time,
-        dampers=csc_array(np.sqrt(damped) * on_nodes(list(mounts)).T),
+        dampers=csc_array(np.sqrt(damped) * on_nodes(mounts).T),
         ports=csc_array(ports.T),
         load=np.zeros(size),
         outputs=_outputs(on_nodes(heights), on_nodes(angles), ports, frame.strains),
