@@ -26,7 +26,7 @@ from vehiclemor.simulation.structural import StructuralModel
 
 # Time in s in which motion counts less by a factor e.
 FADING = 2.0
-# Most coordinates n: from 2 n = 1000 on pyMOR iterates, which does not converge for such spectra.
+# Most coordinates n: from 2 n = 1000 on pyMOR iterates, which did not converge on the truck.
 LARGEST = 499
 
 

@@ -3,8 +3,8 @@
 R. R. Craig, A. L. Hale, Block-Krylov component synthesis method for structural model reduction,
 J. Guid. Control Dyn. 11 (1988), 562-570.  With X = (K + s^2 M)^-1 and a real s in rad/s the basis
 spans X F, X M X F, (X M)^2 X F, ..., where F holds the ports and the linear dampers.  As what
-springs, dampers and tires do is within F, the same basis belongs to whatever they do; d K damps
-the moments and is left out of them.  X exists for any mesh, also where motions have no mass.
+springs, dampers and tires do is within F, the basis is the same whatever they do.  The damping d K
+is left out.  X exists for any mesh, also where motions have no mass.
 
 An iteration that chooses frequencies (SOR-IRKA of pyMOR) did not converge on the truck.  More
 frequencies with fewer moments each gave larger errors.  Nothing is trained.
