@@ -12,15 +12,21 @@ from vehiclemor.simulation.structural import StructuralModel
 FIRST_MODES = 16
 
 
+def port_rates(model: StructuralModel) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and damping (p,) of the ports at the static state."""
+    law = model.system.law
+    rest = np.zeros(law.static.shape[1])
+    _, stiffness, damping = -law.at(rest, rest, np.zeros(len(model.inputs))).T
+    return stiffness, damping
+
+
 def free_modes(model: StructuralModel, highest: float) -> np.ndarray:
     """Modes (n, k) up to so many Hz of the structure on its springs and tires.
 
     It is linearised at the static state; dampers are left out.
     """
     structure: Any = model.system.structure
-    law = model.system.law
-    rest = np.zeros(law.static.shape[1])
-    stiffness = -law.at(rest, rest, np.zeros(len(model.inputs)))[:, 1]
+    stiffness, _ = port_rates(model)
     held = structure.stiffness + structure.ports @ (stiffness[:, None] * structure.ports.T)
     # Shifted, so that motion that hardly anything holds does no harm.
     shift = 1.0

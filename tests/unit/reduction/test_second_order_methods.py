@@ -1,0 +1,90 @@
+"""Balanced truncation and Krylov vectors of structures, in the frequency domain and in time."""
+
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array, diags_array
+
+import vehiclemor as vm
+from vehiclemor.exceptions import InputError
+from vehiclemor.reduction.methods import balanced_truncation, craig_bampton, krylov
+from vehiclemor.reduction.projection.modes import port_rates
+from vehiclemor.reduction.projection.structural import projected
+
+
+@pytest.fixture(scope="module")
+def truck():
+    return vm.model("flexible_truck")
+
+
+def fitted(method, model, **values):
+    method.METHOD.check(model, settings := method.METHOD.settings["structural"](**values))
+    return method.fit(model, None, settings)
+
+
+def response(model, structure, frequency):
+    """Deflections of the ports to forces at them, linearised."""
+    s, (stiffness, rates) = 2j * np.pi * frequency, port_rates(model)
+    sparse = structure.stiffness, structure.mass, structure.ports, structure.dampers
+    k, m, b, w = (x.toarray() for x in sparse)
+    damping = structure.damping_time * k + w @ w.T + (b * rates) @ b.T
+    return b.T @ np.linalg.solve(s**2 * m + s * damping + k + (b * stiffness) @ b.T, b)
+
+
+def response_error(model, reduced):
+    full, small = model.system.structure, projected(model.system.structure, reduced.bases[0])[0]
+    exact, found = ([response(model, x, f) for f in (0.5, 2, 8, 20, 50)] for x in (full, small))
+    return max(np.linalg.norm(a - b) / np.linalg.norm(a) for a, b in zip(exact, found, strict=True))
+
+
+def test_balanced_truncation_has_smaller_errors_than_craig_bampton_of_equal_rank(truck):
+    errors = [response_error(truck, fitted(balanced_truncation, truck, rank=r)) for r in (25, 45)]
+    others = fitted(craig_bampton, truck, highest=60.0)
+    assert others.order == 45
+    assert errors[1] < min(0.1 * errors[0], 0.5 * response_error(truck, others))
+
+
+@pytest.mark.parametrize("method", [balanced_truncation, krylov])
+def test_reduced_trucks_ride_as_the_full_one(truck, method):
+    road = vm.road("C", 7, 22.0)
+    full, run = truck.run(road), fitted(method, truck).simulate(road, "equilibrium")
+    error = np.sqrt(np.mean((run.outputs - full.outputs)[:, :5] ** 2, axis=0))
+    assert (error < 0.01 * full.outputs[:, :5].std(axis=0)).all()
+
+
+def test_krylov_vectors_match_twice_as_many_moments_as_blocks(truck):
+    vectors = krylov.krylov_vectors(truck, 20.0, 2)
+    assert np.allclose(vectors.T @ vectors, np.eye(vectors.shape[1]), atol=1e-12)
+    moments = []
+    for s in (truck.system.structure, projected(truck.system.structure, vectors)[0]):
+        m, b = s.mass.toarray(), s.ports.toarray()
+        solved = np.linalg.inv((s.stiffness + (40.0 * np.pi) ** 2 * s.mass).toarray())
+        moments.append([b.T @ solved @ np.linalg.matrix_power(m @ solved, k) @ b for k in range(5)])
+    agree = [abs(a - b).max() < 1e-9 * abs(a).max() for a, b in zip(*moments, strict=True)]
+    assert agree == [True] * 4 + [False]
+
+
+def test_motions_without_mass_are_for_krylov_alone():
+    mass, stiffness = diags_array([1.0, 2.0, 0.0], format="csc"), csc_array(np.eye(3) + 1.0)
+    b, w = csc_array([[1.0], [0.0], [0.0]]), csc_array((3, 0))
+    structure = SimpleNamespace(mass=mass, stiffness=stiffness, ports=b, dampers=w)
+    model = SimpleNamespace(name="plate", size=3, system=SimpleNamespace(structure=structure))
+    assert krylov.krylov_vectors(model, 1.0, 9).shape == (3, 2)
+    with pytest.raises(InputError, match="plate has motions without mass"):
+        balanced_truncation.METHOD.check(
+            model, balanced_truncation.BalancedTruncationSettings(rank=2)
+        )
+
+
+def test_what_does_not_fit_is_refused(truck, monkeypatch):
+    with pytest.raises(InputError, match=r"n = 559; balanced_truncation .* up to 499"):
+        fitted(balanced_truncation, vm.model("flexible_truck", {"elements_per_bay": 3}))
+    with pytest.raises(InputError, match="rank is 175; flexible_truck allows at most 174"):
+        fitted(balanced_truncation, truck, rank=175)
+    with pytest.raises(InputError, match="moments is 3; it allows at most 2"):
+        krylov.METHOD.check(SimpleNamespace(name="it", size=3), krylov.KrylovSettings(moments=3))
+    monkeypatch.setitem(sys.modules, "pymor.models.iosys", None)
+    with pytest.raises(InputError, match=r'pip install "vehiclemor\[contenders\]"'):
+        fitted(balanced_truncation, truck)
