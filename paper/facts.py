@@ -124,6 +124,9 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
         rows = study_comparison("predictive", folder, jobs)
         rows = rows[rows["kind"] == "method"].dropna(axis=1, how="all")
         return rows.set_index(["model", "label"]).to_xarray()
+    if kind == "sizes":
+        rows = study_comparison(model, folder, jobs)
+        return rows.set_index(["mesh", "label"]).to_xarray()
     return run_studies(source, folder, jobs)[source]
 
 
@@ -144,6 +147,8 @@ def stored_files(source: str, folder: Path) -> list[Path]:
     studies = [source]
     if kind == "costs":
         studies = [f"timing-{model}"]
+    elif kind == "sizes":
+        studies = [model]
     elif kind == "predictive":
         studies = [f"predictive-{name}" for name in names("model")]
     return [folder / "studies" / f"{study}.nc" for study in studies]
@@ -158,6 +163,7 @@ def origin(source: str, dataset: xr.Dataset, files: list[Path]) -> dict[str, str
     commands |= {
         "operations": "python paper/regenerate.py",
         "predictive": "vehiclemor compare predictive",
+        "sizes": "vehiclemor compare size",
     }
     commands |= {kind: f"python paper/{kind}.py" for kind in SCRIPTS}
     written = max((path.stat().st_mtime for path in files), default=None)

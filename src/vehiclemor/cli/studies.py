@@ -44,6 +44,9 @@ def run(
     with shown_progress() as runs:
         found = run_studies(study, results, jobs, scheduler, seed)
     for name, dataset in found.items():
+        if "status" not in dataset:
+            print(f"{name}: {dataset.sizes['mesh']} meshes; {dataset.encoding['source']}")
+            continue
         places = f"{dataset['status'].size} grid points, {runs[name]} runs"
         counts = counted_ends(dataset)
         print(wrapped(f"{name}: {places}: {counts}; {dataset.encoding['source']}", 0, 2))

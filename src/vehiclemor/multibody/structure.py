@@ -9,12 +9,13 @@ is declared as other equations are; all else are arrays.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from scipy.sparse import csc_array
+    # Of SciPy's arrays no types are known.
+    csc_array = Any
 
 
 @dataclass(frozen=True, eq=False)

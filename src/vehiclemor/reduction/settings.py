@@ -77,6 +77,14 @@ StructuralTolerance = Annotated[
         description="largest error of an output by the step size, as part of its range",
     ),
 ]
+StructuralStep = Annotated[
+    float,
+    Field(
+        ge=0.0,
+        le=0.1,
+        description="step size in s in the place of the tolerance; 0: by that",
+    ),
+]
 
 
 class OnlineSettings(Settings):

@@ -76,8 +76,8 @@ def fitted(
 
 def for_model(method: Method, reduced: FittedModel, model: Model, settings: Any) -> FittedModel:
     """What a method gives of a model with other parameters; `InputError` if it learns from runs."""
-    remade = getattr(reduced, "for_model", None)
-    if method.learns_from != "inputs" and (remade is None or difference(reduced.model, model)):
+    remade, own = getattr(reduced, "for_model", None), getattr(reduced, "model", model)
+    if method.learns_from != "inputs" and (remade is None or difference(own, model)):
         raise InputError(
             f"{method.name} is trained on runs of one model: reduce that with the other parameters"
         )

@@ -10,15 +10,17 @@ import xarray as xr
 
 from vehiclemor.arguments import count, file_path
 from vehiclemor.exceptions import InputError
+from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import component, names, unknown
-from vehiclemor.report.criteria import CRITERIA
+from vehiclemor.report.criteria import CRITERIA, SUBSTANTIAL
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.findings import Criterion, Finding, Results, judged
 from vehiclemor.report.frames import frame, grid_rows
 from vehiclemor.report.labels import of_kind, timing_cases
 from vehiclemor.report.printed_numbers import CLAIMS, TIMING, compared, number_criterion
 from vehiclemor.report.published import Claim, Number, load_published
+from vehiclemor.report.sizes import size_rows
 from vehiclemor.report.spectrum import spectrum_table
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.resources import data_names
@@ -26,6 +28,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
+from vehiclemor.study.store import combined_path
 from vehiclemor.study.timing import timed_starts
 
 PAPER = "paper"
@@ -33,6 +36,8 @@ ALL_MODELS = "all three models"
 NOTHING_MEASURED = "an explanation or a judgement; the paper prints nothing that could be measured"
 # The paper says nothing of another start.
 PUBLISHED_START = "equilibrium"
+# The claim that the size study bears on, beside the paper's own models.
+LESS_TIME = "all_close_agreement_less_time"
 Row = dict[str, Any]
 
 
@@ -86,8 +91,28 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
     judged_by = [(number, number_criterion(number)) for number in numbers]
     judged_by += [(claim, claim_criterion(claim)) for claim in claims if claim.kind != "setup"]
     rows = [row for entry, criterion in judged_by for row in rows_of(entry, criterion, results)]
+    rows.append(_of_size(load_published().claims[LESS_TIME], folder))
     place = {model: index for index, model in enumerate(dict.fromkeys(n.model for n in numbers))}
     return pd.DataFrame(sorted(rows, key=lambda row: place.get(row["model"], len(place))))
+
+
+def _of_size(claim: Claim, folder: Path) -> Row:
+    """The claim of less computation on the largest mesh of the truck, if that has been timed."""
+    text = (
+        "time of a Craig-Bampton model over that of its full model, the largest mesh of the truck"
+    )
+    finding = Finding(math.nan, 1.0 - SUBSTANTIAL, None, text, "vehiclemor run size measures it")
+    path = combined_path(folder, "size")
+    if path.exists():
+        known = list(size_rows(read_dataset(path, "study", "size")))
+        chosen = [row for row in known if row["label"] == "Craig-Bampton"]
+        row = max(chosen, key=lambda row: row["coordinates"])
+        share = row["seconds"] / row["full_seconds"]
+        seen = f"n = {row['coordinates']}: {row['gain_mesh']:.3g} times faster"
+        finding = Finding(share, 1.0 - SUBSTANTIAL, share < 1.0 - SUBSTANTIAL, text, seen)
+    head = {"id": claim.id, "model": ALL_MODELS, "item": claim.statement, "published": math.nan}
+    own = {"variant": "a truck of finite elements", "verdict": judged(finding.within)}
+    return head | own | {"replay": math.nan} | finding._asdict()
 
 
 def claim_criterion(claim: Claim) -> Criterion:
@@ -148,6 +173,9 @@ def study_comparison(
     """
     rows: list[Row] = []
     for dataset in run_studies(study, folder, jobs, seed=seed).values():
+        if "mesh" in dataset.dims:
+            rows += size_rows(dataset)
+            continue
         rows += protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
     return pd.DataFrame(rows)
 

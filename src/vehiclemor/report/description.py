@@ -27,7 +27,7 @@ KINDS = {
     "ae": "algebraic equations Phi(q; u) = 0",
     "ode": "ordinary differential equations x' = f(x, u)",
     "dae": "differential equations with constraints, stabilised",
-    "structural": "sparse matrices M q'' + D q' + K q = g + B f(B' q, B' q', u)",
+    "structural": "sparse matrices M q'' + D q' + K q, and forces at ports",
 }
 UNKNOWN = "known once the model has been simulated"
 QUANTITIES = ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints", "ports")

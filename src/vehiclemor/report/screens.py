@@ -22,6 +22,7 @@ from vehiclemor.report.findings import (
 from vehiclemor.report.frames import ERRORS
 from vehiclemor.report.labels import ERROR, Column, column, main_outputs, of_kind
 from vehiclemor.report.printing import Table, shown, wrapped
+from vehiclemor.report.sizes import COSTS, EXPLAINED, KIND, RIVALS, growth_text
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 Row = dict[str, Any]
@@ -225,7 +226,13 @@ def study_parts(rows: pd.DataFrame) -> list[Part]:
     records: list[Row] = rows.to_dict("records")
     grids = [row for row in records if row["kind"] == ERRORS]
     parts = [part for own in _by(grids, "study").values() for part in _grid_parts(own)]
-    judged = [row for row in records if row["kind"] != ERRORS]
+    sized = [row for row in records if row["kind"] == KIND]
+    for own in _by(sized, "study").values():
+        title = f"{own[0]['study']}: what a reduced model gains"
+        parts.append(Table(own, COSTS, title, below=growth_text(own)))
+        compared = [row for row in own if row["error_motion"] == row["error_motion"]]
+        parts.append(Table(compared, RIVALS, below=EXPLAINED))
+    judged = [row for row in records if row["kind"] not in (ERRORS, KIND)]
     return parts + (_unseen_parts(judged) if judged else [])
 
 

@@ -159,9 +159,11 @@ def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
     """Raise `InputError` if functions that were derived are missing or of another shape."""
     n, outputs = len(definition.coordinates), len(definition.outputs)
     constraints = len(definition.constraints)
+    needed: dict[str, tuple[int, ...]]
+    further: dict[str, tuple[int, ...]]
     if definition.kind == "ae":
         needed = {"residual": (n,), "residual_jacobian": (n, n + 1), "newton_step": (n,)}
-        further: dict[str, tuple[int, ...]] = {"joints": (len(definition.joints), 3)}
+        further = {"joints": (len(definition.joints), 3)}
     elif definition.kind == "structural":
         needed, further = {"port_forces": (len(definition.ports), 3)}, {}
     else:

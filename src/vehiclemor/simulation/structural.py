@@ -72,9 +72,12 @@ class Periods:
     _steps: dict[Any, int] = field(default_factory=dict)
 
     def march(
-        self, maneuver: Maneuver, tolerance: float, recorded: bool
+        self, maneuver: Maneuver, tolerance: float, step: float, recorded: bool
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-        """A run from the static state, see `StructuralSystem.march`."""
+        """A run from the static state, see `StructuralSystem.march` and `StructuralModel.run`."""
+        if step:
+            every = max(round(spacing_of(maneuver) / step), 1)
+            return self.steps_of(maneuver, every, maneuver.samples, recorded)
         key = maneuver, tolerance
         if key not in self._steps:
             if len(self._steps) >= MOST_RUNS:
@@ -92,7 +95,7 @@ class Periods:
         inputs = inputs_at_steps(maneuver, every)
         if begin:
             inputs = inputs[begin * every :] - inputs[begin * every]
-        spacing = maneuver.duration / max(maneuver.samples - 1, 1)
+        spacing = spacing_of(maneuver)
         edges = [round(edge / spacing) - begin for edge in self.edges]
         ends = [min(max(edge, 0), samples - 1) for edge in edges] + [samples - 1]
         state, first, parts = np.zeros((3, self.systems[0].structure.size)), 0, []
@@ -114,7 +117,7 @@ class Periods:
             if recorded:
                 states[first + new : end + 1] = part[1][new:]
             first = end
-        return histories, states, sum(part[2] for part in parts), parts[-1][3]
+        return histories, states, np.sum([part[2] for part in parts], axis=0), parts[-1][3]
 
     def steps(self, maneuver: Maneuver, tolerance: float) -> int:
         """Steps between output times, so many that outputs are as accurate as asked for.
@@ -123,7 +126,7 @@ class Periods:
         they differ by more than the tolerance times the range of an output; the method is of second
         order.
         """
-        spacing = maneuver.duration / max(maneuver.samples - 1, 1)
+        spacing = spacing_of(maneuver)
         every = max(round(spacing / FIRST_STEP), 1)
         least, most = (max(round(spacing / h), 1) for h in (LONGEST_STEP, SHORTEST_STEP))
         samples = min(round(TRIED / spacing) + 1, maneuver.samples)
@@ -140,6 +143,11 @@ class Periods:
         while every > least and not every % 2 and 5.0 * error < tolerance:
             every, error = every // 2, 4.0 * error
         return every
+
+
+def spacing_of(maneuver: Maneuver) -> float:
+    """Time in s between output times."""
+    return maneuver.duration / max(maneuver.samples - 1, 1)
 
 
 @lru_cache(maxsize=16)
@@ -259,17 +267,19 @@ class StructuralModel(Model):
         tolerance: float = USUAL,
         outputs: Names = None,
         recorded: bool = False,
+        step: float = 0.0,
     ) -> Trajectory:
         """A run of the full structure, or of reduced ones by period; it records a divergence.
 
-        Where it is to be recorded, the trajectory has all n coordinates.
+        Where it is to be recorded, the trajectory has all n coordinates.  A step in s takes the
+        place of the tolerance.
         """
         maneuver = checked_maneuver(maneuver, self.definition)
         names = None if outputs is None else output_names(outputs)
         periods = periods or Periods((self.system,))
         counts = dict.fromkeys(STRUCTURAL_COUNTS, 0)
         (histories, states, found, reason), seconds = timed(
-            lambda: periods.march(maneuver, tolerance, recorded)
+            lambda: periods.march(maneuver, tolerance, step, recorded)
         )
         counts |= dict(zip(STRUCTURAL_COUNTS, found.tolist(), strict=False))
         times, inputs = recorded_inputs(maneuver)

@@ -20,7 +20,8 @@ from vehiclemor.study.plans.loading import content_hash, studies_and_files
 from vehiclemor.study.plans.protocol import Protocol, load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.plans.results import combined, grid_digest
-from vehiclemor.study.plans.study_file import MOST_SEED
+from vehiclemor.study.plans.size import run_size
+from vehiclemor.study.plans.study_file import MOST_SEED, StudyFile
 from vehiclemor.study.store import combined_path, read_run, result_path, run_path, stored
 from vehiclemor.study.workers import Workers, cluster
 
@@ -52,6 +53,9 @@ def run_studies(
             if isinstance(plan, Protocol):
                 results[plan.study] = run_protocol(plan, folder, jobs, elsewhere)
                 continue
+            if isinstance(plan, tuple):
+                results[plan[0]] = run_size(*plan, folder)
+                continue
             keys = list(plan.experiments)
             workers = Workers(plan.name, folder, jobs, elsewhere)
             results[plan.name] = stored(
@@ -66,16 +70,18 @@ def run_studies(
     return results
 
 
-def _plans(study: str, seed: int | None) -> list[Grid | Protocol]:
-    """Grids and protocols of a study or collection, all names resolved."""
+def _plans(study: str, seed: int | None) -> list[Grid | Protocol | tuple[str, StudyFile]]:
+    """Grids, protocols and size studies of a study or collection, all names resolved."""
     if seed is not None:
         count("seed", seed, least=0, most=MOST_SEED)
     files = studies_and_files(study)
     if seed is not None and not any(definition.drawn for _, definition in files.values()):
         raise InputError(f"seed: {study} samples no test runs")
-    plans: list[Grid | Protocol] = []
+    plans: list[Grid | Protocol | tuple[str, StudyFile]] = []
     for name, (path, definition) in files.items():
-        if definition.bounds:
+        if definition.size:
+            plans.append((name, definition))
+        elif definition.bounds:
             plans.append(load_protocol(str(path), seed if definition.drawn else None, name))
         else:
             large = definition.points >= LARGE
@@ -126,6 +132,11 @@ def status_of(study: str, folder: Path, seed: int | None = None) -> dict[str, St
         raise FileError(f"{folder}: not a folder")
     found: dict[str, StudyStatus] = {}
     for plan in _plans(study, seed):
+        if isinstance(plan, tuple):
+            name, definition = plan
+            result = result_path(folder, name, content_hash(definition))
+            found[name] = StudyStatus(1, done=int(result is not None), result=result)
+            continue
         if isinstance(plan, Protocol):
             validation, name, later = plan.sets["validation"], plan.study, LATER
             groups = [entry.experiments(plan.model, validation) for entry in plan.entries]

@@ -3,185 +3,108 @@
 Timoshenko's stiffness with St. Venant's torsion, consistent mass of the cubic shape functions
 (Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 5.6 and 11.4).  Axial forces act at
 the centroid, transverse ones at the shear centre; the nodes stand on the webs.  Left out: warping,
-which stiffens open sections in torsion, the rotary inertia of bending, and
-half a cross member's width of the rails at either end.
+which stiffens open sections in torsion, the rotary inertia of bending, and half a cross member's
+width of the rails at either end.
 """
 
 from __future__ import annotations
 
-from itertools import product
-from typing import TYPE_CHECKING
+from itertools import pairwise
 
 import numpy as np
 
-from vehiclemor.multibody.flexible_truck.frame import Box, Channel, Frame, Layout, around
+from vehiclemor.multibody.flexible_truck import frame as ladder
 
-if TYPE_CHECKING:
-    from scipy.sparse import csc_array
-
-UP = np.array([0.0, 0.0, 1.0])
-
-
-def _pair(matrix: np.ndarray, rows: list[int], entries: list[list[np.ndarray]]) -> None:
-    """Set a symmetric block from its upper triangle, row by row."""
-    for i, row in enumerate(entries):
-        for j, value in enumerate(row, start=i):
-            matrix[:, rows[i], rows[j]] = matrix[:, rows[j], rows[i]] = value
-
-
-def _bending(l: np.ndarray, shear: np.ndarray) -> list[list[np.ndarray]]:  # noqa: E741
-    """Stiffness over E I / (l^3 (1 + shear)), upper triangle; deflection, its slope, twice."""
-    one = np.ones_like(l)
-    return [
-        [12 * one, 6 * l, -12 * one, 6 * l],
-        [(4 + shear) * l**2, -6 * l, (2 - shear) * l**2],
-        [12 * one, -6 * l],
-        [(4 + shear) * l**2],
-    ]
-
-
-def _inertia(l: np.ndarray) -> list[list[np.ndarray]]:  # noqa: E741
-    """Consistent mass over rho A l / 420, upper triangle; deflection, its slope, twice."""
-    one = np.ones_like(l)
-    return [
-        [156 * one, 22 * l, 54 * one, -13 * l],
-        [4 * l**2, 13 * l, -3 * l**2],
-        [156 * one, -22 * l],
-        [4 * l**2],
-    ]
+# Deflection and slope at the first end, then at the second, of a beam of length 1.
+BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+SHEAR = np.array([[0, 0, 0, 0], [0, 1, 0, -1], [0, 0, 0, 0], [0, -1, 0, 1]])
+INERTIA = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
+# From axes x, y, z to those of a beam along y.
+ALONG_Y = np.kron(np.eye(4), [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def matrices(
-    lengths: np.ndarray,
-    section: Channel | Box,
-    modulus: float,
-    poisson_ratio: float,
-    density: float,
+    lengths: np.ndarray, section: ladder.Section, material: tuple[float, float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and mass (elements, 12, 12) of beams along x with upright webs, z up.
 
     Rows: displacements x, y, z and rotations about them at the first end, then at the second.
     """
+    modulus, poisson_ratio, density = material
     shear_modulus = modulus / (2.0 * (1.0 + poisson_ratio))
     stiffness, mass = np.zeros((2, len(lengths), 12, 12))
-    line = [[1.0 / lengths, -1.0 / lengths], [1.0 / lengths]]
-    thirds = [[lengths / 3.0, lengths / 6.0], [lengths / 3.0]]
+    length = lengths[:, None, None]
     polar = section.upright + section.sideways
-    for row, rigidity, weight in (
+    for row, rigidity, inertia in (
         (0, modulus * section.area, density * section.area),
         (3, shear_modulus * section.torsion, density * polar),
     ):
-        _pair(stiffness, [row, row + 6], [[rigidity * v for v in values] for values in line])
-        _pair(mass, [row, row + 6], [[weight * v for v in values] for values in thirds])
-    web, flanges = section.shear_areas
-    # A slope about y lowers the far end: its rows change sign with the length.
-    for rows, inertia, area, sign in (
-        ([2, 4, 8, 10], section.upright, web, -1.0),
-        ([1, 5, 7, 11], section.sideways, flanges, 1.0),
+        own = (slice(None), *np.ix_([row, row + 6], [row, row + 6]))
+        stiffness[own] = rigidity / length * [[1, -1], [-1, 1]]
+        mass[own] = inertia * length / 6.0 * [[2, 1], [1, 2]]
+    # A slope about y lowers the far end.
+    for rows, second_moment, shear_area, sign in (
+        ([2, 4, 8, 10], section.upright, section.shear_areas[0], -1.0),
+        ([1, 5, 7, 11], section.sideways, section.shear_areas[1], 1.0),
     ):
-        rigidity = modulus * inertia
-        shear = 12.0 * rigidity / (shear_modulus * area * lengths**2)
-        factor = rigidity / (lengths**3 * (1.0 + shear))
-        weight = density * section.area * lengths / 420.0
-        bent, moved = _bending(sign * lengths, shear), _inertia(sign * lengths)
-        _pair(stiffness, rows, [[factor * v for v in values] for values in bent])
-        _pair(mass, rows, [[weight * v for v in values] for values in moved])
+        own = (slice(None), *np.ix_(rows, rows))
+        rigidity = modulus * second_moment
+        shear = 12.0 * rigidity / (shear_modulus * shear_area * length**2)
+        slopes = np.where([False, True, False, True], sign * length, 1.0)
+        scale = slopes * slopes.swapaxes(1, 2)
+        stiffness[own] = rigidity / (length**3 * (1.0 + shear)) * scale * (BENDING + shear * SHEAR)
+        mass[own] = density * section.area * length / 420.0 * scale * INERTIA
     return stiffness, mass
 
 
-def _at_nodes(along: np.ndarray, axial: np.ndarray, across: np.ndarray) -> np.ndarray:
-    """Motion (elements, 12, 12) of the beams' lines in their own axes from that of the nodes.
+def at_nodes(axial: float, across: float) -> np.ndarray:
+    """Motion (12, 12) of a beam's line by that of its nodes.
 
-    `along` (elements, 3) are unit vectors; `axial` and `across` the places (3,) relative to the
-    nodes whose displacement is along the beam, and across it.
+    `axial` and `across` are the places y in m, relative to the nodes, of the points whose
+    displacement is along the beam, and across it.
     """
-    sideways = np.cross(UP, along)
-    axes = np.stack([along, sideways, np.broadcast_to(UP, along.shape)], axis=1)
-    node = np.zeros((len(along), 6, 6))
-    node[:, :3, :3] = node[:, 3:, 3:] = axes
-    node[:, 0, 3:] = -(sideways @ axial)[:, None] * axes[:, 2]
-    node[:, 2, 3:] = (sideways @ across)[:, None] * axes[:, 0]
-    both = np.zeros((len(along), 12, 12))
-    both[:, :6, :6] = both[:, 6:, 6:] = node
-    return both
+    end, shear = ladder.levers(np.array([[0.0, axial, 0.0], [0.0, across, 0.0]]))
+    end[2] = shear[2]
+    return np.kron(np.eye(2), end)
 
 
-def frame(layout: Layout, elements_per_bay: int) -> Frame:
+def frame(layout: ladder.Layout, elements_per_bay: int) -> ladder.Frame:
     """Ladder frame of beams with so many elements a bay, and as many a cross member."""
-    from scipy.sparse import coo_array, csc_array
+    from scipy.sparse import block_diag, csc_array, diags_array, eye_array
 
-    k = elements_per_bay
-    lines = layout.lines([k] * (len(layout.stations) - 1))
-    nodes = [np.array([x, y, layout.height]) for x in lines for y in layout.sides]
-    numbers = np.arange(len(nodes)).reshape(-1, 2)
-    left = np.array([0.0, -1.0, 0.0])
-    groups: list[tuple[np.ndarray, Channel | Box, np.ndarray]] = [
-        (np.stack([row[:-1], row[1:]], axis=1), layout.rail, sign * left)
-        for row, sign in zip(numbers.T, (1.0, -1.0), strict=True)
-    ]
-    for crossing in layout.crossings:
-        first, last = numbers[crossing * k]
-        inner = np.arange(len(nodes), len(nodes) + k - 1)
-        share = np.arange(1, k)[:, None] / k
-        nodes += list(nodes[first] + share * (nodes[last] - nodes[first]))
-        row = np.array([first, *inner, last])
-        groups.append((np.stack([row[:-1], row[1:]], axis=1), layout.cross, 0.0 * left))
-    places = np.array(nodes)
-    material = layout.modulus, layout.poisson_ratio, layout.density
-    parts = []
-    for ends, section, flanges in groups:
-        span = places[ends[:, 1]] - places[ends[:, 0]]
-        lengths = np.linalg.norm(span, axis=1)
-        stiffness, mass = matrices(lengths, section, *material)
-        centre, shear = section.centroid * flanges, section.shear_centre * flanges
-        along = span / lengths[:, None]
-        bent, moved = _at_nodes(along, centre, shear), _at_nodes(along, centre, centre)
-        own = (6 * ends[:, :, None] + np.arange(6)).reshape(len(ends), 12)
-        parts.append(
-            (
-                own,
-                bent.transpose(0, 2, 1) @ stiffness @ bent,
-                moved.transpose(0, 2, 1) @ mass @ moved,
-            )
-        )
-    own = np.concatenate([part[0] for part in parts])
-    rows, columns = np.repeat(own, 12, axis=1).ravel(), np.tile(own, 12).ravel()
-    size = 6 * len(places)
-    found = [
-        csc_array(
-            coo_array((np.concatenate([p[n] for p in parts]).ravel(), (rows, columns)), (size,) * 2)
-        )
-        for n in (1, 2)
-    ]
-    chosen = (6 * numbers[::k, :, None] + np.arange(6)).ravel()
-    picked = coo_array(
-        (np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), (len(chosen), size)
+    k, rail, height, stations = elements_per_bay, layout.rail, layout.height, layout.stations
+    lines = ladder.divided(stations, np.full(len(stations) - 1, k))
+    widths = ladder.divided(layout.sides[::-1], np.array([k]))
+    # Rails run forward, cross members to the left.
+    grids = [np.array([(x, y, height) for x in lines[::-1]]) for y in layout.sides]
+    grids += [np.array([(stations[n], y, height) for y in widths]) for n in layout.crossings]
+    nodes, numbers = ladder.joined(grids)
+    coordinates = eye_array(6 * len(nodes)).tocsr()
+    stiffness, mass, ends = [], [], []
+    for line, (places, own) in enumerate(zip(grids, numbers, strict=True)):
+        lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        section, bent, moved = layout.cross, ALONG_Y, ALONG_Y
+        if line < 2:
+            # Flanges point inward.
+            inward = -np.sign(layout.sides[line])
+            centre, shear = inward * rail.centroid, inward * rail.shear_centre
+            section, bent, moved = rail, at_nodes(centre, shear), at_nodes(centre, centre)
+        elastic, inertia = matrices(lengths, section, layout.material)
+        stiffness += list(bent.T @ elastic @ bent)
+        mass += list(moved.T @ inertia @ moved)
+        ends += list(pairwise(own))
+    chosen = coordinates[np.add.outer(6 * np.ravel(ends), np.arange(6)).ravel()]
+    webs = np.stack([own[::-1] for own in numbers[:2]], axis=1)
+    along = 6 * np.repeat(webs, 2)
+    up = diags_array(np.tile([0.5, -0.5], webs.size) * rail.height)
+    return ladder.Frame(
+        mass=csc_array(chosen.T @ block_diag(mass) @ chosen),
+        stiffness=csc_array(chosen.T @ block_diag(stiffness) @ chosen),
+        nodes=nodes,
+        sections=csc_array(coordinates[np.add.outer(6 * webs[::k], np.arange(6)).ravel()]),
+        strains=ladder.strains(
+            lines,
+            csc_array(coordinates[along] + up @ coordinates[along + 4]),
+            [(stations[n], stations[n + 1]) for n in layout.gauged],
+        ),
     )
-    return Frame(
-        found[1], found[0], places, csc_array(picked), _strains(layout, lines, numbers, size)
-    )
-
-
-def _strains(layout: Layout, lines: np.ndarray, numbers: np.ndarray, size: int) -> csc_array:
-    """Axial strains at the corners of web and flange, by the section's forces at the place."""
-    from scipy.sparse import csc_array, lil_array
-
-    rail, rows = layout.rail, lil_array((4 * len(layout.gauges), size))
-    for number, x in enumerate(layout.gauges):
-        front, rear = around(lines, x)
-        # Two elements, half of each, where the place is a node.
-        for element, side, upper in product(range(front, rear), range(2), range(2)):
-            ends = lines[element + 1], lines[element]
-            length, along = ends[1] - ends[0], (2.0 * x - sum(ends)) / (ends[1] - ends[0])
-            slope = rail.upright / (rail.shear_areas[0] * length**2)
-            bend = 3.0 * along / (1.0 + 24.0 * (1.0 + layout.poisson_ratio) * slope)
-            z, weight = (upper - 0.5) * -rail.height / length, 1.0 / (rear - front)
-            offset = rail.shear_centre * -np.sign(layout.sides[side])
-            for end, sign in enumerate((-1.0, 1.0)):
-                node, row = 6 * numbers[element + 1 - end, side], 4 * number + 2 * side + upper
-                lift = weight * z * bend * 2.0 * sign / length
-                rows[row, node] += weight * sign / length
-                rows[row, node + 2] += lift
-                rows[row, node + 3] += lift * offset
-                rows[row, node + 4] += weight * z * (sign + bend)
-    return csc_array(rows)

@@ -1,22 +1,21 @@
 """Ride of a two-axle truck on a flexible ladder frame: sparse matrices and twelve ports.
 
-M q'' + (E + d K) q' + K q = load + B f(w, w', u), w = B' q: small motion about the upright truck at
-constant speed, gravity along z.  Masses, springs, dampers and stops are those of Project Chrono's
-MAN KAT1 5 t, which has a rigid frame; frame, cab, platform and tires' rates are ours.  The real
-frame is closed and stiffer.  Axes: ISO 8855.
+M q'' + (W W' + d K) q' + K q = load + B f(w, w', u), w = B' q: small motion about the upright truck
+at constant speed, gravity along z.  Masses, springs, dampers and stops are those of Project
+Chrono's MAN KAT1 5 t, which has a rigid frame; frame, cab, platform and tires' rates are ours.  The
+real frame is closed and stiffer.  Axes: ISO 8855.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.multibody.flexible_truck import quantities
-from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.multibody.flexible_truck.vehicle import check, structure
+from vehiclemor.multibody.quantities import TIRE_LOADS, WHEELS
 
 if TYPE_CHECKING:
-    from vehiclemor.multibody.structure import Structure
     from vehiclemor.symbolic.program import Program
 
 # Travel of the springs in m from end to end of the stops' table: nothing is known beyond.
@@ -29,20 +28,6 @@ def derive() -> Program:
     from vehiclemor.multibody.flexible_truck import equations
 
     return equations.derive()
-
-
-def structure(values: Mapping[str, Any]) -> Structure:
-    """Matrices of the truck."""
-    from vehiclemor.multibody.flexible_truck import vehicle
-
-    return vehicle.structure(values)
-
-
-def check(values: Mapping[str, Any]) -> None:
-    """Raise `InputError` or `GeometryError` where there is no such truck or mesh of it."""
-    from vehiclemor.multibody.flexible_truck import vehicle
-
-    vehicle.check(values)
 
 
 DEFINITION = ModelDefinition(
@@ -61,19 +46,11 @@ DEFINITION = ModelDefinition(
     check=check,
     validity={
         **{f"deflection_{wheel}": (-TRAVEL, TRAVEL) for wheel in WHEELS},
-        "pitch": (-SMALL_ANGLE, SMALL_ANGLE),
-        "roll": (-SMALL_ANGLE, SMALL_ANGLE),
+        **dict.fromkeys(("pitch", "roll"), (-SMALL_ANGLE, SMALL_ANGLE)),
         **{f"road_{wheel}": (-0.5, 0.5) for wheel in WHEELS},
         **{f"road_{wheel}_dot": (-10.0, 10.0) for wheel in WHEELS},
     },
-    loads=quantities.LOADS,
-    tabled_outputs=(
-        "driver_acceleration",
-        "pitch",
-        "roll",
-        "twist",
-        *(f"Fz_{wheel}" for wheel in WHEELS),
-        "strain_1",
-    ),
+    loads=TIRE_LOADS,
+    tabled_outputs=("driver_acceleration", "pitch", "roll", "twist", *TIRE_LOADS, "strain_1"),
     main_outputs=("driver_acceleration", "twist", "Fz_FL"),
 )

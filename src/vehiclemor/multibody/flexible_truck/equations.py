@@ -12,9 +12,7 @@ from vehiclemor.multibody.flexible_truck import quantities
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
-FRONT = (True, True, False, False)
-# A force along the deflection, and its derivatives by the deflection and by its rate.
-Law = tuple[sp.Expr, sp.Expr, sp.Expr]
+Parameters = dict[str, sp.Symbol]
 
 
 def derive() -> Program:
@@ -26,12 +24,13 @@ def derive() -> Program:
     p = {name: sp.Symbol(f"p_{name}", real=True) for name in quantities.PARAMETERS}
     driver = [sp.Symbol(f"p_driver_{axis}", real=True) for axis in "xyz"]
     parameters = [s for name in p for s in (driver if name == "driver" else [p[name]])]
-    laws = [_spring(tape, p, front, w[k]) for k, front in enumerate(FRONT)]
-    laws += [_damper(tape, p, rates[4 + k]) for k in range(4)]
-    laws += [_tire(tape, p, u[k] - w[8 + k], u[4 + k] - rates[8 + k]) for k in range(4)]
-    forces = [entry for law in laws for entry in law]
+    forces = [-_spring(tape, p, quantities.ENDS[k // 2], w[k]) for k in range(4)]
+    forces += [-_damper(tape, p, rates[4 + k]) for k in range(4)]
+    forces += [_tire(tape, p, u[k] - w[8 + k], u[4 + k] - rates[8 + k]) for k in range(4)]
+    slopes = tape.jacobian(forces, [*w, *rates])
+    table = [x for k, f in enumerate(forces) for x in (f, slopes[k][k], slopes[k][len(w) + k])]
     return assemble(
-        tape, {"x": [*w, *rates], "u": u}, parameters, {"port_forces": (forces, (len(w), 3))}
+        tape, {"x": [*w, *rates], "u": u}, parameters, {"port_forces": (table, (len(w), 3))}
     )
 
 
@@ -40,46 +39,37 @@ def _step(tape: Tape, condition: sp.Basic) -> sp.Expr:
     return tape.let(sp.Piecewise((1, condition), (0, True)))
 
 
-def _spring(tape: Tape, p: dict[str, sp.Symbol], front: bool, w: sp.Symbol) -> Law:
+def _spring(tape: Tape, p: Parameters, end: str, w: sp.Symbol) -> sp.Expr:
     """A spring: k w + k2 w abs(w) and its two stops; `w` is zero at the free length."""
-    end = "front" if front else "rear"
-    stiffness, progression = p[f"{end}_spring_stiffness"], p[f"{end}_spring_progression"]
+    size = tape.let((2 * _step(tape, w > 0) - 1) * w)
     free = p[f"{end}_free_length"]
-    size = tape.let(sp.Abs(w))
-    bump, bump_rate = _stop(tape, p, tape.let(w - (free - p["shortest_length"])))
-    rebound, rebound_rate = _stop(tape, p, tape.let((free - p["longest_length"]) - w))
-    force = tape.let(stiffness * w + progression * w * size + bump - rebound)
-    rate = tape.let(stiffness + 2 * progression * size + bump_rate + rebound_rate)
-    return -force, -rate, sp.Integer(0)
+    bump = _stop(tape, p, tape.let(w - (free - p["shortest_length"])))
+    rebound = _stop(tape, p, tape.let((free - p["longest_length"]) - w))
+    spring = p[f"{end}_spring_stiffness"] * w + p[f"{end}_spring_progression"] * w * size
+    return tape.let(spring + bump - rebound)
 
 
-def _stop(tape: Tape, p: dict[str, sp.Symbol], excess: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Force of a stop and its derivative: linear between the table's points, and beyond."""
-    force = rate = slope = place = reached = sp.Integer(0)
+def _stop(tape: Tape, p: Parameters, excess: sp.Expr) -> sp.Expr:
+    """Force of a stop: linear between the table's points, and beyond."""
+    force = slope = place = reached = sp.Integer(0)
     for point in quantities.STOP_TABLE:
         here, level = sp.Rational(point, 1000), p[f"stop_force_{point}_mm"]
         steeper = tape.let((level - reached) / (here - place) - slope)
-        beyond = _step(tape, excess > place)
-        force += steeper * beyond * (excess - place)
-        rate += steeper * beyond
+        force += steeper * _step(tape, excess > place) * (excess - place)
         slope, place, reached = tape.let(slope + steeper), here, level
-    return tape.let(force), tape.let(rate)
+    return tape.let(force)
 
 
-def _damper(tape: Tape, p: dict[str, sp.Symbol], v: sp.Symbol) -> Law:
+def _damper(tape: Tape, p: Parameters, v: sp.Symbol) -> sp.Expr:
     """A damper: c v / (1 + d abs(v)); bump is compression."""
     bump = _step(tape, v > 0)
     damping = tape.let(bump * p["bump_damping"] + (1 - bump) * p["rebound_damping"])
     degression = tape.let(bump * p["bump_degression"] + (1 - bump) * p["rebound_degression"])
-    divisor = tape.let(1 + degression * sp.Abs(v))
-    rate = tape.let(damping / divisor)
-    return -(rate * v), sp.Integer(0), -(rate / divisor)
+    return tape.let(damping * v / (1 + degression * (2 * bump - 1) * v))
 
 
-def _tire(tape: Tape, p: dict[str, sp.Symbol], deflection: sp.Expr, rate: sp.Expr) -> Law:
+def _tire(tape: Tape, p: Parameters, deflection: sp.Expr, rate: sp.Expr) -> sp.Expr:
     """A tire: max(0, k d + c v) in contact, d > 0, else 0."""
     d, v = tape.let(deflection), tape.let(rate)
-    stiffness, damping = p["tire_stiffness"], p["tire_damping"]
-    pressed = tape.let(stiffness * d + damping * v)
-    contact = tape.let(_step(tape, d > 0) * _step(tape, pressed > 0))
-    return contact * pressed, -(contact * stiffness), -(contact * damping)
+    pressed = tape.let(p["tire_stiffness"] * d + p["tire_damping"] * v)
+    return tape.let(_step(tape, d > 0) * _step(tape, pressed > 0) * pressed)

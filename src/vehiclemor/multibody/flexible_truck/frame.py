@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,142 +11,84 @@ import numpy as np
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-# Farther apart than this (m) two stations have another one between them.
+# Two stations are no farther apart than this (m).
 BAY = 0.7
-# Bays in whose middle the strains are: four places each, see `Frame.strains`.
-GAUGED = (3, 5, 7, 9, 10)
+# Nodes nearer than this (m) are one.
+SAME = 1e-6
 
 
-@dataclass(frozen=True)
-class Channel:
-    """Thin-walled C section by its middle line; lengths in m.
+class Section:
+    """Thin-walled section of one web, a C, or of two, a box; lengths of its middle line in m.
 
     Formulas: Young and Budynas, *Roark's Formulas for Stress and Strain* (7th ed.), tables A.1,
-    9.2 and 10.2.  Distances along the flanges are from the web, toward the flanges positive.
+    9.2 and 10.2.
+
+    Attributes
+    ----------
+    height, width, thickness
+        Height of the webs, width of the two flanges, thickness of all.
+    area, shear_areas
+        In m2; the latter carry shear along the webs and along the flanges.
+    centroid, shear_centre
+        Their distances from the (first) web, toward the flanges positive.
+    upright, sideways
+        Second moments of area in m4 that resist bending along the webs and along the flanges.
+    torsion
+        Torsion constant in m4: St. Venant's of a C, Bredt's of a box.
     """
 
-    height: float
-    flange: float
-    thickness: float
-
-    @property
-    def area(self) -> float:
-        """Area in m2."""
-        return self.thickness * (self.height + 2.0 * self.flange)
-
-    @property
-    def centroid(self) -> float:
-        """Distance of the centroid."""
-        return self.flange**2 / (2.0 * self.flange + self.height)
-
-    @property
-    def shear_centre(self) -> float:
-        """Distance of the shear centre, which lies on the other side of the web."""
-        return -3.0 * self.flange**2 / (6.0 * self.flange + self.height)
-
-    @property
-    def upright(self) -> float:
-        """Second moment of area in m4 that resists bending along the web."""
-        return self.thickness * self.height**2 * (self.height / 12.0 + self.flange / 2.0)
-
-    @property
-    def sideways(self) -> float:
-        """Second moment of area in m4 that resists bending along the flanges."""
-        flanges = 2.0 * self.thickness * self.flange**3 / 3.0
-        return flanges - self.area * self.centroid**2
-
-    @property
-    def torsion(self) -> float:
-        """St. Venant's torsion constant in m4."""
-        return self.thickness**2 * self.area / 3.0
-
-    @property
-    def shear_areas(self) -> tuple[float, float]:
-        """Areas in m2 that carry shear along the web and along the flanges."""
-        return self.thickness * self.height, 5.0 / 3.0 * self.thickness * self.flange
+    def __init__(self, h: float, b: float, t: float, webs: int) -> None:
+        self.height, self.width, self.thickness = h, b, t
+        self.area = t * (webs * h + 2.0 * b)
+        self.centroid = t * (b**2 + (webs - 1) * h * b) / self.area
+        self.upright = t * h**2 * (webs * h / 12.0 + b / 2.0)
+        about_web = t * (2.0 * b**3 / 3.0 + (webs - 1) * h * b**2)
+        self.sideways = about_web - self.area * self.centroid**2
+        if webs == 1:
+            self.shear_centre = -3.0 * b**2 / (6.0 * b + h)
+            self.shear_areas = t * h, 5.0 / 3.0 * t * b
+            self.torsion = t**2 * self.area / 3.0
+        else:
+            self.shear_centre = b / 2.0
+            self.shear_areas = 2.0 * t * h, 2.0 * t * b
+            self.torsion = 2.0 * t * (h * b) ** 2 / (h + b)
 
 
-@dataclass(frozen=True)
-class Box:
-    """Thin-walled closed section by its middle line; lengths in m.  Formulas as for `Channel`."""
-
-    height: float
-    width: float
-    thickness: float
-    # Double symmetry: both centres are in the middle.
-    centroid = shear_centre = 0.0
-
-    @property
-    def area(self) -> float:
-        """Area in m2."""
-        return 2.0 * self.thickness * (self.height + self.width)
-
-    @property
-    def upright(self) -> float:
-        """Second moment of area in m4 that resists bending along the height."""
-        return self.thickness * self.height**2 * (self.height / 6.0 + self.width / 2.0)
-
-    @property
-    def sideways(self) -> float:
-        """Second moment of area in m4 that resists bending along the width."""
-        return self.thickness * self.width**2 * (self.width / 6.0 + self.height / 2.0)
-
-    @property
-    def torsion(self) -> float:
-        """Bredt's torsion constant in m4."""
-        enclosed = self.height * self.width
-        return 2.0 * self.thickness * enclosed**2 / (self.height + self.width)
-
-    @property
-    def shear_areas(self) -> tuple[float, float]:
-        """Areas in m2 that carry shear along the height and along the width."""
-        return 2.0 * self.thickness * self.height, 2.0 * self.thickness * self.width
-
-
-@dataclass(frozen=True)
 class Layout:
-    """Geometry and material of the ladder: two rails, cross members at some of the stations.
+    """Geometry and material of the ladder: two rails, a cross member in every plane but one.
 
     Attributes
     ----------
     stations
         x (stations,) in m, from front to rear.
+    planes
+        Numbers of the stations of axles, cab mounts, gearbox and ends.
     crossings
         Numbers of the stations with a cross member.
-    spacing, height
-        Distance of the rails' webs, height of their middle; in m.
-    modulus, poisson_ratio, density
-        In N/m2, 1, kg/m3.
+    gauged
+        Numbers of five bays with strains: next to axles and gearbox, and between.
+    sides, height
+        y (2,) of the left and the right rail's web, and z of its middle; in m.
+    rail, cross
+        Sections; all are as high as the rails, so that their middle lines meet.
+    material
+        Modulus in N/m2, Poisson's ratio, density in kg/m3.
     """
 
-    stations: np.ndarray
-    crossings: tuple[int, ...]
-    spacing: float
-    height: float
-    rail: Channel
-    cross: Box
-    modulus: float
-    poisson_ratio: float
-    density: float
-
-    @cached_property
-    def sides(self) -> np.ndarray:
-        """Places y (2,) of the left and the right web in m."""
-        return np.array([0.5, -0.5]) * self.spacing
-
-    @cached_property
-    def gauges(self) -> np.ndarray:
-        """Places x of the strains in m: in the middle between cross members' webs and stations."""
-        half = np.zeros(len(self.stations))
-        half[list(self.crossings)] = self.cross.width / 2.0
-        clear = np.array([self.stations - half, self.stations + half])
-        return np.array([(clear[0, k] + clear[1, k + 1]) / 2.0 for k in GAUGED])
-
-    def lines(self, parts: list[int]) -> np.ndarray:
-        """Places x of a mesh that divides every bay into some parts."""
-        ends = zip(self.stations[:-1], self.stations[1:], parts, strict=True)
-        inner = [np.linspace(a, b, k, endpoint=False) for a, b, k in ends]
-        return np.concatenate([*inner, self.stations[-1:]])
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        places = planes(values)
+        parts = np.ceil(-np.diff(list(places.values())) / BAY - 1e-9).astype(int)
+        self.stations = divided(list(places.values()), parts)
+        self.planes = dict(zip(places, [0, *np.cumsum(parts).tolist()], strict=True))
+        self.crossings = [n for name, n in self.planes.items() if name != "front cab mounts"]
+        front, gearbox, rear = (self.planes[n] for n in ("front axle", "gearbox", "rear axle"))
+        self.gauged = [front, gearbox - 1, (gearbox + rear - 1) // 2, rear - 1, rear]
+        self.sides = np.array([0.5, -0.5]) * values["rail_spacing"]
+        self.height = values["frame_height"]
+        thick, depth = values["rail_thickness"], values["rail_depth"] - values["rail_thickness"]
+        self.rail = Section(depth, values["rail_flange"] - thick / 2.0, thick, webs=1)
+        self.cross = Section(depth, values["cross_width"], values["cross_thickness"], webs=2)
+        self.material = values["modulus"], values["poisson_ratio"], values["density"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +106,7 @@ class Frame:
         station, left and right, at the middle of the web.
     strains
         (20, n): axial strains at the corners of web and flange, by place, left and right, upper
-        and lower; shells have that of the element, or the two, around the place.
+        and lower; from the displacements along x at the ends of the elements around the place.
     """
 
     mass: csc_array
@@ -192,33 +132,39 @@ def planes(values: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def layout(values: Mapping[str, Any]) -> Layout:
-    """Layout from the parameters; every plane but the front mounts' has a cross member.
-
-    All sections are as high as the rails: their middle lines meet.
-    """
-    places = list(planes(values).values())
-    parts = [int(np.ceil((a - b) / BAY - 1e-9)) for a, b in pairwise(places)]
+def divided(corners: Sequence[float] | np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Points from corner to corner, with so many parts between them."""
     numbers = np.concatenate([[0], np.cumsum(parts)])
-    between = [
-        np.linspace(a, b, k, endpoint=False)
-        for (a, b), k in zip(pairwise(places), parts, strict=True)
-    ]
-    thickness, depth = values["rail_thickness"], values["rail_depth"] - values["rail_thickness"]
-    rail = Channel(depth, values["rail_flange"] - thickness / 2.0, thickness)
-    return Layout(
-        stations=np.concatenate([*between, places[-1:]]),
-        crossings=tuple(int(n) for n in np.delete(numbers, 1)),
-        spacing=values["rail_spacing"],
-        height=values["frame_height"],
-        rail=rail,
-        cross=Box(depth, values["cross_width"], values["cross_thickness"]),
-        modulus=values["modulus"],
-        poisson_ratio=values["poisson_ratio"],
-        density=values["density"],
-    )
+    return np.interp(np.arange(numbers[-1] + 1), numbers, corners)
 
 
-def around(lines: np.ndarray, x: float) -> tuple[int, int]:
-    """Numbers of the mesh lines next to a place, in front of it and behind it."""
-    return int(np.nonzero(lines > x + 1e-6)[0][-1]), int(np.nonzero(lines < x - 1e-6)[0][0])
+def joined(grids: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Nodes (nodes, 3) of some grids (..., 3), and their numbers (...): equal places are one."""
+    places = np.concatenate([grid.reshape(-1, 3) for grid in grids])
+    keys = np.round(places / SAME).astype(np.int64)
+    _, first, numbers = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    ends = np.cumsum([grid.size // 3 for grid in grids])[:-1]
+    pieces = np.split(numbers.ravel(), ends)
+    return places[first], [n.reshape(g.shape[:-1]) for n, g in zip(pieces, grids, strict=True)]
+
+
+def levers(arms: np.ndarray) -> np.ndarray:
+    """Motion (points, 6, 6) at the ends of rigid arms (points, 3) by that at their beginning."""
+    found = np.tile(np.eye(6), (len(arms), 1, 1))
+    found[:, :3, 3:] = np.cross(np.eye(3), arms[:, None]).swapaxes(1, 2)
+    return found
+
+
+def strains(lines: np.ndarray, corners: csc_array, bays: list[tuple[float, float]]) -> csc_array:
+    """Strains (20, n) in the middle of five bays by their ends x: means over one or two elements.
+
+    `corners` (lines * 4, n) are displacements along x at the mesh's lines x, see `Frame.strains`.
+    """
+    from scipy.sparse import csc_array, vstack
+
+    rows, by_line = [], corners.tocsr()
+    for x in np.mean(bays, axis=1):
+        front, rear = np.flatnonzero(lines > x + SAME)[-1], np.flatnonzero(lines < x - SAME)[0]
+        ends = [by_line[4 * line : 4 * line + 4] for line in (front, rear)]
+        rows.append((ends[0] - ends[1]) / (lines[front] - lines[rear]))
+    return csc_array(vstack(rows))

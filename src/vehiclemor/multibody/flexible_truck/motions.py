@@ -1,4 +1,4 @@
-"""Motion of places of the truck as rows over s, and the point masses of what is sprung.
+"""Motion of places of the truck as rows over s, which both meshes have.
 
 s (N,) are three displacements and three rotations of the rails at every station, left and right,
 then heave, pitch and roll of the cab, then heave and roll of the front and of the rear axle.
@@ -6,126 +6,88 @@ then heave, pitch and roll of the cab, then heave and roll of the front and of t
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
-from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.flexible_truck.frame import Layout
 
-CAB, AXLES = 3, 4
+# Coordinates of cab and axles.
+OTHERS = 7
 
 
 class Motions:
-    """Motion of points as rows over s (N,): sections of the rails, cab, axles."""
+    """Rows over s (N,).
 
-    def __init__(self, ladder: Layout, held: tuple[float, float]) -> None:
-        self.ladder = ladder
-        # Planes x at which the frame holds what rests on it, see `body`.
-        self.held = held
-        self.size = 12 * len(ladder.stations) + CAB + AXLES
-        self.identity = np.eye(self.size)
-
-    def rail(self, station: int, side: int) -> np.ndarray:
-        """Motion (6, N) of a rail at a station; side 0 is left."""
-        first = 6 * (2 * station + side)
-        return self.identity[first : first + 6]
-
-    def plane(self, x: float) -> np.ndarray:
-        """Motion (6, N) of both rails at a place between them, linear between stations."""
-        stations = self.ladder.stations
-        behind = int(np.clip(np.searchsorted(-stations, -x), 1, len(stations) - 1))
-        share = (stations[behind - 1] - x) / (stations[behind - 1] - stations[behind])
-        motion = np.zeros((6, self.size))
-        for station, weight in ((behind - 1, 1.0 - share), (behind, share)):
-            left, right = self.rail(station, 0), self.rail(station, 1)
-            mean = (left + right) / 2.0
-            mean[3] = (left[2] - right[2]) / self.ladder.spacing
-            motion += weight * moved(mean, np.array([x - stations[station], 0.0, 0.0]))
-        return motion
-
-    def body(self, place: np.ndarray) -> np.ndarray:
-        """Displacement (3, N) of a point of what rests on the frame.
-
-        Bodies and platform are rigid in their plane: along, across and in yaw they follow the
-        frame at the axles, whose roll and pitch move them by their height.  Their heights follow
-        the rails under them.
-        """
-        x, y, z = place
-        front, rear = self.held
-        up = np.array([0.0, 0.0, z - self.ladder.height])
-        ahead, behind = (moved(self.plane(plane), up) for plane in (front, rear))
-        share = (front - x) / (front - rear)
-        yaw = (ahead[1] - behind[1]) / (front - rear)
-        return np.array(
-            [
-                (ahead[0] + behind[0]) / 2.0 - y * yaw,
-                (1.0 - share) * ahead[1] + share * behind[1],
-                moved(self.plane(x), np.array([0.0, y, 0.0]))[2],
-            ]
-        )
-
-    @property
-    def cab(self) -> np.ndarray:
-        """Heave, pitch and roll (3, N) of the cab."""
-        return self.identity[-CAB - AXLES : -AXLES]
-
-    def axle(self, rear: bool) -> np.ndarray:
-        """Heave and roll (2, N) of an axle."""
-        return self.identity[-2:] if rear else self.identity[-AXLES:-2]
-
-    def rigid(self, centre: np.ndarray, cab: np.ndarray) -> np.ndarray:
-        """Rows s (N, 6) where all that is sprung moves as one body; the axles rest."""
-        found = np.zeros((self.size, 6))
-        places = [
-            np.array([x, y, self.ladder.height])
-            for x in self.ladder.stations
-            for y in self.ladder.sides
-        ]
-        found[: -CAB - AXLES] = np.concatenate([moved(np.eye(6), p - centre) for p in places])
-        found[-CAB - AXLES : -AXLES] = moved(np.eye(6), cab - centre)[[2, 4, 3]]
-        return found
-
-
-def moved(motion: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """Motion (6, N) at the end of a rigid arm (3,)."""
-    x, y, z = arm
-    far = motion.copy()
-    far[0] += motion[4] * z - motion[5] * y
-    far[1] += motion[5] * x - motion[3] * z
-    far[2] += motion[3] * y - motion[4] * x
-    return far
-
-
-def points_of_the_rest(x: np.ndarray, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Point masses (points,) in kg and places (points, 3) relative to the sprung centre.
-
-    Four points a station, upper and lower, left and right.  Their masses are quadratic in x, their
-    heights linear but for one distance.  Their mass, centre and inertia are those of `body` (6, 6):
-    the inertia matrix about the sprung centre of what is neither frame nor cab.  `x` (stations,) is
-    relative to that centre.
+    Attributes
+    ----------
+    rails
+        Motion (stations, 2, 6, N) of the left and the right rail.
+    cab
+        Heave, pitch and roll (3, N).
+    axles
+        Heave and roll (2, N) of the front and of the rear axle by name.
+    middles
+        Displacements along, across and upward and roll (stations, 4, N) of both rails together.
+    pitch, roll, twist, yaw
+        Angles (N,) of the frame between the axles; roll is the mean, twist front less rear.
     """
-    ends = np.concatenate([x[:1], (x[1:] + x[:-1]) / 2.0, x[-1:]])
-    length = ends[:-1] - ends[1:]
-    mass, along, upward = body[0, 0], body[1, 5], body[0, 4]
-    roll, pitch, yaw, product = body[3, 3], body[4, 4], body[5, 5], -body[3, 5]
-    lengthwise, across, height = (
-        s / 2.0 for s in (pitch + yaw - roll, roll + yaw - pitch, roll + pitch - yaw)
-    )
-    powers = x ** np.arange(3)[:, None]
-    masses = length * (
-        np.linalg.solve(powers * length @ powers.T, [mass, along, lengthwise]) @ powers
-    )
-    line = np.linalg.solve([[mass, along], [along, lengthwise]], [upward, product])
-    middle = line[0] + line[1] * x
-    width, spread = across / mass, (height - masses @ middle**2) / mass
-    if min(mass, masses.min(), width, spread) <= 0.0:
-        raise GeometryError(
-            "the sprung mass beside frame and cab can't be spread along the frame: its mass, "
-            "centre and moments of inertia need negative masses or distances"
-        )
-    places = [
-        (along, side * np.sqrt(width), height + up * np.sqrt(spread))
-        for along, height in zip(x, middle, strict=True)
-        for side in (1.0, -1.0)
-        for up in (1.0, -1.0)
-    ]
-    return np.repeat(masses / 4.0, 4), np.array(places)
+
+    def __init__(self, ladder: Layout) -> None:
+        self.ladder = ladder
+        size = 12 * len(ladder.stations) + OTHERS
+        rows = np.eye(size)
+        self.rails = rows[:-OTHERS].reshape(-1, 2, 6, size)
+        self.cab, self.axles = rows[-OTHERS:-4], {"front": rows[-4:-2], "rear": rows[-2:]}
+        left, right = self.rails[:, 0], self.rails[:, 1]
+        self.middles = (left + right)[:, :4] / 2.0
+        self.middles[:, 3] = (left[:, 2] - right[:, 2]) / (ladder.sides[0] - ladder.sides[1])
+        at = [ladder.planes["front axle"], ladder.planes["rear axle"]]
+        self.front, self.rear = self.middles[at]
+        self.ahead, self.behind = ladder.stations[at]
+        change, length = self.front - self.rear, self.ahead - self.behind
+        self.pitch, self.yaw = -change[2] / length, change[1] / length
+        self.roll, self.twist = (self.front[3] + self.rear[3]) / 2.0, change[3]
+
+    def rail(self, plane: str, y: float) -> np.ndarray:
+        """Height (N,) of the rail in a plane, at the end of a rigid arm that reaches y (m)."""
+        side = int(y < 0.0)
+        motion = self.rails[self.ladder.planes[plane], side]
+        return motion[2] + (y - self.ladder.sides[side]) * motion[3]
+
+    def axle(self, end: str, y: float) -> np.ndarray:
+        """Height (N,) of an axle at y (m)."""
+        heave, roll = self.axles[end]
+        return heave + y * roll
+
+    def in_cab(self, x: float, y: float) -> np.ndarray:
+        """Height (N,) of the cab at x and y (m) from its centre."""
+        heave, pitch, roll = self.cab
+        return heave + y * roll - x * pitch
+
+    def body(self, places: np.ndarray) -> np.ndarray:
+        """Displacements (points, 3, N) of points (points, 3) of what rests on the frame.
+
+        Bodies and platform are rigid in their plane: along, across and in pitch and yaw they follow
+        the frame at the axles.  Their heights follow the rails under them.
+        """
+        from scipy.interpolate import make_interp_spline
+
+        x, y, z = places.T[:, :, None]
+        stations = self.ladder.stations[::-1]
+        share, up = (self.ahead - x) / (self.ahead - self.behind), z - self.ladder.height
+        rails = make_interp_spline(stations, self.middles[::-1, 2:], k=1)(places[:, 0])
+        along = (self.front[0] + self.rear[0]) / 2.0 + up * self.pitch - y * self.yaw
+        ends = self.front[1] - up * self.front[3], self.rear[1] - up * self.rear[3]
+        across = (1.0 - share) * ends[0] + share * ends[1]
+        return np.stack([along, across, rails[:, 0] + y * rails[:, 1]], axis=1)
+
+
+def block(half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shares (points,) and places (points, 3) of points that have a homogeneous block's moments.
+
+    The block has its sides along the axes; `half` (3,) are half its lengths in m.
+    """
+    points, weights = np.polynomial.legendre.leggauss(8)
+    shares = np.array(list(product(weights / 2.0, repeat=3))).prod(axis=1)
+    return shares, np.array(list(product(points, repeat=3))) * half

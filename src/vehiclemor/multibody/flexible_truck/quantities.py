@@ -4,11 +4,12 @@ Places have coordinates x forward, y left and z up from the middle of the front 
 """
 
 from vehiclemor.multibody import vehicle_parameters as shared
-from vehiclemor.multibody.quantities import TIRE_LOADS, WHEELS, Quantity, per_wheel
+from vehiclemor.multibody.quantities import WHEELS, Quantity, per_wheel
 from vehiclemor.parameters import Declared, point
 
 # Excess beyond shortest or longest length, in mm, at which the stops' force is a parameter.
 STOP_TABLE = (10, 20, 30, 40, 50)
+ENDS = ("front", "rear")
 # Two rails, two flanges, five bays.
 STRAINS = 20
 
@@ -41,39 +42,39 @@ OUTPUTS = (
         for k in range(STRAINS)
     ),
 )
-LOADS = TIRE_LOADS
 
 _SHEET = Declared("m", above=0.0, at_most=0.1)
 _FORCE = Declared("N", at_least=0.0, at_most=1e7)
+_PROGRESSION = Declared("N/m^2", at_least=0.0, at_most=1e9)
 _DEGRESSION = Declared("s/m", at_least=0.0, at_most=1e3)
 _PLACE = Declared("m", at_least=-20.0, at_most=20.0)
-_ENDS = ("front", "rear")
+
+
+def _each(declared: Declared, *names: str) -> dict[str, Declared]:
+    return dict.fromkeys(names, declared)
+
+
+def _both(declared: Declared, *names: str) -> dict[str, Declared]:
+    """Parameters of the front axle and of the rear axle."""
+    return {f"{end}_{name}": declared for name in names for end in ENDS}
+
 
 PARAMETERS = {
     "gravity": shared.GRAVITY,
     "sprung_mass": shared.MASS,
-    "roll_inertia": shared.INERTIA,
-    "pitch_inertia": shared.INERTIA,
-    "yaw_inertia": shared.INERTIA,
-    "sprung_distance": shared.LENGTH,
+    **_each(shared.INERTIA, "roll_inertia", "pitch_inertia", "yaw_inertia"),
+    **_each(shared.LENGTH, "sprung_distance", "wheelbase", "wheel_offset"),
     "sprung_height": _PLACE,
-    "wheelbase": shared.LENGTH,
-    "wheel_offset": shared.LENGTH,
     "driver": point(),
-    **{f"{end}_axle_mass": shared.MASS for end in _ENDS},
-    **{f"{end}_axle_inertia": shared.INERTIA for end in _ENDS},
-    **{f"{end}_spring_stiffness": shared.STIFFNESS for end in _ENDS},
-    **{f"{end}_spring_progression": Declared("N/m^2", at_least=0.0, at_most=1e9) for end in _ENDS},
-    **{f"{end}_spring_offset": shared.LENGTH for end in _ENDS},
-    **{f"{end}_damper_offset": shared.LENGTH for end in _ENDS},
-    **{f"{end}_free_length": shared.LENGTH for end in _ENDS},
-    "shortest_length": shared.LENGTH,
-    "longest_length": shared.LENGTH,
-    **{f"stop_force_{excess}_mm": _FORCE for excess in STOP_TABLE},
-    "bump_damping": shared.DAMPING,
-    "bump_degression": _DEGRESSION,
-    "rebound_damping": shared.DAMPING,
-    "rebound_degression": _DEGRESSION,
+    **_both(shared.MASS, "axle_mass"),
+    **_both(shared.INERTIA, "axle_inertia"),
+    **_both(shared.STIFFNESS, "spring_stiffness"),
+    **_both(_PROGRESSION, "spring_progression"),
+    **_both(shared.LENGTH, "spring_offset", "damper_offset", "free_length"),
+    **_each(shared.LENGTH, "shortest_length", "longest_length"),
+    **_each(_FORCE, *(f"stop_force_{excess}_mm" for excess in STOP_TABLE)),
+    **_each(shared.DAMPING, "bump_damping", "rebound_damping"),
+    **_each(_DEGRESSION, "bump_degression", "rebound_degression"),
     "tire_stiffness": shared.STIFFNESS,
     "tire_damping": shared.DAMPING,
     "modulus": Declared("N/m^2", above=0.0, at_most=1e18),
@@ -82,25 +83,17 @@ PARAMETERS = {
     "rail_spacing": shared.LENGTH,
     "rail_depth": Declared("m", above=0.0, at_most=1.0),
     "rail_flange": Declared("m", above=0.0, at_most=0.5),
-    "rail_thickness": _SHEET,
     "cross_width": Declared("m", above=0.0, at_most=0.5),
-    "cross_thickness": _SHEET,
-    "front_overhang": shared.LENGTH,
-    "frame_length": shared.LENGTH,
+    **_each(_SHEET, "rail_thickness", "cross_thickness"),
+    **_each(shared.LENGTH, "front_overhang", "frame_length", "gearbox_distance"),
     "frame_height": _PLACE,
-    "gearbox_distance": shared.LENGTH,
     "cab_mass": shared.MASS,
-    "cab_roll_inertia": shared.INERTIA,
-    "cab_pitch_inertia": shared.INERTIA,
-    "cab_yaw_inertia": shared.INERTIA,
-    "cab_place": _PLACE,
-    "cab_height": _PLACE,
+    **_each(shared.INERTIA, "cab_roll_inertia", "cab_pitch_inertia", "cab_yaw_inertia"),
+    **_each(_PLACE, "cab_place", "cab_height"),
     "cab_mount_distance": shared.LENGTH,
     "cab_mount_stiffness": shared.STIFFNESS,
     "cab_mount_damping": shared.DAMPING,
-    "platform_front": shared.LENGTH,
-    "platform_rear": shared.LENGTH,
-    "platform_width": shared.LENGTH,
+    **_each(shared.LENGTH, "platform_front", "platform_rear", "platform_width"),
     "platform_height": _PLACE,
     "frame_damping_ratio": Declared("1", at_least=0.0, at_most=1.0),
     "frame_damping_frequency": Declared("Hz", above=0.0, at_most=1e4),

@@ -3,16 +3,16 @@
 Coordinates are those of the frame's nodes, then heave, pitch and roll of the cab, heave and roll of
 the front and of the rear axle.  All of them are zero where springs and tires carry nothing.
 
-The sprung mass that is neither frame nor cab is spread along the frame, and so is the payload, as
-point masses on rigid brackets across both rails, see `Motions.body`.  Springs and dampers act on
-one rail, at the end of a rigid arm.  Nothing on the road holds the truck along, across and in yaw:
-soft springs at the sprung centre do.
+The sprung mass that is neither frame nor cab is a homogeneous block on rigid brackets across both
+rails, and so is the payload, a flat one, see `Motions.body`.  Springs and dampers act on one rail,
+at the end of a rigid arm.  Nothing on the road holds the truck along, across and in yaw: soft
+springs at the sprung centre do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -20,14 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.exceptions import GeometryError, InputError
-from vehiclemor.multibody.flexible_truck.frame import Frame, Layout, layout, planes
-from vehiclemor.multibody.flexible_truck.motions import (
-    AXLES,
-    CAB,
-    Motions,
-    moved,
-    points_of_the_rest,
-)
+from vehiclemor.multibody.flexible_truck import beams, shells
+from vehiclemor.multibody.flexible_truck.frame import Layout, levers, planes
+from vehiclemor.multibody.flexible_truck.motions import OTHERS, Motions, block
+from vehiclemor.multibody.flexible_truck.quantities import ENDS, OUTPUTS, STRAINS
 from vehiclemor.multibody.structure import Structure
 
 if TYPE_CHECKING:
@@ -35,9 +31,9 @@ if TYPE_CHECKING:
 
 # Finest mesh of shells (m): there are no more elements than a bay of beams can have.
 FINEST = 0.02
-# Gauss points of the payload along and across the platform: exact for its moments of inertia.
-ALONG, ACROSS = 8, 4
 AXES = ("roll", "pitch", "yaw")
+# Left and right.
+SIDES = (1.0, -1.0)
 
 
 def check(values: Mapping[str, Any]) -> None:
@@ -53,238 +49,157 @@ def check(values: Mapping[str, Any]) -> None:
         raise GeometryError("rail_thickness is not below rail_flange and rail_depth")
     if not 2.0 * values["rail_flange"] < values["rail_spacing"]:
         raise GeometryError("the rails' flanges overlap: rail_flange is above half rail_spacing")
-    places = planes(values)
-    for (name, x), (behind, further) in pairwise(places.items()):
+    for (name, x), (behind, further) in pairwise(planes(values).items()):
         if not x > further:
             raise GeometryError(f"the frame's {name} ({x:g} m) is not ahead of its {behind}")
-    end = values["frame_length"] - values["front_overhang"]
-    time = values["frame_damping_ratio"] / (np.pi * values["frame_damping_frequency"])
-    if values["cab_mount_damping"] < time * values["cab_mount_stiffness"]:
+    if values["cab_mount_damping"] < damping_time(values) * values["cab_mount_stiffness"]:
         raise GeometryError(
             "the cab's mounts must damp at least as much as the frame for their stiffness"
         )
+    end = values["frame_length"] - values["front_overhang"]
     if not values["platform_front"] < values["platform_rear"] <= end + 1e-9:
         raise GeometryError("the platform must end behind its front, and not behind the frame")
 
 
+def damping_time(values: Mapping[str, Any]) -> float:
+    """Damping of the frame over its stiffness in s, from the ratio at a frequency."""
+    return values["frame_damping_ratio"] / (np.pi * values["frame_damping_frequency"])
+
+
 def structure(values: Mapping[str, Any]) -> Structure:
     """Matrices of the truck; another payload needs no new frame."""
-    given = [(name, np.ravel(value)) for name, value in values.items() if name != "payload"]
-    truck = _unladen(tuple((name, tuple(map(float, value))) for name, value in given))
-    payload = float(values["payload"])
-    return Structure(
-        truck.structure.mass + payload * truck.payload,
-        truck.structure.stiffness,
-        truck.structure.damping_time,
-        truck.structure.dampers,
-        truck.structure.ports,
-        truck.structure.load + payload * truck.payload_load,
-        truck.structure.outputs,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Truck:
-    """A truck without payload, and what a kilogram of payload adds."""
-
-    structure: Structure
-    payload: csc_array
-    payload_load: np.ndarray
+    given: dict[str, Any] = {n: tuple(x) if np.ndim(x) else float(x) for n, x in values.items()}
+    payload = given.pop("payload")
+    truck, added, upward = _unladen(tuple(given.items()))
+    mass = truck.mass + payload * added
+    return replace(truck, mass=mass, load=-given["gravity"] * (mass @ upward))
 
 
 @lru_cache(maxsize=8)
-def _unladen(given: tuple[tuple[str, tuple[float, ...]], ...]) -> _Truck:
+def _unladen(given: tuple[tuple[str, Any], ...]) -> tuple[Structure, csc_array, np.ndarray]:
+    """A truck without payload, the mass of a kilogram of payload, and a heave (n,) of the whole."""
     from scipy.sparse import block_diag, csc_array, eye_array
 
-    v: dict[str, Any] = {n: np.array(x) if len(x) > 1 else sum(x) for n, x in given}
-    check(v)
-    ladder = layout(v)
-    meshed = _meshed(ladder, v)
-    free = eye_array(CAB + AXLES)
+    v = dict(given)
+    ladder = Layout(v)
+    size, parts = v["shell_size"], int(v["elements_per_bay"])
+    frame = shells.frame(ladder, size) if size else beams.frame(ladder, parts)
     # s = spread q, as `Motions` has it.
-    spread = csc_array(block_diag([meshed.sections, free]))
-    none = csc_array((CAB + AXLES,) * 2)
-    motions = Motions(ladder, (0.0, -v["wheelbase"]))
-    mass, load = _cab_and_axles(motions, v)
-    brackets, bracket_load = _brackets(motions, v, meshed, mass)
-    payload, payload_load = _payload(motions, v)
-    mounts = _mounts(motions, v)
-    time = v["frame_damping_ratio"] / (np.pi * v["frame_damping_frequency"])
-    held = v["cab_mount_stiffness"] * mounts.T @ mounts + _held(motions, v)
+    spread = csc_array(block_diag([frame.sections, eye_array(OTHERS)]))
+    size = 6 * len(frame.nodes) + OTHERS
+    for matrix, rows in ((frame.mass, size), (frame.stiffness, size), (frame.strains, STRAINS)):
+        matrix.resize(rows, size)
+
+    def on_nodes(rows: list[np.ndarray]) -> csc_array:
+        """Motions (k, n) by the coordinates from those by s."""
+        return csc_array(csc_array(np.array(rows)) @ spread)
+
+    def weighted(rows: np.ndarray, weights: Any) -> csc_array:
+        """Matrix (n, n) of masses or springs by the motions (k, N) they take part in."""
+        return csc_array(spread.T @ csc_array((rows.T * weights) @ rows) @ spread)
+
+    def points(masses: np.ndarray, places: np.ndarray) -> csc_array:
+        """Matrix (n, n) of point masses."""
+        return weighted(np.concatenate(moving.body(places)), np.repeat(masses, 3))
+
+    moving = Motions(ladder)
+    centre = np.array([-v["sprung_distance"], 0.0, v["sprung_height"]])
+    cab = np.array([v["cab_place"], 0.0, v["cab_height"]])
+    # Motion of all that is sprung as one body, about its centre.
+    rigid = np.zeros((size, 6))
+    rigid[:-OTHERS] = np.concatenate(levers(frame.nodes - centre))
+    rigid[-OTHERS:-4] = levers((cab - centre)[None])[0, [2, 4, 3]]
+    upward = rigid[:, 2].copy()
+    upward[[-4, -2]] = 1.0
+    sprung = [v["sprung_mass"]] * 3 + [v[f"{axis}_inertia"] for axis in AXES]
+    axles = [v[f"{end}_axle_{kind}"] for end in ENDS for kind in ("mass", "inertia")]
+    mass = frame.mass + weighted(*_cab(moving, v))
+    mass += points(*_rest(np.diag(sprung) - rigid.T @ mass @ rigid, centre))
+    mass += weighted(np.concatenate(list(moving.axles.values())), axles)
+    along, across, _ = moving.body(centre[None])[0]
+    hold = np.array([sprung[0], sprung[0], sprung[-1]]) * (2.0 * np.pi * v["hold_frequency"]) ** 2
+    reach = v["cab_mount_distance"]
+    feet = [(end, x, y) for end, x in zip(ENDS, (reach, -reach), strict=True) for y in ladder.sides]
+    mounts = [moving.in_cab(x, y) - moving.rail(f"{end} cab mounts", y) for end, x, y in feet]
+    stiffness = frame.stiffness + weighted(np.array(mounts), [v["cab_mount_stiffness"]] * 4)
+    stiffness += weighted(np.array([along, across, moving.yaw]), hold)
+    time = damping_time(v)
     damped = v["cab_mount_damping"] - time * v["cab_mount_stiffness"]
-    ports = _ports(motions, v)
-    outputs = _outputs(motions, v, meshed.strains, spread, ports)
-    frame_load = meshed.mass @ np.tile([0.0, 0.0, -v["gravity"], 0.0, 0.0, 0.0], len(meshed.nodes))
-
-    def on_nodes(matrix: np.ndarray) -> csc_array:
-        return csc_array(spread.T @ csc_array(matrix) @ spread)
-
-    structure = Structure(
-        mass=csc_array(block_diag([meshed.mass, none])) + on_nodes(mass + brackets),
-        stiffness=csc_array(block_diag([meshed.stiffness, none])) + on_nodes(held),
+    ports = on_nodes(_ports(moving, v))
+    heights, angles = _heights(moving, v), [moving.pitch, moving.roll, moving.twist]
+    truck = Structure(
+        mass=mass,
+        stiffness=stiffness,
         damping_time=time,
-        dampers=csc_array(spread.T @ csc_array(np.sqrt(damped) * mounts.T)),
-        ports=csc_array(spread.T @ csc_array(ports.T)),
-        load=np.append(frame_load, np.zeros(CAB + AXLES)) + spread.T @ (load + bracket_load),
-        outputs=outputs,
+        dampers=csc_array(np.sqrt(damped) * on_nodes(mounts).T),
+        ports=csc_array(ports.T),
+        load=np.zeros(size),
+        outputs=_outputs(on_nodes(heights), on_nodes(angles), ports, frame.strains),
     )
-    return _Truck(structure, on_nodes(payload), spread.T @ payload_load)
-
-
-def _meshed(ladder: Layout, v: Mapping[str, Any]) -> Frame:
-    from vehiclemor.multibody.flexible_truck import beams, shells
-
-    if v["shell_size"]:
-        return shells.frame(ladder, v["shell_size"])
-
-    return beams.frame(ladder, int(v["elements_per_bay"]))
-
-
-def _cab_place(v: Mapping[str, Any]) -> np.ndarray:
-    return np.array([v["cab_place"], 0.0, v["cab_height"]])
-
-
-def _mount_motions(motions: Motions, v: Mapping[str, Any]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Motion (6, N) of the rails under the cab's four mounts, and their places."""
-    ladder = motions.ladder
-    found = []
-    for x in (planes(v)["front cab mounts"], planes(v)["rear cab mounts"]):
-        station = int(np.argmin(np.abs(ladder.stations - x)))
-        for side, y in enumerate(ladder.sides):
-            found.append((motions.rail(station, side), np.array([x, y, ladder.height])))
-    return found
-
-
-def _mounts(motions: Motions, v: Mapping[str, Any]) -> np.ndarray:
-    """Lengthening (4, N) of the cab's mounts, which stand on the rails."""
-    heave, pitch, roll = motions.cab
-    return np.array(
-        [
-            heave + place[1] * roll - (place[0] - v["cab_place"]) * pitch - rail[2]
-            for rail, place in _mount_motions(motions, v)
-        ]
-    )
-
-
-def _cab_and_axles(motions: Motions, v: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Mass (N, N) and weight (N,) of cab and axles.
-
-    The cab follows the four mounts along, across and in yaw.
-    """
-    heave, pitch, roll = motions.cab
-    rails = [rail for rail, _ in _mount_motions(motions, v)]
-    mean = np.mean(rails, axis=0)
-    yaw = (rails[0][1] + rails[1][1] - rails[2][1] - rails[3][1]) / (4.0 * v["cab_mount_distance"])
-    above = v["cab_height"] - motions.ladder.height
-    cab = np.array([mean[0] + above * pitch, mean[1] - above * roll, heave, roll, pitch, yaw])
-    inertias = [v[f"cab_{axis}_inertia"] for axis in AXES]
-    mass = cab.T @ np.diag([v["cab_mass"]] * 3 + inertias) @ cab
-    weight = -v["gravity"] * v["cab_mass"] * heave
-    for rear, end in enumerate(("front", "rear")):
-        axle = motions.axle(bool(rear))
-        mass += axle.T @ np.diag([v[f"{end}_axle_mass"], v[f"{end}_axle_inertia"]]) @ axle
-        weight = weight - v["gravity"] * v[f"{end}_axle_mass"] * axle[0]
-    return mass, weight
-
-
-def _centre(v: Mapping[str, Any]) -> np.ndarray:
-    return np.array([-v["sprung_distance"], 0.0, v["sprung_height"]])
-
-
-def _brackets(
-    motions: Motions, v: Mapping[str, Any], meshed: Frame, others: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mass (N, N) and weight (N,) of what is sprung beside frame and cab."""
-    centre = _centre(v)
-    moving = np.concatenate([moved(np.eye(6), place - centre) for place in meshed.nodes])
-    rigid = motions.rigid(centre, _cab_place(v))
-    sprung = np.diag([v["sprung_mass"]] * 3 + [v[f"{axis}_inertia"] for axis in AXES])
-    body = sprung - moving.T @ meshed.mass @ moving - rigid.T @ others @ rigid
-    masses, places = points_of_the_rest(motions.ladder.stations - centre[0], body)
-    return _points(motions, v["gravity"], masses, places + centre)
-
-
-def _payload(motions: Motions, v: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Mass (N, N) and weight (N,) of one kilogram, uniform over the platform's area."""
-    (along, shares), (across, parts) = (np.polynomial.legendre.leggauss(k) for k in (ALONG, ACROSS))
     front, rear = v["platform_front"], v["platform_rear"]
-    x = -(front + rear + (rear - front) * along) / 2.0
-    y = v["platform_width"] / 2.0 * across
-    places = np.array([(a, b, v["platform_height"]) for a in x for b in y])
-    return _points(motions, v["gravity"], np.outer(shares, parts).ravel() / 4.0, places)
+    shares, places = block(np.array([rear - front, v["platform_width"], 0.0]) / 2.0)
+    middle = [-(front + rear) / 2.0, 0.0, v["platform_height"]]
+    return truck, points(shares, places + middle), upward
 
 
-def _points(
-    motions: Motions, gravity: float, masses: np.ndarray, places: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mass (N, N) and weight (N,) of point masses (points,) at places (points, 3)."""
-    rows = np.array([motions.body(place) for place in places])
-    mass = np.einsum("p,pki,pkj->ij", masses, rows, rows, optimize=True)
-    return mass, -gravity * masses @ rows[:, 2]
+def _cab(moving: Motions, v: Mapping[str, Any]) -> tuple[np.ndarray, list[float]]:
+    """Motion (6, N) and inertia of the cab; along, across and in yaw it follows its mounts."""
+    heave, pitch, roll = moving.cab
+    above = v["cab_height"] - moving.ladder.height
+    front, rear = (moving.middles[moving.ladder.planes[f"{end} cab mounts"]] for end in ENDS)
+    along, across = (front + rear)[:2] / 2.0 + above * np.array([pitch, -roll])
+    yaw = (front[1] - rear[1]) / (2.0 * v["cab_mount_distance"])
+    inertias = [v[f"cab_{axis}_inertia"] for axis in AXES]
+    return np.array([along, across, heave, roll, pitch, yaw]), [v["cab_mass"]] * 3 + inertias
 
 
-def _held(motions: Motions, v: Mapping[str, Any]) -> np.ndarray:
-    """Stiffness (N, N) of the soft springs at the sprung centre: along, across and in yaw."""
-    centre, ahead = _centre(v), np.array([1.0, 0.0, 0.0])
-    along, across, _ = motions.body(centre)
-    rows = np.array([along, across, motions.body(centre + ahead)[1] - across])
-    inertias = np.array([v["sprung_mass"], v["sprung_mass"], v["yaw_inertia"]])
-    return (rows.T * (inertias * (2.0 * np.pi * v["hold_frequency"]) ** 2)) @ rows
+def _rest(body: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Point masses (points,) in kg and their places: a block with a body's inertia (6, 6)."""
+    mass, first = body[0, 0], np.array([body[1, 5], body[2, 3], body[0, 4]])
+    second = np.eye(3) * np.trace(body[3:, 3:]) / 2.0 - body[3:, 3:]
+    squares, axes = np.linalg.eigh(mass * second - np.outer(first, first))
+    if min(mass, *squares) <= 0.0:
+        raise GeometryError(
+            "the sprung mass beside frame and cab can't be spread along the frame: its mass, "
+            "centre and moments of inertia need negative masses or distances"
+        )
+    shares, places = block(np.sqrt(3.0 * squares) / mass)
+    return mass * shares, centre + first / mass + places @ axes.T
 
 
-def _ports(motions: Motions, v: Mapping[str, Any]) -> np.ndarray:
+def _ports(moving: Motions, v: Mapping[str, Any]) -> list[np.ndarray]:
     """Deflections (12, N) of the ports: compressions of springs and dampers, wheels' heights."""
-    ladder = motions.ladder
-    rows = []
-    for kind in ("spring", "damper", "wheel"):
-        for rear, end in enumerate(("front", "rear")):
-            heave, roll = motions.axle(bool(rear))
-            station = int(np.argmin(np.abs(ladder.stations + rear * v["wheelbase"])))
-            for side, y in enumerate(ladder.sides):
-                if kind == "wheel":
-                    rows.append(heave + np.sign(y) * v["wheel_offset"] * roll)
-                    continue
-                place = np.sign(y) * v[f"{end}_{kind}_offset"]
-                rail = moved(motions.rail(station, side), np.array([0.0, place - y, 0.0]))
-                rows.append(heave + place * roll - rail[2])
-    return np.array(rows)
+    kinds = [(kind, end, side) for kind in ("spring", "damper") for end in ENDS for side in SIDES]
+    places = [(end, side * v[f"{end}_{kind}_offset"]) for kind, end, side in kinds]
+    pressed = [moving.axle(end, y) - moving.rail(f"{end} axle", y) for end, y in places]
+    return pressed + [moving.axle(e, side * v["wheel_offset"]) for e in ENDS for side in SIDES]
+
+
+def _heights(moving: Motions, v: Mapping[str, Any]) -> list[np.ndarray]:
+    """Heights (5, N) of the driver's place and of the platform's corners."""
+    (x, y, _), half, level = v["driver"], v["platform_width"] / 2.0, v["platform_height"]
+    corners = [(-v[f"platform_{end}"], side * half, level) for end in ENDS for side in SIDES]
+    return [moving.in_cab(x - v["cab_place"], y), *moving.body(np.array(corners))[:, 2]]
 
 
 def _outputs(
-    motions: Motions, v: Mapping[str, Any], strains: csc_array, spread: csc_array, ports: np.ndarray
+    heights: csc_array, angles: csc_array, ports: csc_array, strains: csc_array
 ) -> tuple[csc_array, csc_array, csc_array, csc_array]:
     """Cq, Cv, Ca and Cf in the order of `OUTPUTS`."""
-    from scipy.sparse import csc_array, hstack, vstack
+    from scipy.sparse import csc_array, eye_array
 
-    size, gauged = spread.shape[1], strains.shape[0]  # pyright: ignore[reportOptionalSubscript]
-    x, y, _ = v["driver"]
-    heave, pitch, roll = motions.cab
-    half = v["platform_width"] / 2.0
-    corners = [
-        motions.body(np.array([-v[f"platform_{end}"], side * half, v["platform_height"]]))[2]
-        for end in ("front", "rear")
-        for side in (1.0, -1.0)
-    ]
-    heights = np.array([heave + y * roll - (x - v["cab_place"]) * pitch, *corners])
-    front, rear = motions.plane(0.0), motions.plane(-v["wheelbase"])
-    angles = [
-        (rear[2] - front[2]) / v["wheelbase"],
-        (front[3] + rear[3]) / 2.0,
-        front[3] - rear[3],
-    ]
-    count, own = len(heights), 3 + 4
-    before, after = csc_array((3 * count + own, 12)), csc_array((gauged, 12))
-    moving = csc_array(heights) @ spread
-    still = csc_array(moving.shape)
-    others = csc_array(np.array([*angles, *ports[:4]])) @ spread
-    strained = hstack([strains, csc_array((gauged, CAB + AXLES))])
-    lower = csc_array((own + 4 + gauged, size))
-    loads = csc_array((4, size))
-    forces = np.zeros((4, 12))
-    forces[:, 8:] = np.eye(4)
+    names = [quantity.name for quantity in OUTPUTS]
+
+    def placed(rows: Any, first: str) -> csc_array:
+        """Rows of some outputs, from the first of them on, among those of all."""
+        return csc_array(eye_array(len(names), rows.shape[0], k=-names.index(first)) @ rows)
+
     return (
-        csc_array(vstack([moving, still, still, others, loads, strained])),
-        csc_array(vstack([still, moving, still, lower])),
-        csc_array(vstack([still, still, moving, lower])),
-        csc_array(vstack([before, csc_array(forces), after])),
+        placed(heights, "driver_height")
+        + placed(angles, "pitch")
+        + placed(ports[:4], "deflection_FL")
+        + placed(strains, "strain_1"),
+        placed(heights, "driver_speed"),
+        placed(heights, "driver_acceleration"),
+        placed(eye_array(4, 12, k=8), "Fz_FL"),
     )

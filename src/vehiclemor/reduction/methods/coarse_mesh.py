@@ -5,13 +5,15 @@ A cheaper model of a structure is had by larger elements, too.
 
 import tomllib
 from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost
-from vehiclemor.reduction.settings import Settings, StructuralTolerance
+from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.structural import USUAL, StructuralModel
@@ -25,6 +27,7 @@ class CoarseMeshSettings(Settings):
         "elements_per_bay = 1, shell_size = 0", description="parameters of the mesh, as in TOML"
     )
     tolerance: StructuralTolerance = USUAL
+    step_size: StructuralStep = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,7 @@ class CoarseMesh:
     model: StructuralModel
     mesh: str
     tolerance: float
+    step_size: float
     offline: OfflineCost
 
     def check_sizes(self) -> None:
@@ -49,7 +53,7 @@ class CoarseMesh:
         """The model on the coarse mesh."""
         found = self.__dict__.get("_coarse")
         if found is None:
-            found = self.__dict__["_coarse"] = reparametrised(self.model, parameters(self.mesh))
+            found = self.__dict__["_coarse"] = on_mesh(self.model, self.mesh)
         return found
 
     def for_model(self, model: StructuralModel) -> "CoarseMesh":
@@ -61,11 +65,16 @@ class CoarseMesh:
     ) -> Trajectory:
         """A run at the maneuver's output times."""
         self.model.start(start)
-        return self.coarse.run(maneuver, None, self.tolerance, outputs)
+        return self.coarse.run(maneuver, None, self.tolerance, outputs, step=self.step_size)
 
-    def best_approximation(self, states: object) -> None:
+    def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace."""
         del states
+
+
+def on_mesh(model: StructuralModel, mesh: str) -> Any:
+    """The model on a mesh; `InputError` if there is no such mesh."""
+    return reparametrised(model, parameters(mesh))
 
 
 def parameters(mesh: str) -> dict[str, float]:
@@ -78,12 +87,12 @@ def parameters(mesh: str) -> dict[str, float]:
 
 def check(model: StructuralModel, settings: CoarseMeshSettings) -> None:
     """Raise `InputError` if the mesh is none."""
-    reparametrised(model, parameters(settings.mesh))
+    on_mesh(model, settings.mesh)
 
 
 def fit(model: StructuralModel, training: Training, settings: CoarseMeshSettings) -> CoarseMesh:
     """Nothing is fitted, and no training run is looked at."""
-    return CoarseMesh(model, settings.mesh, settings.tolerance, OfflineCost())
+    return CoarseMesh(model, settings.mesh, settings.tolerance, settings.step_size, OfflineCost())
 
 
 METHOD = Method(

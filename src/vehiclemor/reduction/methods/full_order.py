@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -17,6 +17,7 @@ from vehiclemor.reduction.settings import (
     OnlineSettings,
     Settings,
     StepTolerance,
+    StructuralStep,
     StructuralTolerance,
     Tolerance,
     Value,
@@ -61,6 +62,7 @@ class StructuralSettings(Settings):
         "generalised_alpha", description="of order 2, one step size a run, damped at infinity"
     )
     tolerance: StructuralTolerance = USUAL
+    step_size: StructuralStep = 0.0
 
 
 # The paper's kind of baseline: a general-purpose integrator of variable step.
@@ -143,25 +145,35 @@ class FullOrderStructure(FullOrder):
     """A structural model; it gives whole runs alone."""
 
     model: StructuralModel
+    step_size: float = 0.0
 
     @property
     def order(self) -> int:
         """Number of coordinates."""
         return self.model.size
 
+    def simulate(
+        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
+        """A run at the output times; it may have diverged."""
+        self.model.start(start)
+        return self.model.run(maneuver, None, self.tolerance, outputs, step=self.step_size)
+
     def for_model(self, model: StructuralModel) -> "FullOrderStructure":
         """The same for another model."""
         return replace(self, model=model)
 
 
-CLASSES = {"ae": FullOrderMechanism, "structural": FullOrderStructure}
-
-
 def fit(
-    model: Model, training: Training, settings: AlgebraicSettings | DynamicSettings
+    model: Any,
+    training: Training,
+    settings: AlgebraicSettings | DynamicSettings | StructuralSettings,
 ) -> FullOrder:
     """Nothing is fitted, and no training run is looked at."""
-    kind = CLASSES.get(model.kind, FullOrderSystem)
+    if isinstance(settings, StructuralSettings):
+        own = model, settings.solver, settings.tolerance
+        return FullOrderStructure(*own, step_size=settings.step_size)
+    kind = FullOrderMechanism if model.kind == "ae" else FullOrderSystem
     return kind(model, settings.solver, settings.tolerance)  # type: ignore[arg-type]
 
 

@@ -17,7 +17,8 @@ def free_modes(model: StructuralModel, highest: float) -> np.ndarray:
 
     It is linearised at the static state; dampers are left out.
     """
-    structure, law = model.system.structure, model.system.law
+    structure: Any = model.system.structure
+    law = model.system.law
     rest = np.zeros(law.static.shape[1])
     stiffness = -law.at(rest, rest, np.zeros(len(model.inputs)))[:, 1]
     held = structure.stiffness + structure.ports @ (stiffness[:, None] * structure.ports.T)
@@ -35,7 +36,7 @@ def fixed_modes(model: StructuralModel, highest: float) -> tuple[np.ndarray, np.
     from scipy.sparse import block_array
     from scipy.sparse.linalg import splu
 
-    structure = model.system.structure
+    structure: Any = model.system.structure
     n, p = structure.ports.shape
     # In a matrix of like sizes pivots stay where the factors are sparse.
     size = float(np.abs(structure.stiffness.diagonal()).mean())
@@ -57,7 +58,7 @@ def _below(stiffness: Any, mass: Any, solve: Any, shift: float, highest: float) 
     from scipy.sparse.linalg import LinearOperator, eigsh
 
     n, count, largest = mass.shape[0], FIRST_MODES, (2.0 * np.pi * highest) ** 2
-    operator = LinearOperator((n, n), matvec=solve, dtype=float)
+    operator = LinearOperator((n, n), matvec=solve, dtype=float)  # type: ignore[call-arg]
     begin = solve(mass @ np.cos(np.arange(n, dtype=float)))
     while True:
         count = min(count, n - 2)

@@ -21,7 +21,7 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.structure import Structure
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.projection.bases import RankTolerance
-from vehiclemor.reduction.settings import Settings, StructuralTolerance
+from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
@@ -46,6 +46,7 @@ class StructuralSettings(Settings):
     """What all reductions of structures share."""
 
     tolerance: StructuralTolerance = USUAL
+    step_size: StructuralStep = 0.0
 
 
 def projected(structure: Structure, basis: np.ndarray) -> tuple[Structure, np.ndarray]:
@@ -72,7 +73,9 @@ def projected(structure: Structure, basis: np.ndarray) -> tuple[Structure, np.nd
         ports=csc_array((structure.ports.T @ vectors).T),
         load=np.zeros(r),
         outputs=(
-            *(csc_array(c @ vectors) for c in (positions, rates, accelerations)),
+            csc_array(positions @ vectors),
+            csc_array(rates @ vectors),
+            csc_array(accelerations @ vectors),
             forces,
         ),
     )
@@ -93,6 +96,8 @@ class ReducedStructure(ShortRepr):
         Times in s at which the next period begins.
     offline, tolerance
         Cost of making it; error by the step size, as of the full model.
+    step_size
+        In s, in the place of the tolerance; 0: by that.
     """
 
     model: StructuralModel
@@ -100,6 +105,7 @@ class ReducedStructure(ShortRepr):
     edges: tuple[float, ...]
     offline: OfflineCost
     tolerance: float
+    step_size: float = 0.0
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if there is no basis of the model's coordinates for each period."""
@@ -107,7 +113,7 @@ class ReducedStructure(ShortRepr):
         require(len(self.bases) == len(self.edges) + 1 > 0, "edges")
         require(all(basis.ndim == 2 and len(basis) == n for basis in self.bases), "bases")
 
-    @cached_property
+    @property
     def order(self) -> int:
         """Largest number of reduced coordinates in any period."""
         return max(basis.shape[1] for basis in self.bases)
@@ -135,7 +141,7 @@ class ReducedStructure(ShortRepr):
     ) -> Trajectory:
         """A run at the maneuver's output times."""
         self.model.start(start)
-        return self.model.run(maneuver, self.periods, self.tolerance, outputs)
+        return self.model.run(maneuver, self.periods, self.tolerance, outputs, step=self.step_size)
 
     def best_approximation(self, states: np.ndarray) -> None:
         """Runs have no coordinates to project."""
@@ -257,13 +263,14 @@ def reduced(
     settings: StructuralSettings,
     began: float,
     evaluations: int = 0,
-    edges: Sequence[float] = (),
+    edges: Sequence[float] | np.ndarray = (),
 ) -> ReducedStructure:
     """The structure in its bases; offline cost from `began` (`time.process_time()`) on."""
     modes = tuple(projected(model.system.structure, basis)[1] for basis in bases)
     cost = OfflineCost(time.process_time() - began, evaluations)
     kind = SteppedStructure if len(modes) == 1 else ReducedStructure
-    return kind(model, modes, tuple(map(float, edges)), cost, settings.tolerance)
+    ends = tuple(map(float, edges))
+    return kind(model, modes, ends, cost, settings.tolerance, settings.step_size)
 
 
 class StructuralPodSettings(StructuralSettings):
@@ -290,7 +297,8 @@ def fit_windows(
     """
     began, evaluations, parts = time.process_time(), 0, []
     for run in training:
-        recorded = run.model.run(run.maneuver, recorded=True)
+        full: Any = run.model
+        recorded = full.run(run.maneuver, recorded=True)
         evaluations += recorded.counts["port_evaluations"]
         parts.append((recorded.times, recorded.coordinates))
     bases = []

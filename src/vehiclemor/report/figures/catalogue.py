@@ -14,7 +14,7 @@ from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
-from vehiclemor.report.figures import errors, paper, result_plot, runs, schematics, theme
+from vehiclemor.report.figures import errors, paper, result_plot, runs, schematics, size, theme
 from vehiclemor.report.result_selection import drawn
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import studies_and_files
@@ -44,6 +44,7 @@ DRAWINGS: dict[str, Callable[..., Figure]] = {
     "equation order": paper.figure_equation_order,
     "pareto": paper.figure_pareto,
     "result": figure_result,
+    "size": size.figure_size,
 }
 # Figures that every model has, of all registered methods: study, what is drawn of it.
 OF_A_MODEL: Mapping[str, tuple[Callable[[str, Path], str], str]] = {
@@ -119,16 +120,18 @@ def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
         kinds["histories"] = "outputs and errors over the time"
         if {output.name for output in component("model", study.model).outputs} >= set(runs.PATH):
             kinds["paths"] = "paths in the plane"
-    if study.bounds:
+    if study.size:
+        kinds = {"size": "times over the number of coordinates"}
+    elif study.bounds:
         kinds = {"pareto": "worst error on unseen inputs over the time of a call"}
     return [
         Entry(
             name=f"{name}-{kind}",
-            draw="pareto" if study.bounds else "result",
+            draw=kind if study.bounds or study.size else "result",
             studies=[path.stem if data_folder() in path.parents else str(path)],
             datasets=[name],
             caption=f"{study.title}: {content}.",
-            options={} if study.bounds else {"kind": kind},
+            options={} if study.bounds or study.size else {"kind": kind},
         )
         for kind, content in kinds.items()
     ]

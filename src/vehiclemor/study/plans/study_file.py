@@ -222,6 +222,21 @@ class MethodEntry(FileSchema):
     )
 
 
+class Size(FileSchema):
+    """Meshes of a structure, over which full and reduced runs are timed; see `plans/size.py`."""
+
+    meshes: list[dict[str, float]] = Field(
+        min_length=1, description="parameters of each mesh, the finest last: what is refined first"
+    )
+    frequency: float = Field(1.0, gt=0.0, description="factor of the maneuver")
+    amplitude: float = Field(1.0, description="factor of the maneuver")
+    step: float = Field(1e-3, gt=0.0, description="s, the same of all runs")
+    whole: int = Field(1000, description="coordinates up to which full order is timed over the run")
+    window: float = Field(1.0, gt=0.0, description="s of the run, over which it is timed beyond")
+    up_to: dict[str, int] = _table("label -> coordinates of the largest mesh that it is made of")
+    beside: list[str] = _list("models whose shipped reduced models are timed beside")
+
+
 class StudyFile(FileSchema):
     """Schema of `data/studies/*.toml`.
 
@@ -281,6 +296,8 @@ class StudyFile(FileSchema):
     )
     straight: Straight | None = Field(None, description="whether a vehicle drives straight on")
 
+    size: Size | None = Field(None, description="meshes: what full and reduced runs cost on each")
+
     @property
     def labelled(self) -> dict[str, MethodEntry]:
         """Label -> method of the study."""
@@ -337,6 +354,8 @@ class StudyFile(FileSchema):
         if doubles := [label for label in labels if labels.count(label) > 1]:
             raise ValueError(f"label {doubles[0]!r} is used twice")
         foreign = [name for name in OF_GRIDS if name in self.model_fields_set]
+        if self.size:
+            return self
         if self.bounds:
             for name in SETS[:2]:
                 if not _is_listed(getattr(self, name)):

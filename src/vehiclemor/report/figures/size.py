@@ -1,0 +1,64 @@
+"""From which size on reducing a vehicle pays: times of whole runs over the size of the model."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from vehiclemor.report.figures import theme
+from vehiclemor.report.figures.theme import Results, Style
+from vehiclemor.report.sizes import KINDS, growth, size_rows
+from vehiclemor.study.plans.size import FULL
+
+# Of the reduced models this one is drawn: it is made of every mesh.
+REDUCED = "Craig-Bampton"
+LOOKS: dict[str, Style] = {
+    "elements_per_bay": {"color": "#0072B2", "marker": "o"},
+    "shell_size": {"color": "#D55E00", "marker": "s"},
+}
+VEHICLES = {"double_wishbone": "wishbone", "independent_suspension_vehicle": "14-DOF car"}
+VEHICLES |= {"high_fidelity_vehicle": "high-fidelity car"}
+
+
+def figure_size(results: Results) -> Figure:
+    """CPU time of a whole run over the number of coordinates, and how many times reduction gains.
+
+    The three models of the paper stand beside the truck.  Hollow marks: the reduced model.
+    """
+    (dataset,) = results.values()
+    figure, axes = theme.panels(1, 2, (7.2, 3.6))
+    left, right = axes[0]
+    n, kinds = dataset["coordinates_of_mesh"].values, dataset["kind"].values
+    full = dataset["seconds_median"].sel(label=FULL).values
+    reduced = dataset["seconds_median"].sel(label=REDUCED).values
+    for kind, (word, _) in KINDS.items():
+        own, look = kinds == kind, LOOKS[kind]
+        slope = f"{word}, full: n^{growth(dataset, kind, FULL):.1f}"
+        left.plot(n[own], full[own], label=slope, **look)
+        hollow: Style = look | {"markerfacecolor": "none", "linestyle": "--"}
+        left.plot(n[own], reduced[own], label=f"{word}, {REDUCED}", **hollow)
+        right.plot(n[own], full[own] / reduced[own], label=f"{word}, the same mesh", **look)
+    cars = ~np.isin(kinds, list(KINDS))
+    black: Style = {"color": "black", "linestyle": "none", "marker": "D", "markersize": 4}
+    left.plot(n[cars], full[cars], label="the paper's models, full", **black)
+    left.plot(n[cars], reduced[cars], markerfacecolor="none", label="reduced", **black)
+    right.plot(n[cars], full[cars] / reduced[cars], label="the paper's models", **black)
+    for name, place in zip(dataset["mesh"].values[cars], np.flatnonzero(cars), strict=True):
+        at = n[place], full[place] / reduced[place]
+        text = VEHICLES.get(str(name), str(name))
+        right.annotate(text, at, (4, 4), textcoords="offset points", fontsize=7)
+    rivals = [row for row in size_rows(dataset) if row["label"] == REDUCED]
+    for group, marker in (("motion", "x"), ("strain", "+")):
+        at = [(row["coordinates"], row[f"gain_{group}"]) for row in rivals]
+        style: Style = {"linestyle": "none", "marker": marker, "color": "#009E73"}
+        label = f"cheapest mesh of equal error, {group}"
+        right.plot(*zip(*at, strict=True), label=label, markersize=7, **style)
+    right.axhline(1.0, **theme.THIN)
+    for axis in (left, right):
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        axis.set_xlabel("coordinates of the full model")
+        axis.legend(fontsize=6.5)
+    left.set_title("(a) CPU time of a whole run in s", loc="left")
+    right.set_title("(b) times that the reduced model is faster", loc="left")
+    return figure
