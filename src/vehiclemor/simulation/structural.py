@@ -186,6 +186,11 @@ class StructuralModel(Model):
         structure = self.definition.structure(self.parameters.values())
         return StructuralSystem(structure, self._static_law(structure))
 
+    @cached_property
+    def _whole(self) -> Periods:
+        """The full structure, with the step sizes of its runs."""
+        return Periods((self.system,))
+
     @property
     def size(self) -> int:
         """Number of coordinates n."""
@@ -276,7 +281,7 @@ class StructuralModel(Model):
         """
         maneuver = checked_maneuver(maneuver, self.definition)
         names = None if outputs is None else output_names(outputs)
-        periods = periods or Periods((self.system,))
+        periods = periods or self._whole
         counts = dict.fromkeys(STRUCTURAL_COUNTS, 0)
         (histories, states, found, reason), seconds = timed(
             lambda: periods.march(maneuver, tolerance, step, recorded)
