@@ -86,12 +86,18 @@ class Periods:
         return self.steps_of(maneuver, self._steps[key], maneuver.samples, recorded)
 
     def steps_of(
-        self, maneuver: Maneuver, every: int, samples: int, recorded: bool = False
+        self, maneuver: Maneuver, every: int, samples: int, recorded: bool = False, begin: int = 0
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-        """The first samples of a run with so many steps between output times."""
+        """The first samples of a run with so many steps between output times.
+
+        One that begins later does so at rest, and its inputs are what is beyond their first.
+        """
         inputs = inputs_at_steps(maneuver, every)
+        if begin:
+            inputs = inputs[begin * every :] - inputs[begin * every]
         spacing = spacing_of(maneuver)
-        ends = [min(round(edge / spacing), samples - 1) for edge in self.edges] + [samples - 1]
+        edges = [round(edge / spacing) - begin for edge in self.edges]
+        ends = [min(max(edge, 0), samples - 1) for edge in edges] + [samples - 1]
         state, first, parts = np.zeros((3, self.systems[0].structure.size)), 0, []
         for k, (system, end) in enumerate(zip(self.systems, ends, strict=True)):
             if k:
@@ -106,27 +112,30 @@ class Periods:
         first = 0
         for part, end in zip(parts, ends, strict=False):
             # The sample on an edge is of the period before: accelerations there follow from two.
-            begin = first + (first > 0)
-            histories[begin : end + 1] = part[0][begin - first :]
+            new = int(first > 0)
+            histories[first + new : end + 1] = part[0][new:]
             if recorded:
-                states[begin : end + 1] = part[1][begin - first :]
+                states[first + new : end + 1] = part[1][new:]
             first = end
         return histories, states, np.sum([part[2] for part in parts], axis=0), parts[-1][3]
 
     def steps(self, maneuver: Maneuver, tolerance: float) -> int:
         """Steps between output times, so many that outputs are as accurate as asked for.
 
-        The beginning of a run is repeated with half the step, as long as they differ by more than
-        the tolerance times the range of an output; the method is of second order.
+        A part of a run, in which its inputs change most, is repeated with half the step, as long as
+        they differ by more than the tolerance times the range of an output; the method is of second
+        order.
         """
         spacing = spacing_of(maneuver)
         every = max(round(spacing / FIRST_STEP), 1)
         least, most = (max(round(spacing / h), 1) for h in (LONGEST_STEP, SHORTEST_STEP))
         samples = min(round(TRIED / spacing) + 1, maneuver.samples)
-        coarse = self.steps_of(maneuver, every, samples)[0]
+        part = {"samples": samples, "begin": liveliest(maneuver, samples)}
+        coarse = self.steps_of(maneuver, every, **part)[0]
         while True:
-            fine = self.steps_of(maneuver, 2 * every, samples)[0]
-            error = relative_error(coarse, fine)
+            fine = self.steps_of(maneuver, 2 * every, **part)[0]
+            # What they differ by is three quarters of the coarse one's error.
+            error = 4.0 / 3.0 * relative_error(coarse, fine)
             if not error > tolerance or every >= most:
                 break
             every, coarse = min(2 * every, most), fine
@@ -150,6 +159,15 @@ def inputs_at_steps(maneuver: Maneuver, every: int) -> np.ndarray:
     return inputs
 
 
+def liveliest(maneuver: Maneuver, samples: int) -> int:
+    """First of so many samples in which the inputs of a maneuver change most."""
+    changes = np.diff(inputs_at_steps(maneuver, 1), axis=0) ** 2
+    whole = changes.sum(axis=0)
+    changed = (changes[:, whole > 0.0] / whole[whole > 0.0]).sum(axis=1)
+    sums = np.append(0.0, np.cumsum(changed))
+    return int(np.argmax(sums[samples - 1 :] - sums[: len(sums) - samples + 1]))
+
+
 def relative_error(one: np.ndarray, other: np.ndarray) -> float:
     """Largest RMS difference of outputs (samples, outputs) as part of their ranges."""
     size = np.ptp(other, axis=0)
@@ -167,6 +185,11 @@ class StructuralModel(Model):
         """The matrices, assembled when they are first needed, about the static state."""
         structure = self.definition.structure(self.parameters.values())
         return StructuralSystem(structure, self._static_law(structure))
+
+    @cached_property
+    def _whole(self) -> Periods:
+        """The full structure, with the step sizes of its runs."""
+        return Periods((self.system,))
 
     @property
     def size(self) -> int:
@@ -258,7 +281,7 @@ class StructuralModel(Model):
         """
         maneuver = checked_maneuver(maneuver, self.definition)
         names = None if outputs is None else output_names(outputs)
-        periods = periods or Periods((self.system,))
+        periods = periods or self._whole
         counts = dict.fromkeys(STRUCTURAL_COUNTS, 0)
         (histories, states, found, reason), seconds = timed(
             lambda: periods.march(maneuver, tolerance, step, recorded)

@@ -196,6 +196,7 @@ def test_a_saved_truck_is_the_same_to_the_bit_and_so_are_many_runs(tmp_path):
     for given, payload, values in zip(runs, (0.0, 4000.0), loaded["values"], strict=True):
         other = rom.for_parameters({"payload": payload}).simulate(given)
         np.testing.assert_array_equal(values, other.outputs)
+    assert np.ptp(loaded["values"].isel(time=0).sel(output="Fz_RL").values) > 5000.0
 
 
 def test_another_payload_keeps_the_basis_and_other_parameters_make_anew(model):
