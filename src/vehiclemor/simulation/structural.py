@@ -130,10 +130,10 @@ class Periods:
         every = max(round(spacing / FIRST_STEP), 1)
         least, most = (max(round(spacing / h), 1) for h in (LONGEST_STEP, SHORTEST_STEP))
         samples = min(round(TRIED / spacing) + 1, maneuver.samples)
-        part = {"samples": samples, "begin": liveliest(maneuver, samples)}
-        coarse = self.steps_of(maneuver, every, **part)[0]
+        begin = liveliest(maneuver, samples)
+        coarse = self.steps_of(maneuver, every, samples, begin=begin)[0]
         while True:
-            fine = self.steps_of(maneuver, 2 * every, **part)[0]
+            fine = self.steps_of(maneuver, 2 * every, samples, begin=begin)[0]
             # What they differ by is three quarters of the coarse one's error.
             error = 4.0 / 3.0 * relative_error(coarse, fine)
             if not error > tolerance or every >= most:
