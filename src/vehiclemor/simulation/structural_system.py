@@ -20,9 +20,14 @@ STRUCTURAL_LOOPS = ("simulation.sparse_loops", "simulation.structural_loops")
 DAMPED = 0.8
 
 
-def weights_of(h: float, damping_time: float) -> tuple[Weights, tuple[float, float, float]]:
-    """Coefficients for a step of h s, and those of M, E and K in the matrix of a step."""
-    a_m, a_f = (2.0 * DAMPED - 1.0) / (DAMPED + 1.0), DAMPED / (DAMPED + 1.0)
+def weights_of(
+    h: float, damping_time: float, radius: float
+) -> tuple[Weights, tuple[float, float, float]]:
+    """Coefficients for a step of h s, and those of M, E and K in the matrix of a step.
+
+    The radius is the spectral one at infinity: 1 damps nothing.
+    """
+    a_m, a_f = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
     beta, gamma = 0.25 * (1.0 - a_m + a_f) ** 2, 0.5 - a_m + a_f
     slope, after = gamma / (beta * h), 1.0 - a_f
     rate_rate, rate_acceleration = 1.0 - gamma / beta, h * (1.0 - 0.5 * gamma / beta)
@@ -87,28 +92,28 @@ class StructuralSystem:
 
     structure: Structure
     law: PortLaw
-    _marching: dict[float, Ready] = field(default_factory=dict)
+    _marching: dict[tuple[float, float], Ready] = field(default_factory=dict)
 
     @cached_property
     def order(self) -> np.ndarray:
         """Order (n,) of the coordinates in which factors of the matrices stay sparse."""
         return ordering(self.structure.mass + self.structure.stiffness)
 
-    def marching(self, h: float) -> Ready:
+    def marching(self, h: float, radius: float = DAMPED) -> Ready:
         """The structure with a step size in s; its matrix is factored once."""
-        found = self._marching.get(h)
+        found = self._marching.get((h, radius))
         if found is None:
             # A step whose error is estimated needs two.
             if len(self._marching) > 3:
                 self._marching.pop(next(iter(self._marching)), None)
-            found = self._marching[h] = ready(self._prepared(h))
+            found = self._marching[h, radius] = ready(self._prepared(h, radius))
         return found
 
-    def _prepared(self, h: float) -> Marching:
+    def _prepared(self, h: float, radius: float) -> Marching:
         from scipy.sparse import hstack
 
         s, order = self.structure, self.order
-        weights, (of_mass, of_damping, of_stiffness) = weights_of(h, s.damping_time)
+        weights, (of_mass, of_damping, of_stiffness) = weights_of(h, s.damping_time, radius)
         mass, stiffness = (m[order][:, order] for m in (s.mass, s.stiffness))
         factor, p = factored(of_mass * mass + of_stiffness * stiffness), s.ports.shape[1]
         beside = hstack([s.ports, s.dampers]).tocsr()[order]
@@ -139,13 +144,20 @@ class StructuralSystem:
         )
 
     def march(
-        self, state: np.ndarray, inputs: np.ndarray, h: float, every: int, recorded: bool = False
+        self,
+        state: np.ndarray,
+        inputs: np.ndarray,
+        h: float,
+        every: int,
+        recorded: bool = False,
+        radius: float = DAMPED,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
         """A run in steps of h s from a state (3, n): coordinates, rates and accelerations.
 
         Inputs (steps + 1, inputs) are those at all steps.  Gives outputs (samples, outputs) and
         coordinates (samples, n), none unless recorded, at every so many steps; counts; and why it
-        has ended.  The state becomes the last one.
+        has ended.  The state becomes the last one.  A spectral radius of 1 at infinity makes the
+        method the midpoint rule, which needs no accelerations but those of the equations.
         """
         (_, n), p, samples = state.shape, self.law.static.shape[1], (len(inputs) - 1) // every + 1
         histories = np.full((samples, self.structure.outputs[0].shape[0]), np.nan)
@@ -155,7 +167,7 @@ class StructuralSystem:
         counts, order = np.zeros(3, dtype=np.int64), self.order
         moved = np.ascontiguousarray(state[:, order])
         arguments = moved, inputs, every, histories, states, buffer, counts
-        reason = structural_loop()(self.marching(h), *arguments)
+        reason = structural_loop()(self.marching(h, radius), *arguments)
         state[:, order] = moved
         if recorded:
             states[:, order] = states.copy()

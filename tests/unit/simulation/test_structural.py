@@ -13,7 +13,7 @@ from vehiclemor.inputs.maneuver import Maneuver, smooth
 from vehiclemor.simulation.sparse_factors import blocks_of, factored
 from vehiclemor.simulation.sparse_loops import solve
 from vehiclemor.simulation.structural import Periods, relative_error
-from vehiclemor.simulation.structural_system import weights_of
+from vehiclemor.simulation.structural_system import DAMPED, weights_of
 
 TRUCK, HEIGHTS = "flexible_truck", ("road_FL", "road_FR", "road_RL", "road_RR")
 # Nothing takes energy away, and the tire, which is one-sided and damped, is gone.
@@ -150,7 +150,7 @@ def test_blocks_of_factors_solve_as_another_solver_does(truck):
     rng = np.random.default_rng(4)
     sparse = random_array((150, 150), density=0.03, rng=rng)
     shells = vm.model(TRUCK, {"shell_size": 0.5}).system.structure
-    _, (of_mass, _, of_stiffness) = weights_of(1e-3, shells.damping_time)
+    _, (of_mass, _, of_stiffness) = weights_of(1e-3, shells.damping_time, DAMPED)
     for matrix in (
         csc_array(sparse @ sparse.T + eye_array(150)),
         csc_array(of_mass * shells.mass + of_stiffness * shells.stiffness),

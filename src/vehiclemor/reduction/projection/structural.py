@@ -176,9 +176,9 @@ class SteppedStructure(ReducedStructure):
         time: float = 0.0,
         next_inputs: np.ndarray | None = None,
     ) -> np.ndarray:
-        """State (2 r,) after dt s, in equal steps of a millisecond at most.
+        """State (2 r,) after dt s, in equal steps of a millisecond at most, by the midpoint rule.
 
-        A state has no accelerations of the method, so each call begins it anew: of first order.
+        A state has no accelerations of the method, with which runs go on.
         """
         check_positive("dt", dt)
         count = max(int(np.ceil(dt / FIRST_STEP - 1e-9)), 1)
@@ -188,29 +188,39 @@ class SteppedStructure(ReducedStructure):
         moved = np.array([state[:r], state[r:], self.rates(state, inputs)[r:]])
         # Rounded, so that a loop whose times are rounded factors once.
         h = float(f"{dt / count:.12g}")
-        reason = self._first.march(moved, path, h, count)[3]
+        reason = self._first.march(moved, path, h, count, radius=1.0)[3]
         if reason:
             raise ConvergenceError(f"{self.model.name}: {REASONS[reason]}, from t = {time:g} s on")
         return np.concatenate(moved[:2])
 
+    @cached_property
+    def _dense(self) -> tuple[np.ndarray, ...]:
+        """Squares of the frequencies (r,), ports (r, p), dampers (r, k), outputs as in `Structure`.
+
+        Products with these few numbers take less time than with sparse arrays.
+        """
+        s: Any = self._first.structure
+        outputs = (matrix.toarray() for matrix in s.outputs)
+        return s.stiffness.diagonal(), s.ports.toarray(), s.dampers.toarray(), *outputs
+
     def _forces(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Port forces and their derivatives (p, 3)."""
-        ports, r = self._first.structure.ports, len(state) // 2
-        return self._first.law.at(ports.T @ state[:r], ports.T @ state[r:], inputs)
+        ports, r = self._dense[1], len(state) // 2
+        return self._first.law.at(state[:r] @ ports, state[r:] @ ports, inputs)
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """Time derivative (2 r,) of a state."""
         del time
-        s, r = self._first.structure, len(state) // 2
-        elastic = s.stiffness @ (state[:r] + s.damping_time * state[r:])
-        force = s.ports @ self._forces(state, inputs)[:, 0]
-        damped = s.dampers @ (s.dampers.T @ state[r:])
-        return np.concatenate([state[r:], force - elastic - damped])
+        squares, ports, dampers, *_ = self._dense
+        r, damping_time = len(squares), self._first.structure.damping_time
+        elastic = squares * (state[:r] + damping_time * state[r:])
+        force = ports @ self._forces(state, inputs)[:, 0]
+        return np.concatenate([state[r:], force - elastic - dampers @ (state[r:] @ dampers)])
 
     def outputs(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, outputs) of states (samples, 2 r) at inputs (samples, inputs)."""
         found, r = [], states.shape[1] // 2
-        cq, cv, ca, cf = self._first.structure.outputs
+        cq, cv, ca, cf = self._dense[3:]
         for x, u in zip(states, inputs, strict=True):
             force = self._forces(x, u)[:, 0] + self._first.law.static[1]
             moved = cq @ x[:r] + cv @ x[r:] + ca @ self.rates(x, u)[r:]
@@ -225,13 +235,14 @@ class SteppedStructure(ReducedStructure):
         function = chosen(of, RESULTS)
         if parameter_names(by):
             raise InputError(f"the reduced equations of {self.model.name} have no parameters")
-        s, law, r = self._first.structure, self._first.law, len(state) // 2
-        ports, p = s.ports.toarray(), len(law.static[0])
+        squares, ports, dampers, cq, cv, ca, cf = self._dense
+        damping_time, law = self._first.structure.damping_time, self._first.law
+        r, p = ports.shape
         if by == "state":
             slopes = self._forces(state, inputs)
             force = np.hstack([slopes[:, 1, None] * ports.T, slopes[:, 2, None] * ports.T])
-            elastic, damped = s.stiffness.toarray(), (s.dampers @ s.dampers.T).toarray()
-            linear = np.hstack([-elastic, -s.damping_time * elastic - damped])
+            elastic = np.diag(squares)
+            linear = np.hstack([-elastic, -damping_time * elastic - dampers @ dampers.T])
             rate = np.hstack([np.zeros((r, r)), np.eye(r)])
         else:
             x = np.concatenate([law.static[0] + ports.T @ state[:r], ports.T @ state[r:]])
@@ -242,7 +253,6 @@ class SteppedStructure(ReducedStructure):
         acceleration = linear + ports @ force
         if function == "rhs":
             return np.vstack([rate, acceleration])
-        cq, cv, ca, cf = s.outputs
         position = np.hstack([np.eye(r), np.zeros((r, r))]) if by == "state" else linear
         return cq @ position + cv @ rate + ca @ acceleration + cf @ force
 

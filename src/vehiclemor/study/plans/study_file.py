@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
+from vehiclemor.study.plans.mesh_sizes import Size
 from vehiclemor.study.plans.ranges import Drawn, Numbers, Range, without_speed
 from vehiclemor.toml_files import FileSchema, Line
 
@@ -220,21 +221,6 @@ class MethodEntry(FileSchema):
         description="with bounds: of full order every candidate has a result; of the contenders "
         "one is chosen",
     )
-
-
-class Size(FileSchema):
-    """Meshes of a structure, over which full and reduced runs are timed; see `plans/size.py`."""
-
-    meshes: list[dict[str, float]] = Field(
-        min_length=1, description="parameters of each mesh, the finest last: what is refined first"
-    )
-    frequency: float = Field(1.0, gt=0.0, description="factor of the maneuver")
-    amplitude: float = Field(1.0, description="factor of the maneuver")
-    step: float = Field(1e-3, gt=0.0, description="s, the same of all runs")
-    whole: int = Field(1000, description="coordinates up to which full order is timed over the run")
-    window: float = Field(1.0, gt=0.0, description="s of the run, over which it is timed beyond")
-    up_to: dict[str, int] = _table("label -> coordinates of the largest mesh that it is made of")
-    beside: list[str] = _list("models whose shipped reduced models are timed beside")
 
 
 class StudyFile(FileSchema):
