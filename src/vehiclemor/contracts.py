@@ -19,7 +19,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build, check_equations
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.structural import StructuralModel
+from vehiclemor.simulation.structures.model import StructuralModel
 from vehiclemor.simulation.trajectory import FINISHED
 
 

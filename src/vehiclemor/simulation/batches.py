@@ -24,7 +24,7 @@ from vehiclemor.simulation.checks import checked_path
 from vehiclemor.simulation.dynamic import reference_solver
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
-from vehiclemor.simulation.structural import SOLVER, TIGHT
+from vehiclemor.simulation.structures.model import SOLVER, TIGHT
 from vehiclemor.simulation.trajectory import (
     STATUSES,
     Names,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.algebraic import AlgebraicModel
     from vehiclemor.simulation.dynamic import DynamicModel
     from vehiclemor.simulation.model import Model
-    from vehiclemor.simulation.structural import StructuralModel
+    from vehiclemor.simulation.structures.model import StructuralModel
     from vehiclemor.symbolic.program import Program
 
 # Largest gap (m or rad) between the joints of a mechanism that counts as assembled.
@@ -143,8 +143,8 @@ def _structural(
     definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
 ) -> StructuralModel:
     """A model of sparse matrices and a port law; the matrices are made when they are needed."""
-    from vehiclemor.simulation.structural import StructuralModel
-    from vehiclemor.simulation.structural_system import STRUCTURAL_LOOPS
+    from vehiclemor.simulation.structures.model import StructuralModel
+    from vehiclemor.simulation.structures.system import STRUCTURAL_LOOPS
 
     with blamed(f"model {definition.name!r}: check", definition.check):
         definition.check(values_of(definition, parameters.flat()))

@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 import vehiclemor as vm
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.projection.structural import ReducedStructure
-from vehiclemor.simulation.structural import relative_error
+from vehiclemor.simulation.structures.model import relative_error
 
 TRUCK = "flexible_truck"
 HEIGHTS = ("road_FL", "road_FR", "road_RL", "road_RR")

@@ -10,10 +10,10 @@ from scipy.sparse.linalg import spsolve
 import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
-from vehiclemor.simulation.sparse_factors import blocks_of, factored
-from vehiclemor.simulation.sparse_loops import solve
-from vehiclemor.simulation.structural import Periods, relative_error
-from vehiclemor.simulation.structural_system import DAMPED, weights_of
+from vehiclemor.simulation.structures.factors import blocks_of, factored
+from vehiclemor.simulation.structures.model import Periods, relative_error
+from vehiclemor.simulation.structures.sparse_loops import solve
+from vehiclemor.simulation.structures.system import DAMPED, weights_of
 
 TRUCK, HEIGHTS = "flexible_truck", ("road_FL", "road_FR", "road_RL", "road_RR")
 # Nothing takes energy away, and the tire, which is one-sided and damped, is gone.

@@ -22,7 +22,7 @@ from vehiclemor.reduction.projection import structural
 from vehiclemor.reduction.projection.modes import port_rates
 from vehiclemor.reduction.projection.structural import ReducedStructure, StructuralSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.simulation.structural import StructuralModel
+from vehiclemor.simulation.structures.model import StructuralModel
 
 # Time in s in which motion counts less by a factor e.
 FADING = 2.0

@@ -16,7 +16,7 @@ from vehiclemor.reduction.interface import Method, OfflineCost
 from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.build import reparametrised
-from vehiclemor.simulation.structural import USUAL, StructuralModel
+from vehiclemor.simulation.structures.model import USUAL, StructuralModel
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 

@@ -18,7 +18,7 @@ from vehiclemor.reduction.projection.structural import (
     reduced,
 )
 from vehiclemor.reduction.training import Training
-from vehiclemor.simulation.structural import StructuralModel
+from vehiclemor.simulation.structures.model import StructuralModel
 
 
 class CraigBamptonSettings(StructuralSettings):

@@ -28,7 +28,7 @@ from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.structural import USUAL, StructuralModel
+from vehiclemor.simulation.structures.model import USUAL, StructuralModel
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.simulation.sparse_factors import factored
-from vehiclemor.simulation.structural import StructuralModel
+from vehiclemor.simulation.structures.factors import factored
+from vehiclemor.simulation.structures.model import StructuralModel
 
 # Modes that are looked for at first.
 FIRST_MODES = 16

@@ -26,14 +26,14 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.kernel_derivatives import PLACES, By, chosen, parameter_names, partial
-from vehiclemor.simulation.structural import (
+from vehiclemor.simulation.structures.model import (
     FIRST_STEP,
     REASONS,
     USUAL,
     Periods,
     StructuralModel,
 )
-from vehiclemor.simulation.structural_system import StructuralSystem
+from vehiclemor.simulation.structures.system import StructuralSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory
 from vehiclemor.sizes import require
 

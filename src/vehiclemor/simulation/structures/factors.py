@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import GeometryError
-from vehiclemor.simulation.sparse_loops import Blocks, Columns
+from vehiclemor.simulation.structures.sparse_loops import Blocks, Columns
 
 # Numbers stored for each that is not zero, and columns, in a block of a factor.
 WASTE, WIDEST = 1.3, 32

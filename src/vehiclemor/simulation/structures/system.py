@@ -10,12 +10,12 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.multibody.structure import Structure
-from vehiclemor.simulation import structural_loops as compiled
 from vehiclemor.simulation.paths import address_of
-from vehiclemor.simulation.sparse_factors import blocks_of, columns_of, factored, ordering
-from vehiclemor.simulation.structural_loops import Marching, Weights
+from vehiclemor.simulation.structures import time_loops as compiled
+from vehiclemor.simulation.structures.factors import blocks_of, columns_of, factored, ordering
+from vehiclemor.simulation.structures.time_loops import Marching, Weights
 
-STRUCTURAL_LOOPS = ("simulation.sparse_loops", "simulation.structural_loops")
+STRUCTURAL_LOOPS = ("simulation.structures.sparse_loops", "simulation.structures.time_loops")
 # Spectral radius of the method at infinity.
 DAMPED = 0.8
 

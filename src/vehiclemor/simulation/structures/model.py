@@ -14,7 +14,6 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.multibody.structure import Structure
 from vehiclemor.registry import choice
-from vehiclemor.simulation import structural_loops as compiled
 from vehiclemor.simulation.checks import (
     check_positive,
     checked_inputs,
@@ -25,8 +24,9 @@ from vehiclemor.simulation.checks import (
 from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
-from vehiclemor.simulation.sparse_factors import factored
-from vehiclemor.simulation.structural_system import PortLaw, StructuralSystem
+from vehiclemor.simulation.structures import time_loops as compiled
+from vehiclemor.simulation.structures.factors import factored
+from vehiclemor.simulation.structures.system import PortLaw, StructuralSystem
 from vehiclemor.simulation.trajectory import (
     STRUCTURAL_COUNTS,
     Names,

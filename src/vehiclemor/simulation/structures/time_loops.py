@@ -26,7 +26,13 @@ from vehiclemor.codegen.loop_types import (
     matrix,
     vector,
 )
-from vehiclemor.simulation.sparse_loops import Blocks, Columns, add_product, column_product, solve
+from vehiclemor.simulation.structures.sparse_loops import (
+    Blocks,
+    Columns,
+    add_product,
+    column_product,
+    solve,
+)
 
 FINISHED, NOT_FINITE, NO_CONVERGENCE = range(3)
 # Places of the counts of a run.
