@@ -39,6 +39,8 @@ FACTS = ROOT / "paper" / "facts.json"
 # Kinds of sources that one file of the results folder holds; and those of a script each.
 SCRIPTS = {"in_use": in_use}
 FILES = {"benchmark": "benchmark.json"} | {kind: script.FILE for kind, script in SCRIPTS.items()}
+# The truck's protocol takes a quarter of an hour: it is no part of the collection.
+PROTOCOLS = "predictive", "predictive-flexible_truck"
 # [source: variable; label; label; ...]
 QUERY = re.compile(r"\[([^:\[\]]+):([^\[\]]+)\]")
 # What an expression may call; everything else is arithmetic.
@@ -121,7 +123,8 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
         values = {key: number.value for key, number in load_published().numbers.items()}
         return pd.DataFrame({"value": values}).rename_axis("id").to_xarray()
     if kind == "predictive":
-        rows = study_comparison("predictive", folder, jobs)
+        parts = [study_comparison(study, folder, jobs) for study in PROTOCOLS]
+        rows = pd.concat(parts, ignore_index=True)
         rows = rows[rows["kind"] == "method"].dropna(axis=1, how="all")
         return rows.set_index(["model", "label"]).to_xarray()
     if kind == "sizes":
