@@ -19,7 +19,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build, check_equations
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.structures.model import StructuralModel
+from vehiclemor.simulation.structures.model import StructuralModel, wrong_matrices
 from vehiclemor.simulation.trajectory import FINISHED
 
 
@@ -95,16 +95,8 @@ def _check_dynamic(model: Any, maneuver: Maneuver) -> None:
 
 def _check_structural(model: StructuralModel, maneuver: Maneuver) -> None:
     name, structure = model.name, model.system.structure
-    n, p, k = model.size, len(model.definition.ports), len(model.outputs)
-    expected = {"mass": (n, n), "stiffness": (n, n), "ports": (n, p)}
-    for matrix, shape in expected.items():
-        assert getattr(structure, matrix).shape == shape, f"{name}: wrong shape of {matrix}"
-    assert structure.dampers.shape[0] == n, f"{name}: wrong shape of dampers"
-    shapes = [matrix.shape for matrix in structure.outputs]
-    assert shapes == [(k, n), (k, n), (k, n), (k, p)], f"{name}: wrong shapes of outputs"
-    for matrix in (structure.mass, structure.stiffness):
-        apart = abs(matrix - matrix.T).max()
-        assert apart <= 1e-9 * abs(matrix).max(), f"{name}: mass or stiffness is not symmetric"
+    p, k = len(model.definition.ports), len(model.outputs)
+    assert not wrong_matrices(structure, p, k), f"{name}: {wrong_matrices(structure, p, k)}"
     law = model.system.law
     assert np.isfinite(law.static).all(), f"{name}: its static state is not finite"
     trajectory = model.simulate(maneuver)

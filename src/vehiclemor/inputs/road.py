@@ -34,7 +34,7 @@ DENSITY, REFERENCE = 256e-6, 0.1
 STEP = 1.0 / 500.0
 WAVES = np.arange(6, 1416)
 # m/s, nominal and bounds of `road`.
-SPEED, SPEEDS = 20.0, (10.0, 25.0)
+SPEED, SPEEDS = 20.0, (1.0, 40.0)
 # Distance (m) of left and right wheels, and of front and rear wheels.
 TRACK, WHEELBASE = 2.07, 4.5
 # Length (s) of the ramp at which the road sets in.
@@ -152,7 +152,7 @@ def road(road_class: str = "C", seed: int = 1, speed: float = SPEED) -> Maneuver
     Parameters
     ----------
     road_class, seed, speed
-        A (smooth) to E (very rough); 0 to 999999, each gives another road; 10 to 25 m/s.
+        A (smooth) to E (very rough); 0 to 999999, each gives another road; 1 to 40 m/s.
 
     Raises
     ------

@@ -22,7 +22,7 @@ from vehiclemor.netcdf_file import INTEGRITY, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.parts import Reader, Writer
-from vehiclemor.reduction.trust import SAMPLED, InputRange
+from vehiclemor.reduction.trust import BANDS, InputRange
 from vehiclemor.reduction.validation import checked_fit, checked_settings, validated
 from vehiclemor.registry import component
 from vehiclemor.short_repr import shortened
@@ -100,7 +100,7 @@ def read(path: Any) -> dict[str, Any]:
         known = made["input_range"]
         if not isinstance(known, InputRange):
             raise TypeError(f"input_range is {quoted(known)}, no InputRange")
-        kinds = 1 if model.kind in SAMPLED else 3
+        kinds = {"ae": 1, "structural": 1 + len(BANDS)}.get(model.kind, 3)
         require(known.largest.shape == (kinds, len(model.inputs)), "largest")
         if not _alike(stored["response"], response(model, made["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")

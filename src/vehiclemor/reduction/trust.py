@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,9 +20,13 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.sizes import shaped
 
-# Kinds of models whose inputs are known by their magnitudes at output times: a mechanism has no
-# memory, and roads differ in all else.
-SAMPLED = ("ae", "structural")
+# Edges in Hz of the bands in which inputs of structures are known, and time (s) between samples: a
+# reduced structure holds modes up to a frequency, and a corrugated road is small but quick.
+BANDS, SAMPLING = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 500.0), 1e-3
+# Part by which the content of a band may pass that of the training: roads differ by chance.
+CHANCE = 1.3
+# Part of the largest band below which another one counts as empty.
+QUIET = 1e-4
 # One part in a million is rounding.
 EDGE = 1.0 + 1e-6
 # An input that was zero in training may be nothing else.
@@ -67,6 +73,19 @@ def inputs_beyond(maneuver: Maneuver, known: np.ndarray) -> np.ndarray:
     return first_beyond(maneuver, np.array([-known[0], *known]))
 
 
+@lru_cache(maxsize=512)
+def bands_of(maneuver: Maneuver) -> np.ndarray:
+    """Magnitudes of the inputs, and their RMS values in `BANDS`, (10, inputs)."""
+    count = max(round(maneuver.duration / SAMPLING), 2)
+    values = maneuver.at(np.linspace(0.0, maneuver.duration, count, endpoint=False))
+    power = np.abs(np.fft.rfft(values, axis=0)) ** 2 * (2.0 / count**2)
+    # The mean is no motion.
+    hertz = np.fft.rfftfreq(count, maneuver.duration / count)[1:]
+    places = np.searchsorted(BANDS, hertz)
+    content = [power[1:][places == band].sum(axis=0) for band in range(len(BANDS))]
+    return np.vstack([np.abs(values).max(axis=0), np.sqrt(content)])
+
+
 @dataclass(frozen=True)
 class InputRange:
     """Inputs, initial speeds and durations of the training runs: a method's least claim.
@@ -74,8 +93,9 @@ class InputRange:
     Attributes
     ----------
     largest
-        Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a dynamic
-        model sizes of whole signals (3, inputs), see `Extent`.
+        Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a structure
+        these and RMS values in `BANDS` (10, inputs); of a dynamic model sizes of whole signals (3,
+        inputs), see `Extent`.
     speed, reach
         Middle of the initial speeds in m/s, and how far they lie from it.
     longest
@@ -103,8 +123,10 @@ class InputRange:
     def trust(self, model: Model, maneuver: Maneuver, speed: float) -> Trust:
         """How far a run with an initial speed in m/s goes in the range."""
         maneuver = maneuver.for_inputs(model.inputs)
-        if model.kind in SAMPLED:
+        if model.kind == "ae":
             return self.trust_of_inputs(model.inputs, maneuver.at(maneuver.times), maneuver.times)
+        if model.kind == "structural":
+            return trust_in(self._bands(model.inputs, maneuver))
         used = extent_of(maneuver).largest / self._sizes
         since = np.full(len(model.inputs), np.inf)
         if (used > 1.0).any():
@@ -120,6 +142,18 @@ class InputRange:
         if self.histories is not None:
             ranges["difference from the inputs of training runs"] = self._unlike(maneuver)
         return trust_in(ranges)
+
+    def _bands(self, names: Sequence[str], maneuver: Maneuver) -> dict[str, tuple[float, float]]:
+        """How far whole inputs go in magnitude and in each band, from the begin on."""
+        used = bands_of(maneuver) / self._sizes
+        words = [f"{low:g} to {high:g} Hz" for low, high in pairwise((0.0, *BANDS))]
+        found = {}
+        for name, (size, *content) in zip(names, used.T, strict=True):
+            found[f"input {name}"] = float(size), 0.0 if size > 1.0 else np.inf
+            for word, part in zip(words, content, strict=True):
+                found[f"input {name}, {word}"] = float(part), 0.0 if part > 1.0 else np.inf
+        lasts = maneuver.duration / self.longest
+        return found | {"duration": (lasts, self.longest if lasts > 1.0 else np.inf)}
 
     def _unlike(self, maneuver: Maneuver) -> tuple[float, float]:
         """How far inputs are from those of the nearest training run, and since when (s)."""
@@ -157,7 +191,15 @@ def input_range(
     low, high = min(speeds), max(speeds)
     middle = 0.5 * (low + high)
     reach = EDGE * (max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0)
-    if model.kind in SAMPLED:
+    if model.kind == "structural":
+        sizes = np.max([bands_of(m) for m in maneuvers], axis=0)
+        sizes[1:] *= CHANCE
+        # What is left of a smooth input in a band is rounding, and no content that could matter.
+        quiet = QUIET * sizes[1:].max(axis=0)
+        largest = EDGE * np.maximum(np.vstack([sizes[:1], np.maximum(sizes[1:], quiet)]), NOTHING)
+        longest = max(maneuver.duration for maneuver in maneuvers)
+        return InputRange(largest, middle, reach, longest * EDGE)
+    if model.kind == "ae":
         values = [np.abs(m.at(m.times)).max(axis=0) for m in maneuvers]
         largest = EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
         return InputRange(largest, middle, reach, np.inf)

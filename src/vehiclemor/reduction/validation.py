@@ -81,7 +81,8 @@ def for_model(method: Method, reduced: FittedModel, model: Model, settings: Any)
         raise InputError(
             f"{method.name} is trained on runs of one model: reduce that with the other parameters"
         )
-    if remade is not None:
+    # Of a model with online parameters the others ask for a new fit.
+    if remade is not None and not (model.definition.online and difference(own, model)):
         with blamed(f"method {method.name!r}: for_model", remade):
             return checked_fit(method.name, remade(model))
     return fitted(method, model, (), settings)

@@ -58,7 +58,7 @@ def size_rows(dataset: xr.Dataset) -> Iterator[Row]:
 
 
 def _is_vehicle(dataset: xr.Dataset, place: int) -> bool:
-    return str(dataset["kind"].values[place]) not in KINDS
+    return str(dataset["kind"].values[place]) == "vehicle"
 
 
 def _against(dataset: xr.Dataset, group: str, error: float, seconds: float) -> Row:
@@ -77,10 +77,10 @@ def _against(dataset: xr.Dataset, group: str, error: float, seconds: float) -> R
 def mesh_text(dataset: xr.Dataset, place: int) -> str:
     """A mesh in words: `shells, 0.25 m`; of a vehicle its name."""
     name, kind = str(dataset["mesh"].values[place]), str(dataset["kind"].values[place])
-    if kind not in KINDS:
+    if kind == "vehicle":
         return name.replace("_", " ")
-    word, unit = KINDS[kind]
-    return f"{word}, {name.split()[1].rstrip(',')} {unit}"
+    word, unit = KINDS.get(kind, (kind, ""))
+    return f"{word}, {name.split()[1].rstrip(',')} {unit}".rstrip()
 
 
 def growth(dataset: xr.Dataset, kind: str, label: str) -> float:
@@ -99,10 +99,11 @@ def growth_text(rows: Sequence[Row]) -> str:
         row["mesh_kind"]: row for row in reversed(rows) if row["growth_full"] == row["growth_full"]
     }
     parts = [
-        f"{KINDS[kind][0]}: full n^{row['growth_full']:.2f}, {row['label']} n^{row['growth']:.2f}"
+        f"{KINDS.get(kind, (kind,))[0]}: full n^{row['growth_full']:.2f}, "
+        f"{row['label']} n^{row['growth']:.2f}"
         for kind, row in sorted(found.items())
     ]
-    return f"Times grow with the number n of coordinates ({'; '.join(parts)})."
+    return f"Times grow with the number n of coordinates ({'; '.join(parts)})." if parts else ""
 
 
 COSTS = {

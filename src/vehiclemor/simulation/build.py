@@ -152,7 +152,10 @@ def _structural(
     check_equations(definition, equations)
     constants = hoisted_constants(equations, parameters.flat(), [])
     initial = {DESIGN_START: np.zeros(0)}
-    return StructuralModel(definition, equations, parameters, digest, constants, initial)
+    model = StructuralModel(definition, equations, parameters, digest, constants, initial)
+    # What can't stand is told here.
+    assert model.size
+    return model
 
 
 def check_equations(definition: ModelDefinition, equations: Derivation) -> None:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 # Travel of the springs in m from end to end of the stops' table: nothing is known beyond.
 TRAVEL = 0.37
 SMALL_ANGLE = 0.2
+# In N: the tire is pressed by its section height, 0.375 m.
+LARGEST_LOAD = 100_788.0
 
 
 def derive() -> Program:
@@ -46,6 +48,7 @@ DEFINITION = ModelDefinition(
     check=check,
     validity={
         **{f"deflection_{wheel}": (-TRAVEL, TRAVEL) for wheel in WHEELS},
+        **dict.fromkeys(TIRE_LOADS, (0.0, LARGEST_LOAD)),
         **dict.fromkeys(("pitch", "roll"), (-SMALL_ANGLE, SMALL_ANGLE)),
         **{f"road_{wheel}": (-0.5, 0.5) for wheel in WHEELS},
         **{f"road_{wheel}_dot": (-10.0, 10.0) for wheel in WHEELS},

@@ -13,21 +13,19 @@ from pydantic import Field
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost
-from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTolerance
+from vehiclemor.reduction.projection.structural import StructuralSettings
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.build import reparametrised
-from vehiclemor.simulation.structures.model import USUAL, StructuralModel
+from vehiclemor.simulation.structures.model import StructuralModel
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
-class CoarseMeshSettings(Settings):
+class CoarseMeshSettings(StructuralSettings):
     """Settings for a structure."""
 
     mesh: str = Field(
         "elements_per_bay = 1, shell_size = 0", description="parameters of the mesh, as in TOML"
     )
-    tolerance: StructuralTolerance = USUAL
-    step_size: StructuralStep = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +85,9 @@ def parameters(mesh: str) -> dict[str, float]:
 
 def check(model: StructuralModel, settings: CoarseMeshSettings) -> None:
     """Raise `InputError` if the mesh is none."""
+    for name in parameters(settings.mesh):
+        if name in model.definition.online:
+            raise InputError(f"coarse_mesh: {name} is no parameter of a mesh")
     on_mesh(model, settings.mesh)
 
 

@@ -11,14 +11,13 @@ from pydantic import Field
 from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost, Presets
+from vehiclemor.reduction.projection.structural import StructuralSettings
 from vehiclemor.reduction.reduced_system import ReducedMechanism, ReducedSystem
 from vehiclemor.reduction.settings import (
     AnyIntegrator,
     OnlineSettings,
     Settings,
     StepTolerance,
-    StructuralStep,
-    StructuralTolerance,
     Tolerance,
     Value,
 )
@@ -55,14 +54,12 @@ class DynamicSettings(OnlineSettings):
     tolerance: Tolerance = 1e-8
 
 
-class StructuralSettings(Settings):
+class FullStructureSettings(StructuralSettings):
     """How structures are integrated."""
 
     solver: Literal["generalised_alpha"] = Field(
         "generalised_alpha", description="of order 2, one step size a run, damped at infinity"
     )
-    tolerance: StructuralTolerance = USUAL
-    step_size: StructuralStep = 0.0
 
 
 # The paper's kind of baseline: a general-purpose integrator of variable step.
@@ -167,10 +164,10 @@ class FullOrderStructure(FullOrder):
 def fit(
     model: Any,
     training: Training,
-    settings: AlgebraicSettings | DynamicSettings | StructuralSettings,
+    settings: AlgebraicSettings | DynamicSettings | FullStructureSettings,
 ) -> FullOrder:
     """Nothing is fitted, and no training run is looked at."""
-    if isinstance(settings, StructuralSettings):
+    if isinstance(settings, FullStructureSettings):
         own = model, settings.solver, settings.tolerance
         return FullOrderStructure(*own, step_size=settings.step_size)
     kind = FullOrderMechanism if model.kind == "ae" else FullOrderSystem
@@ -181,13 +178,13 @@ METHOD = Method(
     name="full_order",
     summary="no reduction: the full-order model, the baseline",
     settings={"ae": AlgebraicSettings, "ode": DynamicSettings, "dae": DynamicSettings}
-    | {"structural": StructuralSettings},
+    | {"structural": FullStructureSettings},
     # Strongest: the fastest solver found whose errors are within the bounds of the studies.
     presets={
         "ae": _presets("newton_lanes", 1e-4),
         "ode": _presets("ros34pw2", 2e-3, paper=PAPER),
         "dae": _presets("ros34pw2", 7e-4, paper=PAPER),
-        "structural": _presets("generalised_alpha", 1e-3),
+        "structural": _presets("generalised_alpha", 1e-2, paper={"tolerance": USUAL}),
     },
     fit=fit,
     learns_from="inputs",

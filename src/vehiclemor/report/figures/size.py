@@ -10,12 +10,11 @@ from vehiclemor.report.figures.theme import Results, Style
 from vehiclemor.report.sizes import KINDS, growth, size_rows
 from vehiclemor.study.plans.size import FULL
 
-# Of the reduced models this one is drawn: it is made of every mesh.
-REDUCED = "Craig-Bampton"
-LOOKS: dict[str, Style] = {
-    "elements_per_bay": {"color": "#0072B2", "marker": "o"},
-    "shell_size": {"color": "#D55E00", "marker": "s"},
-}
+LOOKS: tuple[Style, ...] = (
+    {"color": "#0072B2", "marker": "o"},
+    {"color": "#D55E00", "marker": "s"},
+    {"color": "#CC79A7", "marker": "^"},
+)
 VEHICLES = {"double_wishbone": "wishbone", "independent_suspension_vehicle": "14-DOF car"}
 VEHICLES |= {"high_fidelity_vehicle": "high-fidelity car"}
 
@@ -23,31 +22,34 @@ VEHICLES |= {"high_fidelity_vehicle": "high-fidelity car"}
 def figure_size(results: Results) -> Figure:
     """CPU time of a whole run over the number of coordinates, and how many times reduction gains.
 
-    The three models of the paper stand beside the truck.  Hollow marks: the reduced model.
+    The three models of the paper stand beside the truck.  Hollow marks: the reduced model, the
+    first of the study.
     """
     (dataset,) = results.values()
     figure, axes = theme.panels(1, 2, (7.2, 3.6))
     left, right = axes[0]
     n, kinds = dataset["coordinates_of_mesh"].values, dataset["kind"].values
     full = dataset["seconds_median"].sel(label=FULL).values
-    reduced = dataset["seconds_median"].sel(label=REDUCED).values
-    for kind, (word, _) in KINDS.items():
-        own, look = kinds == kind, LOOKS[kind]
+    name = str(dataset["label"].values[1])
+    reduced = dataset["seconds_median"].sel(label=name).values
+    meshes = [kind for kind in dict.fromkeys(kinds.tolist()) if kind != "vehicle"]
+    for kind, look in zip(meshes, LOOKS, strict=False):
+        own, word = kinds == kind, KINDS.get(kind, (kind, ""))[0]
         slope = f"{word}, full: n^{growth(dataset, kind, FULL):.1f}"
         left.plot(n[own], full[own], label=slope, **look)
         hollow: Style = look | {"markerfacecolor": "none", "linestyle": "--"}
-        left.plot(n[own], reduced[own], label=f"{word}, {REDUCED}", **hollow)
+        left.plot(n[own], reduced[own], label=f"{word}, {name}", **hollow)
         right.plot(n[own], full[own] / reduced[own], label=f"{word}, the same mesh", **look)
-    cars = ~np.isin(kinds, list(KINDS))
+    cars = kinds == "vehicle"
     black: Style = {"color": "black", "linestyle": "none", "marker": "D", "markersize": 4}
     left.plot(n[cars], full[cars], label="the paper's models, full", **black)
     left.plot(n[cars], reduced[cars], markerfacecolor="none", label="reduced", **black)
     right.plot(n[cars], full[cars] / reduced[cars], label="the paper's models", **black)
-    for name, place in zip(dataset["mesh"].values[cars], np.flatnonzero(cars), strict=True):
+    for car, place in zip(dataset["mesh"].values[cars], np.flatnonzero(cars), strict=True):
         at = n[place], full[place] / reduced[place]
-        text = VEHICLES.get(str(name), str(name))
+        text = VEHICLES.get(str(car), str(car))
         right.annotate(text, at, (4, 4), textcoords="offset points", fontsize=7)
-    rivals = [row for row in size_rows(dataset) if row["label"] == REDUCED]
+    rivals = [row for row in size_rows(dataset) if row["label"] == name]
     for group, marker in (("motion", "x"), ("strain", "+")):
         at = [(row["coordinates"], row[f"gain_{group}"]) for row in rivals]
         style: Style = {"linestyle": "none", "marker": marker, "color": "#009E73"}

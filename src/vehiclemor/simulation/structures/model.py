@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
+from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError, blamed
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import recorded_inputs
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.structure import Structure
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import (
@@ -47,7 +48,12 @@ REASONS = {
     compiled.NO_CONVERGENCE: "no convergence of the port forces",
 }
 # Runs whose step sizes are kept.
-MOST_RUNS = 1024
+MOST_RUNS = 512
+# Time (s) between output times beyond which errors are estimated between them.
+LONGEST_SPACING = 0.02
+# Part of the largest range of an output of the same unit that is rounding; and of the largest
+# entry of a matrix by which it may differ from its transpose.
+ROUNDING, SYMMETRIC = 1e-6, 1e-9
 # Changes of port forces (N) at which a static state counts as found.
 STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 100
 
@@ -69,21 +75,31 @@ class Periods:
     systems: tuple[StructuralSystem, ...]
     edges: tuple[float, ...] = ()
     passed: tuple[np.ndarray, ...] = ()
-    _steps: dict[Any, int] = field(default_factory=dict)
+    _steps: dict[Any, tuple[int, str]] = field(default_factory=dict)
 
     def march(
-        self, maneuver: Maneuver, tolerance: float, step: float, recorded: bool
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-        """A run from the static state, see `StructuralSystem.march` and `StructuralModel.run`."""
+        self,
+        maneuver: Maneuver,
+        accuracy: tuple[float, float],
+        alike: np.ndarray,
+        recorded: bool,
+    ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray, int], str]:
+        """A run from the static state, see `StructuralSystem.march`, and what to know of its steps.
+
+        The accuracy is a tolerance and a step size in s, which takes its place unless it is 0;
+        `alike` are numbers (outputs,) of their units.
+        """
+        tolerance, step = accuracy
         if step:
-            every = max(round(spacing_of(maneuver) / step), 1)
-            return self.steps_of(maneuver, every, maneuver.samples, recorded)
-        key = maneuver, tolerance
-        if key not in self._steps:
-            if len(self._steps) >= MOST_RUNS:
-                self._steps.clear()
-            self._steps[key] = self.steps(maneuver, tolerance)
-        return self.steps_of(maneuver, self._steps[key], maneuver.samples, recorded)
+            every, remark = max(round(spacing_of(maneuver) / step), 1), ""
+        else:
+            key = maneuver, tolerance
+            if key not in self._steps:
+                if len(self._steps) >= MOST_RUNS:
+                    self._steps.clear()
+                self._steps[key] = self.steps(maneuver, tolerance, alike)
+            every, remark = self._steps[key]
+        return self.steps_of(maneuver, every, maneuver.samples, recorded), remark
 
     def steps_of(
         self, maneuver: Maneuver, every: int, samples: int, recorded: bool = False, begin: int = 0
@@ -119,14 +135,23 @@ class Periods:
             first = end
         return histories, states, np.sum([part[2] for part in parts], axis=0), parts[-1][3]
 
-    def steps(self, maneuver: Maneuver, tolerance: float) -> int:
+    def steps(self, maneuver: Maneuver, tolerance: float, alike: np.ndarray) -> tuple[int, str]:
         """Steps between output times, so many that outputs are as accurate as asked for.
+
+        Beside them is said if no step that is tried is short enough.
 
         A part of a run, in which its inputs change most, is repeated with half the step, as long as
         they differ by more than the tolerance times the range of an output; the method is of second
         order.
         """
         spacing = spacing_of(maneuver)
+        if spacing > LONGEST_SPACING:
+            # Few output times would show nothing of what lies between them.
+            inner = int(np.ceil(spacing / LONGEST_SPACING))
+            own = {"kept": {}} if isinstance(maneuver, Signal) else {}
+            finer = replace(maneuver, samples=(maneuver.samples - 1) * inner + 1, **own)
+            every, remark = self.steps(finer, tolerance, alike)
+            return inner * every, remark
         every = max(round(spacing / FIRST_STEP), 1)
         least, most = (max(round(spacing / h), 1) for h in (LONGEST_STEP, SHORTEST_STEP))
         samples = min(round(TRIED / spacing) + 1, maneuver.samples)
@@ -135,14 +160,17 @@ class Periods:
         while True:
             fine = self.steps_of(maneuver, 2 * every, samples, begin=begin)[0]
             # What they differ by is three quarters of the coarse one's error.
-            error = 4.0 / 3.0 * relative_error(coarse, fine)
+            error = 4.0 / 3.0 * relative_error(coarse, fine, alike)
             if not error > tolerance or every >= most:
                 break
             every, coarse = min(2 * every, most), fine
         # Errors grow with the square of the step.
         while every > least and not every % 2 and 5.0 * error < tolerance:
             every, error = every // 2, 4.0 * error
-        return every
+        missed = (
+            f"steps of {spacing / every:.3g} s leave an error of {error:.1e} of an output's range"
+        )
+        return every, missed if error > tolerance else ""
 
 
 def spacing_of(maneuver: Maneuver) -> float:
@@ -168,12 +196,37 @@ def liveliest(maneuver: Maneuver, samples: int) -> int:
     return int(np.argmax(sums[samples - 1 :] - sums[: len(sums) - samples + 1]))
 
 
-def relative_error(one: np.ndarray, other: np.ndarray) -> float:
-    """Largest RMS difference of outputs (samples, outputs) as part of their ranges."""
+def relative_error(one: np.ndarray, other: np.ndarray, alike: np.ndarray) -> float:
+    """Largest RMS difference of outputs (samples, outputs) as part of their ranges.
+
+    Those that move by less than a millionth of what others of the same unit (`alike`) do, such as
+    roll on a road that is alike on both sides, move by rounding alone.
+    """
     size = np.ptp(other, axis=0)
-    moving = size > 0.0
+    largest = np.array([size[alike == unit].max() for unit in alike])
+    moving = size > ROUNDING * largest
     difference = np.sqrt(np.mean((one - other) ** 2, axis=0))
     return float((difference[moving] / size[moving]).max(initial=0.0))
+
+
+def wrong_matrices(structure: Structure, ports: int, outputs: int) -> str:
+    """What is wrong with the matrices of a structure; empty if nothing is."""
+    n = structure.size
+    shapes = {"mass": (n, n), "stiffness": (n, n), "ports": (n, ports)}
+    shapes |= {"dampers": (n, structure.dampers.shape[1])}
+    found: dict[str, Any] = {name: getattr(structure, name) for name in shapes}
+    named = ("outputs of q", "of q'", "of q''", "of the port forces")
+    found |= dict(zip(named, structure.outputs, strict=True))
+    shapes |= dict(zip(named, [(outputs, n)] * 3 + [(outputs, ports)], strict=True))
+    for name, matrix in found.items():
+        if matrix.shape != shapes[name]:
+            return f"{name} has shape {matrix.shape}, not {shapes[name]}"
+        if not np.isfinite(matrix.tocsc().data).all():
+            return f"{name} has an entry that is not finite"
+    for name in ("mass", "stiffness"):
+        if abs(found[name] - found[name].T).max() > SYMMETRIC * abs(found[name]).max():
+            return f"{name} is not symmetric"
+    return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,14 +235,25 @@ class StructuralModel(Model):
 
     @cached_property
     def system(self) -> StructuralSystem:
-        """The matrices, assembled when they are first needed, about the static state."""
-        structure = self.definition.structure(self.parameters.values())
+        """The matrices about the static state; `InputError` if the declaration makes none."""
+        name = self.name
+        with blamed(f"model {name!r}: structure", self.definition.structure):
+            structure = self.definition.structure(self.parameters.values())
+            wrong = wrong_matrices(structure, len(self.definition.ports), len(self.outputs))
+        if wrong:
+            raise InputError(f"model {name!r}: structure: {wrong}")
         return StructuralSystem(structure, self._static_law(structure))
 
     @cached_property
     def _whole(self) -> Periods:
         """The full structure, with the step sizes of its runs."""
         return Periods((self.system,))
+
+    @cached_property
+    def _alike(self) -> np.ndarray:
+        """Numbers (outputs,) of the units of the outputs."""
+        units = [quantity.unit for quantity in self.definition.outputs]
+        return np.array([units.index(unit) for unit in units])
 
     @property
     def size(self) -> int:
@@ -283,8 +347,8 @@ class StructuralModel(Model):
         names = None if outputs is None else output_names(outputs)
         periods = periods or self._whole
         counts = dict.fromkeys(STRUCTURAL_COUNTS, 0)
-        (histories, states, found, reason), seconds = timed(
-            lambda: periods.march(maneuver, tolerance, step, recorded)
+        ((histories, states, found, reason), remark), seconds = timed(
+            lambda: periods.march(maneuver, (tolerance, step), self._alike, recorded)
         )
         counts |= dict(zip(STRUCTURAL_COUNTS, found.tolist(), strict=False))
         times, inputs = recorded_inputs(maneuver)
@@ -303,6 +367,7 @@ class StructuralModel(Model):
                 self.definition, name, columns[left, first.index(left)], times[left]
             )
             histories[left:] = np.nan
+        lifted = lifted_wheels(self.definition.loads, first[len(limited) :], times)
         run = Trajectory.of(
             times=times,
             inputs=inputs,
@@ -313,7 +378,7 @@ class StructuralModel(Model):
             seconds=seconds,
             status="diverged" if failure else "ok",
             message=failure,
-            remark=lifted_wheels(self.definition.loads, first[len(limited) :], times),
+            remark="; ".join(filter(None, (lifted, remark))),
             trust=None,
             names=self.outputs,
             model=self,

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 # Scores nearer to each other than this share are a tie, which the cheaper candidate wins; and
 # times, which scatter.
 TIE, TIE_OF_TIMES = 0.05, 0.2
+# Part of the largest range of an output of the same unit that is rounding.
+ROUNDING = 1e-6
 # Part of the bounds that a candidate may use up in validation, and the contender that is chosen:
 # the test has more runs, and its worst is worse.
 MARGIN, MARGIN_OF_CHOSEN = 0.5, 0.8
@@ -92,7 +94,15 @@ def errors_by(dataset: xr.Dataset, output: str, measure: str) -> xr.DataArray:
     """Errors of an output by a measure, see `Bound`."""
     own = dataset.sel(output=output)
     if measure == "relative":
-        return own["rms_error"] / own["signal_range"]
+        # What moves by rounding alone, as roll on a symmetric road, has no error.
+        alike = dataset["output_unit"] == own["output_unit"]
+        least = ROUNDING * dataset["signal_range"].where(alike).max("output")
+        size = own["signal_range"]
+        return (
+            (own["rms_error"] / size.where(size > least))
+            .where(size > least, 0.0)
+            .where(np.isfinite(own["rms_error"]))
+        )
     return own[f"{measure}_error"]
 
 

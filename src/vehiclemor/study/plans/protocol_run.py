@@ -68,7 +68,7 @@ def run_protocol(
         for number, name in enumerate(sets)
     }
     # The full order by another integrator than that of the references.
-    preset = "paper" if model.kind in ("ode", "dae") else "recommended"
+    preset = "recommended" if model.kind == "ae" else "paper"
     settings = complete_settings(model, "full_order", preset=preset)
     seconds = {
         name: make_experiment(model, "full_order", settings, (), sets[name], "errors")

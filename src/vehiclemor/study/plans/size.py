@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.codegen.cache import compiler_identity
+from vehiclemor.exceptions import InputError
 from vehiclemor.failure import Failure
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.metrics import rms, signal_range
@@ -47,6 +49,10 @@ ROUNDS = 5
 def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
     """Times and errors on the dimensions `mesh`, `label` and `group`; stored, as are its runs."""
     assert study.size is not None
+    if component("model", study.model).kind != "structural":
+        raise InputError(f"size: {study.model} is no structure")
+    for other in study.size.beside:
+        rom(other)
     meshes: list[Any] = [build(study.model, overrides=mesh) for mesh in study.size.meshes]
     codes = [code_digest(study.model, e.method, dict(e.settings)) for e in study.methods]
     content = [study.model_dump_json(), *codes, meshes[0].kernel_hash, machine(), ROUNDS]
@@ -81,8 +87,11 @@ def _measured(name: str, study: StudyFile, meshes: Sequence[Any], folder: Path) 
         found += [model and model.simulate(chosen).outputs for model in own]
         for column, outputs in enumerate(found):
             if outputs is not None:
-                relative = rms(outputs - truth["outputs"].values) / scale
-                errors[row, column] = relative[~strains].max(), relative[strains].max()
+                relative = rms(outputs - truth["outputs"].values) / np.where(
+                    scale > 0.0, scale, 1.0
+                )
+                for group, chosen_outputs in enumerate((~strains, strains)):
+                    errors[row, column, group] = relative[chosen_outputs].max(initial=0.0)
         for column, model in enumerate(own, start=1):
             if model is not None:
                 order[row, column] = model.reduced.order
@@ -90,7 +99,10 @@ def _measured(name: str, study: StudyFile, meshes: Sequence[Any], folder: Path) 
     order[:, 0] = n
     for row, (_, reduced) in enumerate(beside, start=len(meshes)):
         order[row, 1], offline[row, 1] = reduced.reduced.order, reduced.reduced.offline.seconds
-    seconds, lower, upper = np.nanquantile(timed, (0.5, 0.25, 0.75), axis=0)
+    with warnings.catch_warnings():
+        # What is not made of a mesh was never timed.
+        warnings.filterwarnings("ignore", "All-NaN slice")
+        seconds, lower, upper = np.nanquantile(timed, (0.5, 0.25, 0.75), axis=0)
     found = variables({"coordinates_of_mesh": np.array(n)}, "mesh")
     found |= variables(
         {"seconds_median": seconds, "seconds_lower": lower, "seconds_upper": upper}

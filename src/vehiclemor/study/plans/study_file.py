@@ -31,6 +31,7 @@ OF_TESTS = (
     *(*SETS[1:], *DRAWN, "version", "seed", "reported", "sensitive"),
     *("targets", "failure_rate", "flagged_misses", "straight"),
 )
+OF_SIZES = {"title", "model", "maneuver", "training", "size", "methods"}
 OF_ENTRIES = ("candidates", "role")
 
 
@@ -341,6 +342,11 @@ class StudyFile(FileSchema):
             raise ValueError(f"label {doubles[0]!r} is used twice")
         foreign = [name for name in OF_GRIDS if name in self.model_fields_set]
         if self.size:
+            foreign = sorted(self.model_fields_set - OF_SIZES)
+            if foreign:
+                raise ValueError(f"a size study has no {foreign[0]}")
+            if not self.model_fields_set >= OF_SIZES or not isinstance(self.training, str):
+                raise ValueError("a size study names a model, a maneuver, a training and methods")
             return self
         if self.bounds:
             for name in SETS[:2]:
