@@ -47,11 +47,11 @@ DEFINITION = ModelDefinition(
     derive=derive,
     check=check,
     validity={
+        **{f"road_{wheel}": (-0.5, 0.5) for wheel in WHEELS},
+        **{f"road_{wheel}_dot": (-10.0, 10.0) for wheel in WHEELS},
         **{f"deflection_{wheel}": (-TRAVEL, TRAVEL) for wheel in WHEELS},
         **dict.fromkeys(TIRE_LOADS, (0.0, LARGEST_LOAD)),
         **dict.fromkeys(("pitch", "roll"), (-SMALL_ANGLE, SMALL_ANGLE)),
-        **{f"road_{wheel}": (-0.5, 0.5) for wheel in WHEELS},
-        **{f"road_{wheel}_dot": (-10.0, 10.0) for wheel in WHEELS},
     },
     loads=TIRE_LOADS,
     tabled_outputs=("driver_acceleration", "pitch", "roll", "twist", *TIRE_LOADS, "strain_1"),

@@ -196,13 +196,14 @@ def liveliest(maneuver: Maneuver, samples: int) -> int:
     return int(np.argmax(sums[samples - 1 :] - sums[: len(sums) - samples + 1]))
 
 
-def relative_error(one: np.ndarray, other: np.ndarray, alike: np.ndarray) -> float:
+def relative_error(one: np.ndarray, other: np.ndarray, alike: np.ndarray | None = None) -> float:
     """Largest RMS difference of outputs (samples, outputs) as part of their ranges.
 
     Those that move by less than a millionth of what others of the same unit (`alike`) do, such as
     roll on a road that is alike on both sides, move by rounding alone.
     """
     size = np.ptp(other, axis=0)
+    alike = np.arange(len(size)) if alike is None else alike
     largest = np.array([size[alike == unit].max() for unit in alike])
     moving = size > ROUNDING * largest
     difference = np.sqrt(np.mean((one - other) ** 2, axis=0))

@@ -82,14 +82,13 @@ def _measured(name: str, study: StudyFile, meshes: Sequence[Any], folder: Path) 
     truth = references[-1]
     strains = np.array([name.startswith("strain") for name in truth["output"].values])
     scale = signal_range(truth["outputs"].values)
+    scale[scale == 0.0] = 1.0
     for row, (reference, own) in enumerate(zip(references, fits, strict=True)):
         found = [reference["outputs"].values]
         found += [model and model.simulate(chosen).outputs for model in own]
         for column, outputs in enumerate(found):
             if outputs is not None:
-                relative = rms(outputs - truth["outputs"].values) / np.where(
-                    scale > 0.0, scale, 1.0
-                )
+                relative = rms(outputs - truth["outputs"].values) / scale
                 for group, chosen_outputs in enumerate((~strains, strains)):
                     errors[row, column, group] = relative[chosen_outputs].max(initial=0.0)
         for column, model in enumerate(own, start=1):
