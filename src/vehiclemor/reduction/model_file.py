@@ -100,7 +100,7 @@ def read(path: Any) -> dict[str, Any]:
         known = made["input_range"]
         if not isinstance(known, InputRange):
             raise TypeError(f"input_range is {quoted(known)}, no InputRange")
-        kinds = {"ae": 1, "structural": 1 + len(BANDS)}.get(model.kind, 3)
+        kinds = {"ae": 1, "structural": len(BANDS)}.get(model.kind, 3)
         require(known.largest.shape == (kinds, len(model.inputs)), "largest")
         if not _alike(stored["response"], response(model, made["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")

@@ -20,13 +20,13 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.sizes import shaped
 
-# Edges in Hz of the bands in which inputs of structures are known, and time (s) between samples: a
-# reduced structure holds modes up to a frequency, and a corrugated road is small but quick.
-BANDS, SAMPLING = (2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 500.0), 1e-3
-# Part by which the content of a band may pass that of the training: roads differ by chance.
-CHANCE = 1.3
-# Part of the largest band below which another one counts as empty.
-QUIET = 1e-4
+# Edges in Hz of bands in which inputs of structures are known, and time (s) between samples.  A
+# reduced structure holds motion up to a frequency: on a corrugated road hardly anything is slower.
+BANDS, SAMPLING = (16.0, 32.0, 64.0, 128.0, 256.0, 500.0), 1e-3
+# How many times the share of a band may pass that in the training: roads differ by chance.
+CHANCE = 3.0
+# Share of a band that needs no training.
+QUIET = 1e-2
 # One part in a million is rounding.
 EDGE = 1.0 + 1e-6
 # An input that was zero in training may be nothing else.
@@ -75,15 +75,18 @@ def inputs_beyond(maneuver: Maneuver, known: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=512)
 def bands_of(maneuver: Maneuver) -> np.ndarray:
-    """Magnitudes of the inputs, and their RMS values in `BANDS`, (10, inputs)."""
+    """Magnitudes of the inputs, and shares of `BANDS` in their RMS values, (6, inputs)."""
     count = max(round(maneuver.duration / SAMPLING), 2)
     values = maneuver.at(np.linspace(0.0, maneuver.duration, count, endpoint=False))
-    power = np.abs(np.fft.rfft(values, axis=0)) ** 2 * (2.0 / count**2)
+    # There and back, so that its ends fit and no jump between them seems quick.
+    mirrored = np.vstack([values, values[::-1]])
+    power = np.abs(np.fft.rfft(mirrored, axis=0)) ** 2 * (2.0 / len(mirrored) ** 2)
     # The mean is no motion.
-    hertz = np.fft.rfftfreq(count, maneuver.duration / count)[1:]
-    places = np.searchsorted(BANDS, hertz)
-    content = [power[1:][places == band].sum(axis=0) for band in range(len(BANDS))]
-    return np.vstack([np.abs(values).max(axis=0), np.sqrt(content)])
+    hertz = np.fft.rfftfreq(len(mirrored), maneuver.duration / count)[1:]
+    whole = np.maximum(power[1:].sum(axis=0), NOTHING**2)
+    inside = [(low < hertz) & (hertz <= high) for low, high in pairwise(BANDS)]
+    shares = [np.sqrt(power[1:][band].sum(axis=0) / whole) for band in inside]
+    return np.vstack([np.abs(values).max(axis=0), shares])
 
 
 @dataclass(frozen=True)
@@ -94,8 +97,8 @@ class InputRange:
     ----------
     largest
         Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a structure
-        these and RMS values in `BANDS` (10, inputs); of a dynamic model sizes of whole signals (3,
-        inputs), see `Extent`.
+        these and shares of `BANDS` in their RMS values (6, inputs); of a dynamic model sizes of
+        whole signals (3, inputs), see `Extent`.
     speed, reach
         Middle of the initial speeds in m/s, and how far they lie from it.
     longest
@@ -146,7 +149,7 @@ class InputRange:
     def _bands(self, names: Sequence[str], maneuver: Maneuver) -> dict[str, tuple[float, float]]:
         """How far whole inputs go in magnitude and in each band, from the begin on."""
         used = bands_of(maneuver) / self._sizes
-        words = [f"{low:g} to {high:g} Hz" for low, high in pairwise((0.0, *BANDS))]
+        words = [f"{low:g} to {high:g} Hz" for low, high in pairwise(BANDS)]
         found = {}
         for name, (size, *content) in zip(names, used.T, strict=True):
             found[f"input {name}"] = float(size), 0.0 if size > 1.0 else np.inf
@@ -194,9 +197,9 @@ def input_range(
     if model.kind == "structural":
         sizes = np.max([bands_of(m) for m in maneuvers], axis=0)
         sizes[1:] *= CHANCE
-        # What is left of a smooth input in a band is rounding, and no content that could matter.
-        quiet = QUIET * sizes[1:].max(axis=0)
-        largest = EDGE * np.maximum(np.vstack([sizes[:1], np.maximum(sizes[1:], quiet)]), NOTHING)
+        # A share so small does not matter.
+        sizes[1:] = np.maximum(sizes[1:], QUIET)
+        largest = EDGE * np.maximum(sizes, NOTHING)
         longest = max(maneuver.duration for maneuver in maneuvers)
         return InputRange(largest, middle, reach, longest * EDGE)
     if model.kind == "ae":

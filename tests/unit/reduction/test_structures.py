@@ -285,3 +285,29 @@ def test_structures_are_not_exported_and_start_from_rest_alone(small, tmp_path):
         with pytest.raises(InputError, match=r"input|z is") as error:
             small.simulate(wrong)
         assert "\n" not in str(error.value)
+
+
+def corrugated(hertz, size):
+    """A road of one frequency on both sides."""
+
+    def heights(t):
+        paths = [size * np.sin(2.0 * np.pi * hertz * s) * np.clip(s, 0.0, 1.0) for s in (t, t - 0.2)]
+        return np.column_stack([paths[0], paths[0], paths[1], paths[1]])
+
+    further = {"inputs": HEIGHTS, "step": 0.05 / hertz, "output_step": 0.01}
+    return vm.Signal.from_function(heights, 2.0, **further)
+
+
+def test_quick_roads_are_not_trusted_however_small_they_are():
+    rom = vm.reduce(truck(), "craig_bampton", training=[vm.road("D", 5, 25.0)], **SHORT)
+    assert rom.simulate(corrugated(3.0, 0.01)).status == "ok"
+    run = rom.simulate(corrugated(40.0, 1e-4))
+    assert (run.status, "32 to 64 Hz" in run.message) == ("untrusted", True)
+
+
+def test_parameters_that_change_the_structure_ask_for_a_new_fit():
+    rom, given = vm.reduce(truck(), "krylov", training=[ROAD], **SHORT), {"rail_thickness": 4e-3}
+    thin = vm.reduce(vm.model(TRUCK, given), "krylov", training=[ROAD], **SHORT)
+    again = rom.for_parameters(given)
+    np.testing.assert_array_equal(again.simulate(ROAD).outputs, thin.simulate(ROAD).outputs)
+    assert rom.for_parameters({"elements_per_bay": 2.0}).simulate(ROAD).status == "ok"

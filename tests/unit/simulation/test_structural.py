@@ -1,5 +1,7 @@
 """Structures: runs are those of other integrators and of textbook formulas; static states stand."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,7 +13,7 @@ import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
 from vehiclemor.simulation.structures.factors import blocks_of, factored
-from vehiclemor.simulation.structures.model import Periods, relative_error
+from vehiclemor.simulation.structures.model import Periods, relative_error, wrong_matrices
 from vehiclemor.simulation.structures.sparse_loops import solve
 from vehiclemor.simulation.structures.system import DAMPED, weights_of
 
@@ -269,3 +271,43 @@ def test_wrong_input_is_told_in_one_line(chain, wrong, words):
     with pytest.raises(InputError, match=words) as error:
         chain().simulate(**given)
     assert "\n" not in str(error.value)
+
+
+def test_a_road_alike_on_both_sides_needs_no_shorter_steps():
+    heights = np.repeat(np.sin(np.linspace(0.0, np.pi, 101))[:, None] ** 2, 4, axis=1)
+    names, times = [f"road_{w}" for w in ("FL", "FR", "RL", "RR")], np.linspace(0.0, 1.0, 101)
+    steps = []
+    for lower in (0.0, 1e-3):
+        u = 0.02 * heights * (1.0 - lower * np.array([0.0, 1.0, 0.0, 1.0]))
+        given = vm.Signal.from_samples(times, u, "cubic", inputs=names, output_step=0.01)
+        steps.append(vm.model(TRUCK).run(given).counts["steps"])
+    assert steps[0] <= steps[1]
+
+
+def test_steps_are_judged_between_output_times_that_are_far_apart(chain):
+    model, given = chain(), vm.Signal.from_function(bump(0.02), 2.0, inputs=["z"], output_step=2.0)
+    fine = vm.Signal.from_function(bump(0.02), 2.0, inputs=["z"], output_step=0.01)
+    spacing = [2.0 / model.run(s, tolerance=1e-3).counts["steps"] for s in (given, fine)]
+    assert spacing[0] <= 2.0 * spacing[1]
+
+
+def test_a_tolerance_that_no_step_meets_is_told(chain):
+    assert "of a range" in chain().run(signal(), tolerance=1e-12).remark
+    assert chain().run(signal(), tolerance=1e-2).remark == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"mass": lambda m: m[:-1]}, "mass has shape"),
+        ({"stiffness": lambda m: m * np.nan}, "stiffness has an entry that is not finite"),
+        ({"ports": lambda m: m[:, :1]}, "ports has shape"),
+    ],
+)
+def test_matrices_that_do_not_fit_are_one_line(chain, change, text):
+    structure = chain().system.structure
+    (name, changed), *_ = change.items()
+    wrong = dataclasses.replace(structure, **{name: changed(getattr(structure, name))})
+    law, outputs = chain().system.law, len(chain().outputs)
+    assert text in wrong_matrices(wrong, law.static.shape[1], outputs)
+    assert wrong_matrices(structure, law.static.shape[1], outputs) == ""

@@ -25,7 +25,7 @@ class CraigBamptonSettings(StructuralSettings):
     """Settings for a structure."""
 
     highest: float = Field(
-        100.0, gt=0.0, le=1e5, description="modes of up to so many Hz are kept, ports held"
+        200.0, gt=0.0, le=1e5, description="modes of up to so many Hz are kept, ports held"
     )
 
 
