@@ -48,7 +48,8 @@ def figure_size(results: Results) -> Figure:
     for car, place in zip(dataset["mesh"].values[cars], np.flatnonzero(cars), strict=True):
         at = n[place], full[place] / reduced[place]
         text = VEHICLES.get(str(car), str(car))
-        right.annotate(text, at, (4, 4), textcoords="offset points", fontsize=7)
+        below = (4, 4) if n[place] < 10 else (5, -9)
+        right.annotate(text, at, below, textcoords="offset points", fontsize=7)
     rivals = [row for row in size_rows(dataset) if row["label"] == name]
     for group, marker in (("motion", "x"), ("strain", "+")):
         at = [(row["coordinates"], row[f"gain_{group}"]) for row in rivals]
