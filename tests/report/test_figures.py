@@ -14,6 +14,7 @@ from vehiclemor.registry import component
 from vehiclemor.report.figures.catalogue import FIGURES
 from vehiclemor.report.figures.paper import figure_pareto
 from vehiclemor.report.figures.theme import panels, save_figure, styled
+from vehiclemor.report.sizes import size_rows
 from vehiclemor.study.run import run_studies
 
 PARETO = "predictive-double_wishbone"
@@ -58,6 +59,38 @@ def unseen(results):
     return {"unseen-inputs": dataset, "unseen-inputs-trained": manifold}
 
 
+def sized():
+    """Times and errors of three meshes of shells, two of beams and a vehicle."""
+    kinds = ["elements_per_bay"] * 2 + ["shell_size"] * 3 + ["vehicle"]
+    meshes = [f"{kind} {place}" for place, kind in enumerate(kinds[:-1], 1)] + ["tricycle"]
+    n = np.array([200.0, 400.0, 1000.0, 4000.0, 16000.0, 10.0])
+    seconds = np.column_stack([1e-3 * n, np.full(6, 0.05)])
+    errors = np.array([0.2, 0.2, 0.1, 0.02, 0.0, np.nan])
+    errors = np.stack([errors, errors + 1e-3], axis=1)[..., None] * [1.0, 2.0]
+    table = {
+        "coordinates_of_mesh": ("mesh", n),
+        "seconds_median": (("mesh", "label"), seconds),
+        "order": (("mesh", "label"), np.full((6, 2), 40.0)),
+        "offline": (("mesh", "label"), np.full((6, 2), 2.0)),
+        "relative_error": (("mesh", "label", "group"), errors),
+    }
+    labels = {"mesh": meshes, "label": ["full order", "Craig-Bampton"]}
+    labels |= {"group": ["motion", "strain"], "kind": ("mesh", kinds)}
+    return xr.Dataset(table, labels, {"study": "size"})
+
+
+def test_a_reduced_model_is_set_beside_the_cheapest_mesh_that_is_as_accurate():
+    rows = {row["mesh"]: row for row in size_rows(sized())}
+    assert rows["shells, 4 m"]["gain_mesh"] == pytest.approx(80.0)
+    # A coarser mesh is as accurate: refining has gained nothing.
+    assert rows["beams, 2 a bay"]["rival_motion"] == "beams, 1 a bay"
+    assert rows["beams, 2 a bay"]["gain_motion"] == pytest.approx(4.0)
+    assert rows["shells, 5 m"]["rival_strain"] == "shells, 5 m"
+    assert rows["shells, 5 m"]["growth_full"] == pytest.approx(1.0)
+    assert rows["shells, 5 m"]["break_even"] == pytest.approx(2.0 / (16.0 - 0.05))
+    assert rows["tricycle"]["rival_motion"] == ""
+
+
 @pytest.fixture(scope="session")
 def drawn(results, unseen_travels):
     """Every figure of the catalogue, drawn."""
@@ -68,6 +101,8 @@ def drawn(results, unseen_travels):
             data[entry.studies[0]] = grid_of(entry)
         elif entry.drawing == "pareto":
             data[entry.studies[0]] = unseen_travels
+        elif entry.drawing == "size":
+            data = {"size": sized()}
         elif entry.drawing == "unseen inputs":
             data = unseen(results)
         with styled():

@@ -20,7 +20,7 @@ from vehiclemor.registry import component, names, unknown
     [
         ("model", "double_wishbon", "double_wishbone?"),
         ("method", "full-order", "full_order?"),
-        ("method", "PID", "known: coarse_mesh, "),
+        ("method", "PID", "known: balanced_truncation, "),
         ("maneuver", "sine", "sine_travel"),
         ("model", "", "known: "),
     ],

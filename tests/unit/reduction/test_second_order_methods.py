@@ -40,9 +40,9 @@ def response_error(model, reduced):
 
 
 def test_balanced_truncation_has_smaller_errors_than_craig_bampton_of_equal_rank(truck):
-    errors = [response_error(truck, fitted(balanced_truncation, truck, rank=r)) for r in (25, 45)]
     others = fitted(craig_bampton, truck, highest=60.0)
-    assert others.order == 45
+    ranks = 25, others.order
+    errors = [response_error(truck, fitted(balanced_truncation, truck, rank=r)) for r in ranks]
     assert errors[1] < min(0.1 * errors[0], 0.5 * response_error(truck, others))
 
 

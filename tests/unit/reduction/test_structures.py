@@ -291,7 +291,9 @@ def corrugated(hertz, size):
     """A road of one frequency on both sides."""
 
     def heights(t):
-        paths = [size * np.sin(2.0 * np.pi * hertz * s) * np.clip(s, 0.0, 1.0) for s in (t, t - 0.2)]
+        paths = [
+            size * np.sin(2.0 * np.pi * hertz * s) * np.clip(s, 0.0, 1.0) for s in (t, t - 0.2)
+        ]
         return np.column_stack([paths[0], paths[0], paths[1], paths[1]])
 
     further = {"inputs": HEIGHTS, "step": 0.05 / hertz, "output_step": 0.01}

@@ -292,7 +292,7 @@ def test_steps_are_judged_between_output_times_that_are_far_apart(chain):
 
 
 def test_a_tolerance_that_no_step_meets_is_told(chain):
-    assert "of a range" in chain().run(signal(), tolerance=1e-12).remark
+    assert "of an output's range" in chain().run(signal(), tolerance=1e-12).remark
     assert chain().run(signal(), tolerance=1e-2).remark == ""
 
 
