@@ -15,6 +15,8 @@ LOOKS: tuple[Style, ...] = (
     {"color": "#D55E00", "marker": "s"},
     {"color": "#CC79A7", "marker": "^"},
 )
+# Places of names beside marks, in points.
+OFFSETS = (4, 4), (2, -16), (6, -8)
 VEHICLES = {"double_wishbone": "wishbone", "independent_suspension_vehicle": "14-DOF car"}
 VEHICLES |= {"high_fidelity_vehicle": "high-fidelity car"}
 
@@ -48,8 +50,9 @@ def figure_size(results: Results) -> Figure:
     for car, place in zip(dataset["mesh"].values[cars], np.flatnonzero(cars), strict=True):
         at = n[place], full[place] / reduced[place]
         text = VEHICLES.get(str(car), str(car))
-        below = (4, 4) if n[place] < 10 else (5, -9)
-        right.annotate(text, at, below, textcoords="offset points", fontsize=7)
+        # So that neither marks nor the line of no gain cross a name.
+        beside = OFFSETS[sum(n[cars] < n[place]) % len(OFFSETS)]
+        right.annotate(text, at, beside, textcoords="offset points", fontsize=7)
     rivals = [row for row in size_rows(dataset) if row["label"] == name]
     for group, marker in (("motion", "x"), ("strain", "+")):
         at = [(row["coordinates"], row[f"gain_{group}"]) for row in rivals]
@@ -57,6 +60,7 @@ def figure_size(results: Results) -> Figure:
         label = f"cheapest mesh of equal error, {group}"
         right.plot(*zip(*at, strict=True), label=label, markersize=7, **style)
     right.axhline(1.0, **theme.THIN)
+    right.set_ylim(0.5, 2.0 * float(np.nanmax(full / reduced)))
     for axis in (left, right):
         axis.set_xscale("log")
         axis.set_yscale("log")
