@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.cli import main
+from vehiclemor.registry import component, names
 from vehiclemor.report import comparison
 from vehiclemor.report.comparison import (
     claim_criterion,
@@ -15,8 +16,11 @@ from vehiclemor.report.comparison import (
     timing_of,
 )
 from vehiclemor.report.findings import LARGEST_SPREAD
+from vehiclemor.report.labels import timing_cases
 from vehiclemor.report.printed_numbers import TIMING, number_criterion
 from vehiclemor.report.published import load_published
+from vehiclemor.simulation.build import build
+from vehiclemor.study.experiment import complete_settings
 from vehiclemor.study.run import run_studies
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
@@ -179,3 +183,12 @@ def test_screens_have_the_numbers_and_claims_and_fit_the_terminal(said, rows):
     for word in ("projection", "replay", "offline"):
         assert word in plain
     assert len(json.loads(said("--json")[1])) == len(rows)
+
+
+@pytest.mark.parametrize("name", names("model"))
+def test_every_model_has_cases_of_costs_that_its_methods_take(name):
+    built, cases = build(name), timing_cases(component("model", name))
+    assert {"baseline", "strongest", "replay"} < {case.id for case in cases}
+    for case in cases:
+        settings = complete_settings(built, case.method, case.settings, case.preset)
+        assert set(settings) == set(component("method", case.method).names_of(built.kind))

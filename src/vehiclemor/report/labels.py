@@ -151,6 +151,7 @@ class TablesFile(FileSchema):
 
     algebraic: OfKind
     dynamic: OfKind
+    structural: OfKind
     reduced: dict[str, list[Case]]
 
 
@@ -161,8 +162,9 @@ def tables_file() -> TablesFile:
 
 
 def of_kind(kind: str) -> OfKind:
-    """What tables show of all models of a kind: `ae`, `ode` or `dae`."""
-    return tables_file().algebraic if kind == "ae" else tables_file().dynamic
+    """What tables show of all models of a kind, one of `KINDS`."""
+    file = tables_file()
+    return {"ae": file.algebraic, "structural": file.structural}.get(kind, file.dynamic)
 
 
 def default_rank(coordinates: int) -> int:
@@ -176,6 +178,8 @@ def timing_cases(definition: ModelDefinition) -> list[Case]:
     reduced = tables_file().reduced.get(definition.name) or [
         Case.model_validate({"method": method, "preset": preset, "settings": settings})
         for method, preset in REDUCED
+        # Those of structures stand among their cases.
+        if definition.kind != "structural"
     ]
     return [case.named() for case in (*of_kind(definition.kind).cases, *reduced)]
 
