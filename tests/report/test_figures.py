@@ -70,8 +70,8 @@ def sized():
     table = {
         "coordinates_of_mesh": ("mesh", n),
         "seconds_median": (("mesh", "label"), seconds),
-        "order": (("mesh", "label"), np.full((6, 2), 40.0)),
-        "offline": (("mesh", "label"), np.full((6, 2), 2.0)),
+        "effective_rank": (("mesh", "label"), np.full((6, 2), 40.0)),
+        "offline_seconds": (("mesh", "label"), np.full((6, 2), 2.0)),
         "relative_error": (("mesh", "label", "group"), errors),
     }
     labels = {"mesh": meshes, "label": ["full order", "Craig-Bampton"]}

@@ -49,6 +49,10 @@ class Structure:
     load: np.ndarray
     outputs: tuple[csc_array, csc_array, csc_array, csc_array]
 
+    def held(self, stiffness: np.ndarray) -> csc_array:
+        """K (n, n) with springs of these stiffnesses (p,) at the ports."""
+        return self.stiffness + self.ports @ (stiffness[:, None] * self.ports.T)
+
     @property
     def size(self) -> int:
         """Number of coordinates."""

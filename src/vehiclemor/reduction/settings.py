@@ -1,10 +1,12 @@
 """What the settings of all methods share: one pydantic class by method and kind of model."""
 
-from typing import Annotated, Literal
+import tomllib
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, field_validator
 
+from vehiclemor.exceptions import InputError
 from vehiclemor.simulation.integrators.catalogue import ALIASES, INTEGRATORS
 
 Value = int | float | str
@@ -97,6 +99,18 @@ StructuralStep = Annotated[
     ),
     AfterValidator(_step),
 ]
+
+
+def inline_table(text: str, where: str) -> dict[str, Any]:
+    """Names and values in a setting, as in TOML: `terms = 12, ridge = 1e-9`, also line by line.
+
+    `InputError` if it is none; `where` says whose it is.
+    """
+    lines = filter(None, (line.strip(" ,") for line in text.splitlines()))
+    try:
+        return tomllib.loads(f"given = {{ {', '.join(lines)} }}")["given"]
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
 class OnlineSettings(Settings):

@@ -43,14 +43,14 @@ def size_rows(dataset: xr.Dataset) -> Iterator[Row]:
                 "mesh_kind": str(dataset["kind"].values[place]),
                 "coordinates": int(n[place]),
                 "label": "chosen by its protocol" if _is_vehicle(dataset, place) else label,
-                "order": float(own["order"]),
+                "order": float(own["effective_rank"]),
                 "full_seconds": float(full[place]),
                 "seconds": time,
                 "gain_mesh": float(full[place] / time),
-                "offline_seconds": float(own["offline"]),
+                "offline_seconds": float(own["offline_seconds"]),
                 "growth_full": growth(dataset, str(dataset["kind"].values[place]), FULL),
                 "growth": growth(dataset, str(dataset["kind"].values[place]), label),
-                "break_even": float(own["offline"] / saved) if saved > 0.0 else np.nan,
+                "break_even": float(own["offline_seconds"] / saved) if saved > 0.0 else np.nan,
             }
             for group in GROUPS:
                 row |= _against(dataset, group, float(own["relative_error"].sel(group=group)), time)

@@ -142,7 +142,7 @@ def _dynamic(
 def _structural(
     definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
 ) -> StructuralModel:
-    """A model of sparse matrices and a port law; the matrices are made when they are needed."""
+    """A model of sparse matrices and a port law; `GeometryError` where it can't stand."""
     from vehiclemor.simulation.structures.model import StructuralModel
     from vehiclemor.simulation.structures.system import STRUCTURAL_LOOPS
 
@@ -153,8 +153,7 @@ def _structural(
     constants = hoisted_constants(equations, parameters.flat(), [])
     initial = {DESIGN_START: np.zeros(0)}
     model = StructuralModel(definition, equations, parameters, digest, constants, initial)
-    # What can't stand is told here.
-    assert model.size
+    model.assemble()
     return model
 
 

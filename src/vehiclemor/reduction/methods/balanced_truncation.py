@@ -66,7 +66,7 @@ def fit(model: StructuralModel, training: Training, settings: Any) -> ReducedStr
     mass, elastic, ports, beside = (m.toarray() for m in (s.mass, s.stiffness, s.ports, s.dampers))
     stiffness, rates = port_rates(model)
     damping = s.damping_time * elastic + beside @ beside.T + (ports * rates) @ ports.T
-    held = elastic + (ports * stiffness) @ ports.T + fading * damping + fading**2 * mass
+    held = s.held(stiffness).toarray() + fading * damping + fading**2 * mass
     faded = damping + 2.0 * fading * mass
     with log_levels({"pymor": "ERROR"}):
         full = SecondOrderModel.from_matrices(mass, faded, held, ports, ports.T)

@@ -3,8 +3,8 @@
 A cheaper model of a structure is had by larger elements, too.
 """
 
-import tomllib
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost
 from vehiclemor.reduction.projection.structural import StructuralSettings
+from vehiclemor.reduction.settings import inline_table
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.structures.model import StructuralModel
@@ -46,13 +47,10 @@ class CoarseMesh:
         """Number of coordinates of the coarse mesh."""
         return self.coarse.size
 
-    @property
-    def coarse(self) -> StructuralModel:
+    @cached_property
+    def coarse(self) -> Any:
         """The model on the coarse mesh."""
-        found = self.__dict__.get("_coarse")
-        if found is None:
-            found = self.__dict__["_coarse"] = on_mesh(self.model, self.mesh)
-        return found
+        return reparametrised(self.model, parameters(self.mesh))
 
     def for_model(self, model: StructuralModel) -> "CoarseMesh":
         """The same mesh for a model whose other parameters differ."""
@@ -70,25 +68,18 @@ class CoarseMesh:
         del states
 
 
-def on_mesh(model: StructuralModel, mesh: str) -> Any:
-    """The model on a mesh; `InputError` if there is no such mesh."""
-    return reparametrised(model, parameters(mesh))
-
-
 def parameters(mesh: str) -> dict[str, float]:
     """Parameters of a mesh by name; `InputError` if the text is none."""
-    try:
-        return tomllib.loads(f"mesh = {{ {mesh} }}")["mesh"]
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"coarse_mesh: mesh: {error}") from None
+    return inline_table(mesh, "coarse_mesh: mesh")
 
 
 def check(model: StructuralModel, settings: CoarseMeshSettings) -> None:
     """Raise `InputError` if the mesh is none."""
-    for name in parameters(settings.mesh):
+    given = parameters(settings.mesh)
+    for name in given:
         if name in model.definition.online:
             raise InputError(f"coarse_mesh: {name} is no parameter of a mesh")
-    on_mesh(model, settings.mesh)
+    reparametrised(model, given)
 
 
 def fit(model: StructuralModel, training: Training, settings: CoarseMeshSettings) -> CoarseMesh:

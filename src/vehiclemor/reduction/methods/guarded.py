@@ -4,7 +4,6 @@ A fast model runs.  Where it extrapolates, the full order does the whole run: th
 mostly gone wrong before its trust indicator passes 1.
 """
 
-import tomllib
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +13,7 @@ from pydantic import Field
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import FitOther, FittedModel, Method, OfflineCost, simulated
-from vehiclemor.reduction.settings import OnlineSettings, Settings, Solver, Tolerance
+from vehiclemor.reduction.settings import OnlineSettings, Settings, Solver, Tolerance, inline_table
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.validation import checked_fit, checked_settings, fitted, validated
 from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
@@ -116,11 +115,7 @@ def check(model: DynamicModel, settings: GuardedSettings) -> None:
 def _settings_of_both(model: DynamicModel, settings: GuardedSettings) -> list[tuple[str, Settings]]:
     """Methods of the fast and of the safe model with their settings."""
     method: Method = component("method", settings.fast)
-    lines = [line.strip(" ,") for line in settings.fast_settings.splitlines()]
-    try:
-        given = tomllib.loads(f"given = {{ {', '.join(filter(None, lines))} }}")["given"]
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{NAME}: fast_settings: {error}") from None
+    given = inline_table(settings.fast_settings, f"{NAME}: fast_settings")
     known = {*method.names_of(model.kind)}
     online = {name: getattr(settings, name) for name in ("solver", "tolerance") if name in known}
     if twice := [name for name in online if name in given]:

@@ -27,7 +27,7 @@ def free_modes(model: StructuralModel, highest: float) -> np.ndarray:
     """
     structure: Any = model.system.structure
     stiffness, _ = port_rates(model)
-    held = structure.stiffness + structure.ports @ (stiffness[:, None] * structure.ports.T)
+    held = structure.held(stiffness)
     # Shifted, so that motion that hardly anything holds does no harm.
     shift = 1.0
     solve = factored(held + shift * structure.mass, "MMD_AT_PLUS_A").solve

@@ -245,6 +245,10 @@ class StructuralModel(Model):
             raise InputError(f"model {name!r}: structure: {wrong}")
         return StructuralSystem(structure, self._static_law(structure))
 
+    def assemble(self) -> None:
+        """Make the matrices, so that what is wrong with them is told now."""
+        _ = self.system
+
     @cached_property
     def _whole(self) -> Periods:
         """The full structure, with the step sizes of its runs."""
@@ -270,8 +274,7 @@ class StructuralModel(Model):
         law = PortLaw(self.equations.kernels, self.constants, np.zeros((2, p)))
         # Ports that carry nothing at first are held by what the others have.
         stiffness = np.full(p, 1e5)
-        held = structure.stiffness + structure.ports @ (stiffness[:, None] * structure.ports.T)
-        factor = factored(held, "MMD_AT_PLUS_A")
+        factor = factored(structure.held(stiffness), "MMD_AT_PLUS_A")
         ports = structure.ports.toarray()
         compliance = ports.T @ factor.solve(ports)
         free = ports.T @ factor.solve(structure.load)
@@ -347,11 +350,9 @@ class StructuralModel(Model):
         maneuver = checked_maneuver(maneuver, self.definition)
         names = None if outputs is None else output_names(outputs)
         periods = periods or self._whole
-        counts = dict.fromkeys(STRUCTURAL_COUNTS, 0)
         ((histories, states, found, reason), remark), seconds = timed(
             lambda: periods.march(maneuver, (tolerance, step), self._alike, recorded)
         )
-        counts |= dict(zip(STRUCTURAL_COUNTS, found.tolist(), strict=False))
         times, inputs = recorded_inputs(maneuver)
         failure = ""
         if reason:
@@ -375,7 +376,7 @@ class StructuralModel(Model):
             coordinates=states if recorded else inputs[:, :0],
             speeds=inputs[:, :0],
             outputs=histories,
-            counts=counts,
+            counts=dict(zip(STRUCTURAL_COUNTS, found.tolist(), strict=True)),
             seconds=seconds,
             status="diverged" if failure else "ok",
             message=failure,

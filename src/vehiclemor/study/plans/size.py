@@ -51,27 +51,27 @@ def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
     assert study.size is not None
     if component("model", study.model).kind != "structural":
         raise InputError(f"size: {study.model} is no structure")
-    for other in study.size.beside:
-        rom(other)
-    meshes: list[Any] = [build(study.model, overrides=mesh) for mesh in study.size.meshes]
+    kernel = build(study.model, overrides=study.size.meshes[0]).kernel_hash
     codes = [code_digest(study.model, e.method, dict(e.settings)) for e in study.methods]
-    content = [study.model_dump_json(), *codes, meshes[0].kernel_hash, machine(), ROUNDS]
+    content = [study.model_dump_json(), *codes, kernel, machine(), ROUNDS]
     text = json.dumps([*content, compiler_identity()])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    make = partial(_measured, name, study, meshes, folder)
+    make = partial(_measured, name, study, folder)
     return stored(combined_path(folder, name), "size", key, make, content=content_hash(study))
 
 
-def _measured(name: str, study: StudyFile, meshes: Sequence[Any], folder: Path) -> xr.Dataset:
+def _measured(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
     import xarray as xr
 
     size = study.size
     assert size is not None
+    # What can't be had is told before anything is computed.
+    beside = [(strongest_full(model), rom(model)) for model in size.beside]
+    meshes: list[Any] = [build(study.model, overrides=mesh) for mesh in size.meshes]
     chosen = component("maneuver", study.maneuver).perturbed(size.frequency, size.amplitude)
     with one_thread():
         references = [_reference(model, chosen, size.step, folder) for model in meshes]
         fits = [_fits(study, model) for model in meshes]
-        beside = [(strongest_full(model), rom(model)) for model in size.beside]
         labels = [FULL, *(entry.label or entry.method for entry in study.methods)]
         rows = [*map(_mesh_label, size.meshes), *size.beside]
         n = [model.size for model in meshes] + [len(full.model.coordinates) for full, _ in beside]
@@ -105,7 +105,7 @@ def _measured(name: str, study: StudyFile, meshes: Sequence[Any], folder: Path) 
     found = variables({"coordinates_of_mesh": np.array(n)}, "mesh")
     found |= variables(
         {"seconds_median": seconds, "seconds_lower": lower, "seconds_upper": upper}
-        | {"order": order, "offline": offline},
+        | {"effective_rank": order, "offline_seconds": offline},
         *("mesh", "label"),
     )
     found |= variables({"relative_error": errors}, "mesh", "label", "group")
