@@ -73,6 +73,14 @@ def inputs_beyond(maneuver: Maneuver, known: np.ndarray) -> np.ndarray:
     return first_beyond(maneuver, np.array([-known[0], *known]))
 
 
+def largest_bands(maneuvers: Sequence[Maneuver]) -> np.ndarray:
+    """Largest magnitudes and shares (6, inputs) of inputs of structures, see `bands_of`."""
+    largest = np.max([bands_of(maneuver) for maneuver in maneuvers], axis=0)
+    # A share so small does not matter.
+    largest[1:] = np.maximum(CHANCE * largest[1:], QUIET)
+    return EDGE * np.maximum(largest, NOTHING)
+
+
 @lru_cache(maxsize=512)
 def bands_of(maneuver: Maneuver) -> np.ndarray:
     """Magnitudes of the inputs, and shares of `BANDS` in their RMS values, (6, inputs)."""
@@ -128,16 +136,8 @@ class InputRange:
         maneuver = maneuver.for_inputs(model.inputs)
         if model.kind == "ae":
             return self.trust_of_inputs(model.inputs, maneuver.at(maneuver.times), maneuver.times)
-        if model.kind == "structural":
-            return trust_in(self._bands(model.inputs, maneuver))
-        used = extent_of(maneuver).largest / self._sizes
-        since = np.full(len(model.inputs), np.inf)
-        if (used > 1.0).any():
-            since = inputs_beyond(maneuver, self.largest)
-        ranges = {}
-        for name, (further, *quicker), time in zip(model.inputs, used.T, since, strict=True):
-            what = f"input {name}" + " above 2 Hz" * bool(further <= 1.0 < max(quicker))
-            ranges[what] = float(max(further, *quicker)), float(time)
+        of_inputs = self._bands if model.kind == "structural" else self._extents
+        ranges = of_inputs(model.inputs, maneuver)
         off = abs(speed - self.speed) / self.reach
         ranges["initial speed"] = off, 0.0 if off > 1.0 else np.inf
         lasts = maneuver.duration / self.longest
@@ -146,8 +146,20 @@ class InputRange:
             ranges["difference from the inputs of training runs"] = self._unlike(maneuver)
         return trust_in(ranges)
 
+    def _extents(self, names: Sequence[str], maneuver: Maneuver) -> dict[str, tuple[float, float]]:
+        """How far whole inputs of a vehicle go, and since when (s) they are beyond."""
+        used = extent_of(maneuver).largest / self._sizes
+        since = np.full(len(names), np.inf)
+        if (used > 1.0).any():
+            since = inputs_beyond(maneuver, self.largest)
+        found = {}
+        for name, (further, *quicker), time in zip(names, used.T, since, strict=True):
+            what = f"input {name}" + " above 2 Hz" * bool(further <= 1.0 < max(quicker))
+            found[what] = float(max(further, *quicker)), float(time)
+        return found
+
     def _bands(self, names: Sequence[str], maneuver: Maneuver) -> dict[str, tuple[float, float]]:
-        """How far whole inputs go in magnitude and in each band, from the begin on."""
+        """How far whole inputs of a structure go, in magnitude and in each band."""
         used = bands_of(maneuver) / self._sizes
         words = [f"{low:g} to {high:g} Hz" for low, high in pairwise(BANDS)]
         found = {}
@@ -155,8 +167,7 @@ class InputRange:
             found[f"input {name}"] = float(size), 0.0 if size > 1.0 else np.inf
             for word, part in zip(words, content, strict=True):
                 found[f"input {name}, {word}"] = float(part), 0.0 if part > 1.0 else np.inf
-        lasts = maneuver.duration / self.longest
-        return found | {"duration": (lasts, self.longest if lasts > 1.0 else np.inf)}
+        return found
 
     def _unlike(self, maneuver: Maneuver) -> tuple[float, float]:
         """How far inputs are from those of the nearest training run, and since when (s)."""
@@ -194,14 +205,6 @@ def input_range(
     low, high = min(speeds), max(speeds)
     middle = 0.5 * (low + high)
     reach = EDGE * (max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0)
-    if model.kind == "structural":
-        sizes = np.max([bands_of(m) for m in maneuvers], axis=0)
-        sizes[1:] *= CHANCE
-        # A share so small does not matter.
-        sizes[1:] = np.maximum(sizes[1:], QUIET)
-        largest = EDGE * np.maximum(sizes, NOTHING)
-        longest = max(maneuver.duration for maneuver in maneuvers)
-        return InputRange(largest, middle, reach, longest * EDGE)
     if model.kind == "ae":
         values = [np.abs(m.at(m.times)).max(axis=0) for m in maneuvers]
         largest = EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
@@ -211,4 +214,5 @@ def input_range(
     if follows_time:
         times = np.linspace(0.0, longest, maneuvers[0].samples)
         histories = np.array([maneuver.at(times) for maneuver in maneuvers])
-    return InputRange(largest_inputs(maneuvers), middle, reach, longest * EDGE, histories)
+    largest_of = largest_bands if model.kind == "structural" else largest_inputs
+    return InputRange(largest_of(maneuvers), middle, reach, longest * EDGE, histories)

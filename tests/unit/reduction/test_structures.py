@@ -313,3 +313,10 @@ def test_parameters_that_change_the_structure_ask_for_a_new_fit():
     again = rom.for_parameters(given)
     np.testing.assert_array_equal(again.simulate(ROAD).outputs, thin.simulate(ROAD).outputs)
     assert rom.for_parameters({"elements_per_bay": 2.0}).simulate(ROAD).status == "ok"
+
+
+def test_bases_of_control_periods_are_not_trusted_on_another_road():
+    rom = vm.reduce(truck(), "pod", training=[ROAD], rank=5, **SHORT)
+    assert rom.simulate(ROAD).status == "ok"
+    run = rom.simulate(vm.road("B", 4))
+    assert (run.status, "difference from the inputs" in run.message) == ("untrusted", True)
