@@ -56,11 +56,9 @@ def _summaries(kind: str) -> dict[str, str]:
 def studies() -> dict[str, str]:
     """Studies that come with the package: name -> one line."""
     from vehiclemor.resources import data_names
-    from vehiclemor.study.plans.loading import study_path
-    from vehiclemor.study.plans.study_file import StudyFile
-    from vehiclemor.toml_files import read_toml
+    from vehiclemor.study.plans.loading import read_study, study_path
 
-    return {name: read_toml(study_path(name), StudyFile).title for name in data_names("studies")}
+    return {name: read_study(study_path(name)).title for name in data_names("studies")}
 
 
 def describe(

@@ -2,7 +2,7 @@
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
@@ -28,8 +28,13 @@ class FileSchema(BaseModel):
 
 def read_toml(path: Path, schema: type[Schema]) -> Schema:
     """Read and validate a TOML file; `FileError` if it is missing, unreadable or does not fit."""
+    return fitting(path, toml_content(path), schema)
+
+
+def toml_content(path: Path) -> dict[str, Any]:
+    """What a TOML file says; `FileError` if it is missing or unreadable."""
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except RecursionError:
         raise FileError(f"{path}: tables or lists are nested too deeply") from None
     except FileNotFoundError:
@@ -41,6 +46,10 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
     # A number of thousands of digits is no TOML error, but no number either; nor is "\0" a path.
     except ValueError as error:
         raise FileError(f"{path}: not a valid TOML file: {error}") from None
+
+
+def fitting(path: Path, content: dict[str, Any], schema: type[Schema]) -> Schema:
+    """The content of a file, validated; `FileError` if it does not fit."""
     try:
         return schema.model_validate(content)
     except ValidationError as error:

@@ -4,7 +4,8 @@ The entry point of a method, in the group `vehiclemor.methods`, names a `Method`
 """
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from inspect import signature
@@ -41,6 +42,17 @@ class OfflineCost:
 
     def check_sizes(self) -> None:
         """There are none."""
+
+
+@contextmanager
+def installed(method: str, library: str) -> Iterator[None]:
+    """Where a method imports its library; `InputError` that says how to install it."""
+    try:
+        yield
+    except ImportError as error:
+        raise InputError(
+            f'{method} needs {library}; install it by: pip install "vehiclemor[contenders]"'
+        ) from error
 
 
 def offline_cost(

@@ -16,7 +16,7 @@ from vehiclemor.reduction.interface import never_refused
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build_derived
-from vehiclemor.study.plans.loading import load_studies, study_path
+from vehiclemor.study.plans.loading import load_studies, read_study, study_path
 from vehiclemor.study.plans.study_file import SETS, StudyFile, values
 from vehiclemor.toml_files import read_toml
 
@@ -163,7 +163,7 @@ def _maneuver(name: str) -> Description:
 def _study(name: str) -> Description:
     """Grid and methods of a study, its members if it is a collection, or its sets of runs."""
     path = study_path(name)
-    study = read_toml(path, StudyFile)
+    study = read_study(path)
     head: Description = {"study": path.stem, "summary": study.title, "file": str(path)}
     if study.studies:
         rows = [

@@ -1,9 +1,11 @@
-"""Balanced truncation of structures, by pyMOR: what the ports can move and feel most.
+"""Balanced truncation by pyMOR: of a vehicle's lateral dynamics, of a structure at its ports.
 
-Free-velocity balanced truncation: D. G. Meyer, S. Srinivasan, Balancing and model reduction for
-second-order form linear systems, IEEE Trans. Autom. Control 41 (1996), 1632-1644.
+A vehicle is linearised at straight running, see `vehicle.lateral`: B. C. Moore, IEEE Trans. Autom.
+Control 26 (1981), 17-32.  A structure is balanced with free velocities: D. G. Meyer, S. Srinivasan,
+Balancing and model reduction for second-order form linear systems, IEEE Trans. Autom. Control 41
+(1996), 1632-1644.
 
-The structure is linearised at its static state.  Inputs are the forces of the ports, outputs their
+A structure is linearised at its static state.  Inputs are the forces of the ports, outputs their
 deflections; strains, many among a model's outputs, would crowd out the motion.  The projection is
 Galerkin's, in pyMOR's right basis alone: matrices stay symmetric.  Gramians need damping, and what
 soft springs hold has hardly any.  So they are those of q exp(-t / FADING), which weighs late
@@ -17,12 +19,17 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.interface import Method, installed
 from vehiclemor.reduction.projection import structural
 from vehiclemor.reduction.projection.modes import port_rates
 from vehiclemor.reduction.projection.structural import ReducedStructure, StructuralSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.simulation.structures.model import StructuralModel
+from vehiclemor.reduction.vehicle.lateral import (
+    LinearVehicleSettings,
+    linear_reduction,
+    no_linear_model,
+)
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 
 # Time in s in which motion counts less by a factor e.
 FADING = 2.0
@@ -36,8 +43,10 @@ class BalancedTruncationSettings(StructuralSettings):
     rank: int = Field(45, ge=1, description="basis vectors")
 
 
-def check(model: StructuralModel, settings: BalancedTruncationSettings) -> None:
+def check(model: Any, settings: Any) -> None:
     """Raise `InputError` if a structure is too large or too small, or its mass is singular."""
+    if model.kind != "structural":
+        return
     name, n = model.name, model.size
     if n > LARGEST:
         raise InputError(
@@ -51,17 +60,16 @@ def check(model: StructuralModel, settings: BalancedTruncationSettings) -> None:
         raise InputError(f"{name} has motions without mass; take krylov or craig_bampton for it")
 
 
-def fit(model: StructuralModel, training: Training, settings: Any) -> ReducedStructure:
+def fit(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
     """Balance and truncate; no training run is looked at.  `InputError` if pyMOR is missing."""
-    try:
+    with installed("balanced_truncation", "pyMOR"):
         from pymor.core.logger import log_levels
         from pymor.models.iosys import SecondOrderModel
+        from pymor.reductors.bt import BTReductor
         from pymor.reductors.sobt import SOBTfvReductor
-    except ImportError as error:
-        raise InputError(
-            'balanced_truncation needs pyMOR; install it by: pip install "vehiclemor[contenders]"'
-        ) from error
     began = time.process_time()
+    if model.kind != "structural":
+        return linear_reduction(BTReductor, model, settings, began)
     s, n, fading = model.system.structure, model.size, 1.0 / FADING
     mass, elastic, ports, beside = (m.toarray() for m in (s.mass, s.stiffness, s.ports, s.dampers))
     stiffness, rates = port_rates(model)
@@ -80,9 +88,13 @@ def fit(model: StructuralModel, training: Training, settings: Any) -> ReducedStr
 
 METHOD = Method(
     name="balanced_truncation",
-    summary="motions that the ports move and feel most, by pyMOR",
+    summary="what the inputs move and the outputs see most, of a linearised model, by pyMOR",
     reference="10.1109/9.544000",
-    settings={"structural": BalancedTruncationSettings},
+    settings={
+        **dict.fromkeys(("ode", "dae"), LinearVehicleSettings),
+        "structural": BalancedTruncationSettings,
+    },
+    refusal=no_linear_model,
     fit=fit,
     check=check,
     learns_from="inputs",

@@ -5,12 +5,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-from vehiclemor.exceptions import FileError
+from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import write_text
 from vehiclemor.registry import choice
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.study_file import StudyFile
-from vehiclemor.toml_files import FileSchema, read_toml
+from vehiclemor.toml_files import FileSchema, fitting, toml_content
 
 # Between entries of a long list.
 LINE = ",\n  "
@@ -23,6 +23,24 @@ def study_path(study: str) -> Path:
     return data_folder() / "studies" / f"{choice('study', study, data_names('studies'))}.toml"
 
 
+def read_study(path: Path) -> StudyFile:
+    """What a file says, and what it takes from the study that it extends.
+
+    `FileError` if one of them is missing or wrong.
+    """
+    content = toml_content(path)
+    name, rows = content.pop("extends", ""), content.pop("rows", [])
+    if name:
+        try:
+            base = toml_content(study_path(str(name)))
+            entries = {e.get("label", e.get("method")): e for e in base.pop("methods", [])}
+            methods = [entries[choice("row of the extended study", row, entries)] for row in rows]
+        except InputError as error:
+            raise FileError(f"{path}: extends: {error}") from None
+        content = base | content | {"methods": [*methods, *content.get("methods", [])]}
+    return fitting(path, content, StudyFile)
+
+
 def load_studies(study: str) -> dict[str, StudyFile]:
     """Study name -> definition; a collection gives all of its members."""
     return {name: definition for name, (_, definition) in studies_and_files(study).items()}
@@ -31,13 +49,13 @@ def load_studies(study: str) -> dict[str, StudyFile]:
 def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
     """As `load_studies`, with the files."""
     path = study_path(study)
-    definition = read_toml(path, StudyFile)
+    definition = read_study(path)
     if not definition.studies:
         return {path.stem: (path, definition)}
     members: dict[str, tuple[Path, StudyFile]] = {}
     for member in definition.studies:
         file = study_path(member)
-        content = read_toml(file, StudyFile)
+        content = read_study(file)
         if content.studies:
             raise FileError(f"{path}: studies.{member} is a collection itself")
         if content in (other for _, other in members.values()):

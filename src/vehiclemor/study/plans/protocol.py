@@ -18,7 +18,7 @@ from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
-from vehiclemor.study.plans.loading import study_path
+from vehiclemor.study.plans.loading import read_study, study_path
 from vehiclemor.study.plans.ranges import DECIMALS
 from vehiclemor.study.plans.study_file import (
     DRAWN,
@@ -30,7 +30,6 @@ from vehiclemor.study.plans.study_file import (
     StudyFile,
 )
 from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
-from vehiclemor.toml_files import read_toml
 
 FULL_ORDER, CONTENDER = "full order", "contender"
 # Of the names of the package's own; the model follows.
@@ -110,7 +109,7 @@ def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protoc
     `name` is that of its results, by default that of the file.
     """
     path = study_path(study)
-    definition = read_toml(path, StudyFile)
+    definition = read_study(path)
     if not definition.bounds:
         raise FileError(f"{path}: has no bounds")
     seed = definition.seed if seed is None else seed

@@ -232,6 +232,10 @@ class StudyFile(FileSchema):
     """
 
     title: Line = Field(description="one line")
+    extends: str = Field(
+        "", description="study, or TOML file, that gives all that is not given here but its methods"
+    )
+    rows: list[str] = _list("labels of methods of the extended study that are rows here too")
     studies: list[str] = _list("of a collection: names of studies, or TOML files")
     model: str = Field("", description="registered name; needed for a grid")
     parameters: dict[str, float | list[float]] = _table(

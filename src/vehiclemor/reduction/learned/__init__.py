@@ -1,0 +1,1 @@
+"""Models that general learners fit to samples of training runs: coordinates, equations, loop."""

@@ -1,0 +1,352 @@
+"""A model that a general learner has fitted: few coordinates, its equations, one compiled loop."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations_with_replacement, pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.codegen.loops import Loop, loops
+from vehiclemor.inputs.checks import checked_maneuver
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import recorded_inputs
+from vehiclemor.reduction.interface import OfflineCost
+from vehiclemor.reduction.learned.learned_loops import Equations
+from vehiclemor.reduction.learned.samples import (
+    Components,
+    Samples,
+    States,
+    components,
+    gathered,
+    online_inputs,
+)
+from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.run_timer import timed
+from vehiclemor.simulation.trajectory import Start, Trajectory
+from vehiclemor.sizes import require, shaped
+
+# Runge-Kutta steps: longest as a multiple of the fastest linear time, and how many a sample at
+# most.
+STABLE, MOST_STEPS = 2.0, 50
+# Relative singular values that least squares leave out.
+CUT = 1e-10
+
+Terms = Sequence[tuple[int, ...]]
+
+
+class LearnedSettings(Settings):
+    """What all general learners share."""
+
+    rank: int = Field(10, ge=1, le=100, description="principal components, at most")
+    steps: int = Field(4, ge=1, le=100, description="samples in the time between output times")
+    skipped: float = Field(
+        1.5, ge=0.0, le=100.0, description="first seconds of a run that are not learned from"
+    )
+
+
+def monomials(arguments: int, degree: int, constant: bool) -> Terms:
+    """Products of up to so many of the arguments, as numbers from 1 on; () is the constant."""
+    orders = range(0 if constant else 1, degree + 1)
+    numbers = range(1, arguments + 1)
+    return [term for order in orders for term in combinations_with_replacement(numbers, order)]
+
+
+def columns(terms: Terms, values: np.ndarray) -> np.ndarray:
+    """Monomials (samples, terms) of arguments (samples, arguments)."""
+    padded = np.column_stack([np.ones(len(values)), values])
+    found = [np.prod(padded[:, list(term)], axis=1) for term in terms]
+    return np.column_stack(found) if found else np.empty((len(values), 0))
+
+
+def polynomials(terms: Terms, coefficients: np.ndarray, arguments: int) -> Equations:
+    """Polynomials as equations: coefficients (terms, m)."""
+    degree = max(map(len, terms), default=1) or 1
+    table = np.zeros((len(terms), degree), dtype=np.int64)
+    for row, term in zip(table, terms, strict=True):
+        row[: len(term)] = term
+    m = coefficients.shape[1]
+    nothing = np.zeros(arguments), np.zeros((0, arguments)), np.zeros((0, m))
+    return Equations(
+        table,
+        np.ascontiguousarray(coefficients),
+        np.zeros(0, dtype=np.int64),
+        np.zeros(0),
+        *nothing,
+    )
+
+
+class Regression(NamedTuple):
+    """What a learner sees: standardised arguments (samples, v - 1) and results (samples, m).
+
+    The first r results are rates of the components or, of one-step models, their changes; then come
+    psi', U, V of a vehicle, beyond those of straight running.  Of a mechanism the results are the
+    coordinates.
+    """
+
+    arguments: np.ndarray
+    results: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Learning:
+    """Samples as a learner sees them, and the model of what it has fitted.
+
+    Attributes
+    ----------
+    samples, components
+        Of the training runs.
+    mapped
+        Whether changes in one step are learned; else rates.
+    began
+        `time.process_time()` at the beginning of the fit.
+    """
+
+    samples: Samples
+    components: Components
+    mapped: bool
+    began: float
+
+    @classmethod
+    def of(
+        cls, model: Any, training: Training, settings: LearnedSettings, mapped: bool
+    ) -> "Learning":
+        """Samples of the training runs, their components, what is learnt from them."""
+        samples = gathered(model, training, settings.steps, settings.skipped)
+        # As if samples that are known from another fit were made anew.
+        began = time.process_time() - samples.seconds
+        return cls(samples, components(samples, settings.rank), mapped, began)
+
+    @cached_property
+    def input_scale(self) -> np.ndarray:
+        """Magnitudes (inputs,) of the inputs."""
+        scale = np.abs(self.samples.inputs).max(axis=0)
+        return np.where(scale > 0.0, scale, 1.0)
+
+    @cached_property
+    def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
+        """Components (samples, r) of the samples, and of those that follow."""
+        s, forward = self.samples, self.components.forward.T
+        return s.deviations @ forward, s.next_deviations @ forward
+
+    @cached_property
+    def inputs(self) -> np.ndarray:
+        """Standardised inputs; of one-step models those of the sample that follows too."""
+        s, scale = self.samples, self.input_scale
+        more = [s.next_inputs / scale] if self.mapped else []
+        return np.hstack([s.inputs / scale, *more])
+
+    @cached_property
+    def regression(self) -> Regression:
+        """Arguments and results at the samples."""
+        s, (z, following) = self.samples, self.coordinates
+        if s.states.model.kind == "ae":
+            return Regression(self.inputs, s.deviations)
+        results = following - z if self.mapped else s.rates @ self.components.forward.T
+        return Regression(np.hstack([z, self.inputs]), np.hstack([results, s.motion]))
+
+    def least_squares(self, terms: Terms, values: np.ndarray, arguments: np.ndarray) -> np.ndarray:
+        """Coefficients (terms, m) of values (samples, m)."""
+        return np.linalg.lstsq(columns(terms, arguments), values, rcond=CUT)[0]
+
+    def linear(self) -> tuple[Equations, np.ndarray]:
+        """Linear equations by least squares, and what they leave of the results (samples, m)."""
+        arguments, results = self.regression
+        terms = monomials(arguments.shape[1], 1, self.samples.constant)
+        found = self.least_squares(terms, results, arguments)
+        left = results - columns(terms, arguments) @ found
+        return polynomials(terms, found, arguments.shape[1]), left
+
+    def with_motion(self, terms: Terms, coefficients: np.ndarray) -> Equations:
+        """Polynomial equations of given rates (terms, r), psi', U, V fitted in the same terms."""
+        arguments, results = self.regression
+        motion = self.least_squares(terms, results[:, coefficients.shape[1] :], arguments)
+        return polynomials(terms, np.hstack([coefficients, motion]), arguments.shape[1])
+
+    def model(self, equations: Equations, lifted: Terms = ()) -> "LearnedModel":
+        """The model of what has been fitted; `lifted` are monomials of the first components."""
+        s, r = self.samples, len(self.components.forward)
+        if s.states.shape:
+            straight = np.zeros((1, equations.coefficients.shape[1]))
+            straight[0, -2] = s.states.shape.speed
+            terms = np.vstack([equations.terms, np.zeros_like(equations.terms[:1])])
+            found = np.vstack([equations.coefficients, straight])
+            equations = equations._replace(terms=terms, coefficients=found)
+        outputs = np.zeros((0, 0))
+        if s.states.model.kind == "structural":
+            # The forces at the ports are in the accelerations: they are no function of motion.
+            known = np.hstack([self.coordinates[0], s.inputs / self.input_scale])
+            known = np.column_stack([known, np.ones(len(known))])
+            outputs = np.linalg.lstsq(known, s.outputs, rcond=CUT)[0]
+        step = s.spacing
+        if not self.mapped and len(equations.coefficients):
+            speeds = np.zeros((r, r))
+            for term, row in zip(equations.terms, equations.coefficients, strict=True):
+                if 0 < term[0] <= r and not term[1:].any():
+                    speeds[term[0] - 1] = row[:r]
+            fastest = np.abs(np.linalg.eigvals(speeds)).max()
+            step /= np.clip(np.ceil(step * fastest / STABLE), 1, MOST_STEPS)
+        count = max(map(len, lifted), default=1)
+        table = np.array([[*term, *[0] * (count - len(term))] for term in lifted], dtype=np.int64)
+        cost = OfflineCost(time.process_time() - self.began, s.evaluations)
+        return LearnedModel(
+            *(s.states, self.components, equations, float(step), self.mapped),
+            *(self.input_scale, table.reshape(-1, count), outputs, cost),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedModel(ShortRepr):
+    """Equations that a general learner has fitted to training runs.
+
+    Attributes
+    ----------
+    states, components
+        Which states are meant, and their components.
+    equations
+        Of components and standardised inputs, see `Learning`.
+    step, mapped
+        In s; whether the equations give what changes in a step, or rates.
+    input_scale
+        Magnitudes of the inputs (inputs,).
+    lifted
+        Monomials (coordinates, degree) of the components that are coordinates; none: components.
+    outputs
+        Coefficients (components + inputs + 1, outputs) of a structure's outputs.
+    """
+
+    states: States
+    components: Components
+    equations: Equations
+    step: float
+    mapped: bool
+    input_scale: np.ndarray
+    lifted: np.ndarray
+    outputs: np.ndarray
+    offline: OfflineCost
+
+    @property
+    def model(self) -> Any:
+        """The full one."""
+        return self.states.model
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the loop would read or write beyond these arrays."""
+        e, m = self.equations, self.equations.coefficients.shape[1]
+        arguments = len(e.lengths) + 1
+        kinds = self.model.kind == "ae"
+        inputs = len(self.input_scale) * (1 if kinds or not self.mapped else 2)
+        require(arguments == 1 + inputs + (0 if kinds else self.order), "arguments")
+        require(
+            m == (len(self.model.coordinates) if kinds else self.order + self.states.planar), "m"
+        )
+        shaped("equations", (e.coefficients, len(e.terms), m), (e.heights, len(e.centres), m))
+        shaped("centres", (e.centres, len(e.centres), arguments - 1))
+        require(bool(((e.terms >= 0) & (e.terms < arguments)).all()), "terms")
+        sizes = e.widths.tolist()
+        if sizes:
+            require(min(sizes) > 0 and (sizes[0], sizes[-1]) == (arguments - 1, m), "widths")
+            count = sum((a + 1) * b for a, b in pairwise(sizes))
+            shaped("weights", (e.weights, count))
+        r = len(self.components.forward)
+        require(bool(((self.lifted >= 0) & (self.lifted <= r)).all()), "lifted")
+
+    @property
+    def order(self) -> int:
+        """Number of coordinates: components, or monomials of them."""
+        return len(self.lifted) or len(self.components.forward)
+
+    def for_model(self, model: Any) -> "LearnedModel":
+        """The same equations for a model whose online parameters are others."""
+        return replace(self, states=States.of_model(model))
+
+    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+        """A run at the maneuver's output times, between steps by linear interpolation."""
+        model = self.model
+        maneuver = checked_maneuver(maneuver, model.definition)
+        times, inputs = recorded_inputs(maneuver)
+        nothing = np.zeros(len(model.counts), dtype=np.int64)
+        if model.kind == "ae":
+            model.check_start(start)
+            path, seconds = timed(lambda: self._values(inputs / self.input_scale))
+            return model.trajectory(times, inputs, path, nothing.tolist(), seconds)
+        begun = model.start(start)
+        (path, reached), seconds = timed(lambda: self._path(maneuver, begun))
+        known = self.step * np.arange(len(path))
+        late = times > known[reached - 1] + 1e-9
+        failure = ""
+        if reached < len(path):
+            failure = f"the learned equations have diverged at t = {known[reached]:.4g} s"
+        table = np.column_stack([np.interp(times, known, column) for column in path.T])
+        table[late & bool(failure)] = np.nan
+        r = len(self.components.forward)
+        if model.kind == "structural":
+            u = online_inputs(model, inputs) / self.input_scale
+            return Trajectory.of(
+                times=times,
+                inputs=inputs,
+                coordinates=inputs[:, :0],
+                speeds=inputs[:, :0],
+                outputs=np.column_stack([table[:, :r], u, np.ones(len(u))]) @ self.outputs,
+                counts=dict.fromkeys(model.counts, 0),
+                seconds=seconds,
+                status="diverged" if failure else "ok",
+                message=failure,
+                names=model.outputs,
+                model=model,
+            )
+        states = self.states.back(table[:, :r] @ self.components.back.T, table[:, self.order :])
+        states[0] = begun
+        return model.trajectory(times, inputs, states, nothing, seconds, failure)
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """Full states (samples, 2 n) in the span of the components."""
+        if self.model.kind in ("ae", "structural"):
+            return None
+        found = self.states.of(states) @ self.components.forward.T @ self.components.back.T
+        planar = np.array([self.states.begun(state) for state in states])
+        return self.states.back(found, planar)
+
+    def _values(self, arguments: np.ndarray) -> np.ndarray:
+        """Results (samples, m) at standardised arguments (samples, v - 1)."""
+        results = np.empty((len(arguments), self.equations.coefficients.shape[1]))
+        v = np.column_stack([np.ones(len(arguments)), arguments])
+        learned_loop("evaluated")(self.equations, v, self._buffer(0), results)
+        return results
+
+    def _path(self, maneuver: Maneuver, begun: np.ndarray) -> tuple[np.ndarray, int]:
+        """Coordinates and quadratures at all steps of a run, and how many rows are reached."""
+        steps = max(int(np.ceil(maneuver.duration / self.step - 1e-9)), 1)
+        halves = 0.5 * self.step * np.arange(2 * steps + 1)
+        inputs = maneuver.at(np.minimum(halves, maneuver.duration))
+        scaled = online_inputs(self.model, inputs) / self.input_scale
+        path = np.empty((steps + 1, self.equations.coefficients.shape[1]))
+        path[0] = self._encoded(begun)
+        buffer = self._buffer(path.shape[1])
+        found = learned_loop("march")(
+            self.equations, self.order, self.step, int(self.mapped), scaled, path, buffer
+        )
+        return path, found
+
+    def _encoded(self, state: np.ndarray) -> np.ndarray:
+        """Coordinates of a full state, then heading and place."""
+        if self.model.kind == "structural":
+            return np.zeros(self.order)
+        z = self.states.of(state[None]) @ self.components.forward.T
+        if len(self.lifted):
+            z = np.prod(np.column_stack([[1.0], z])[:, self.lifted], axis=2)
+        return np.concatenate([z[0], self.states.begun(state)])
+
+    def _buffer(self, size: int) -> np.ndarray:
+        layers = 2 * max(self.equations.widths.tolist(), default=0)
+        return np.empty(5 * size + len(self.equations.lengths) + 1 + layers)
+
+
+def learned_loop(name: str) -> Loop:
+    """A compiled loop of learned equations."""
+    return loops(("reduction.learned.learned_loops",), ("march", "evaluated"))[name]

@@ -1,0 +1,228 @@
+"""Samples of training runs, as general learners take them: states, rates, inputs, what follows.
+
+Of a vehicle the states are its shape, and heading and place follow by quadratures (see
+`vehicle.shape`); of a structure coordinates and rates about the static state; of a mechanism there
+are none, since its coordinates follow from the inputs.  States are taken relative to the model's
+first start, and turned into their principal components, each standardised.
+"""
+
+import time
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.exceptions import InputError
+from vehiclemor.reduction.training import Training, TrainingRun
+from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
+from vehiclemor.simulation.model import Model
+
+# Samples that a fit sees at most, evenly taken.
+MOST_SAMPLES = 30_000
+# Components below this part of the first one are rounding.
+ROUNDING = 1e-9
+# Rate, in ranges of a state in 1 s, below which the start is at rest.
+STILL = 1e-6
+
+
+def online_inputs(model: Model, inputs: np.ndarray) -> np.ndarray:
+    """Inputs (samples, inputs), and behind them the parameters that change from run to run."""
+    values = model.parameters.values()
+    given = [float(np.asarray(values[name])) for name in model.definition.online]
+    return np.hstack([inputs, np.tile(given, (len(inputs), 1))]) if given else inputs
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """States of a model as a learner sees them.
+
+    Attributes
+    ----------
+    model
+        The full one.
+    shape
+        Of a vehicle.
+    """
+
+    model: Any
+    shape: VehicleShape | None
+
+    @classmethod
+    def of_model(cls, model: Any) -> "States":
+        """Those of a model of any kind."""
+        steered = model.kind in ("ode", "dae") and not no_steered_vehicle(model)
+        return cls(model, VehicleShape(model) if steered else None)
+
+    def check_sizes(self) -> None:
+        """There are none."""
+
+    @property
+    def planar(self) -> int:
+        """Number of quadratures: heading and place of a vehicle."""
+        return 3 if self.shape else 0
+
+    def of(self, states: np.ndarray) -> np.ndarray:
+        """Deviations (samples, n) of full states from the first start."""
+        if self.shape:
+            return self.shape.of(states) - self.shape.reference
+        return states - self.model.start()
+
+    def back(self, deviations: np.ndarray, planar: np.ndarray) -> np.ndarray:
+        """Full states of deviations, and of heading and place (samples, 3) of a vehicle."""
+        if self.shape:
+            return self.shape.states(deviations + self.shape.reference, planar[:, [1, 2, 0]])
+        return deviations + self.model.start()
+
+    def begun(self, state: np.ndarray) -> np.ndarray:
+        """Heading and place of a state, none if the model has none."""
+        if not self.shape:
+            return np.zeros(0)
+        x, y, heading = self.model.planar
+        return state[[heading, x, y]]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples of training runs, evenly taken, each with the one that follows it.
+
+    Attributes
+    ----------
+    states
+        What the columns of `deviations` are.
+    spacing
+        Time in s to the sample that follows.
+    inputs, next_inputs
+        (samples, inputs).
+    deviations, next_deviations, rates
+        (samples, n).
+    motion
+        psi', U, V (samples, 3) of a vehicle, less those of straight running; else (samples, 0).
+    outputs
+        (samples, outputs) of a structure, else (samples, 0).
+    evaluations, seconds
+        Of the full model's equations; CPU time of the process.
+    """
+
+    states: States
+    spacing: float
+    inputs: np.ndarray
+    next_inputs: np.ndarray
+    deviations: np.ndarray
+    next_deviations: np.ndarray
+    rates: np.ndarray
+    motion: np.ndarray
+    outputs: np.ndarray
+    evaluations: int
+    seconds: float
+
+    @property
+    def constant(self) -> bool:
+        """Whether learnt equations need a constant: the first start is not at rest."""
+        model = self.states.model
+        if self.states.shape or model.kind == "structural":
+            return False
+        if model.kind == "ae":
+            return True
+        rest = model.rhs_at(model.start()[None], np.zeros((1, len(model.inputs))))[0]
+        return bool(np.abs(rest).max() > STILL)
+
+
+def gathered(model: Any, training: Training, steps: int, skipped: float) -> Samples:
+    """Samples of training runs, with so many steps between output times.
+
+    The first seconds of each run are skipped, of a shorter one the first half.  `InputError` if the
+    runs have output times of another spacing.
+    """
+    starts = (r.start if isinstance(r.start, str) else tuple(r.start) for r in training)
+    runs = tuple((r.model, r.maneuver, start) for r, start in zip(training, starts, strict=True))
+    return _gathered(model, runs, steps, skipped)
+
+
+# Candidates of one method, and methods one after the other, learn from the same samples.
+@lru_cache(maxsize=2)
+def _gathered(model: Any, runs: tuple[Any, ...], steps: int, skipped: float) -> Samples:
+    began = time.process_time()
+    training = [TrainingRun(*run) for run in runs]
+    states, maneuvers = States.of_model(model), [run.maneuver for run in training]
+    spacings = [maneuver.duration / (maneuver.samples - 1) / steps for maneuver in maneuvers]
+    if max(spacings) - min(spacings) > 1e-9 * max(spacings):
+        raise InputError(
+            f"learned models need training runs with output times of one spacing, not "
+            f"{min(spacings):g} and {max(spacings):g} s"
+        )
+    count = sum((maneuver.samples - 1) * steps for maneuver in maneuvers)
+    taken = steps, -(-count // MOST_SAMPLES), skipped
+    parts = [_of_run(states, run, *taken) for run in training]
+    *histories, evaluations = zip(*parts, strict=True)
+    arrays = [np.concatenate(history) for history in histories]
+    seconds = time.process_time() - began
+    return Samples(states, spacings[0], *arrays, sum(evaluations), seconds)
+
+
+def _of_run(
+    states: States, run: TrainingRun, steps: int, every: int, skipped: float
+) -> tuple[Any, ...]:
+    """Histories of every so many samples of a run, as in `Samples`; evaluations of its equations.
+
+    What follows is found in the same run; the last sample has none.
+    """
+    model: Any = run.model
+    maneuver = replace(run.maneuver, samples=(run.maneuver.samples - 1) * steps + 1)
+    last = maneuver.samples - 1
+    first = int(min(skipped / maneuver.duration, 0.5) * last)
+    taken = np.arange(first, last, every)
+    if model.kind == "structural":
+        found = model.run(maneuver, recorded=True)
+        # Runs record coordinates alone.
+        speeds = np.gradient(found.coordinates, found.times, axis=0, edge_order=2)
+        deviations, inputs = np.hstack([found.coordinates, speeds]), found.inputs
+        rates = np.gradient(deviations, found.times, axis=0, edge_order=2)[taken]
+        motion, outputs = rates[:, :0], found.outputs[taken]
+    else:
+        found = replace(run, maneuver=maneuver).recorded()
+        now, inputs = found.states[taken], found.inputs
+        motion = outputs = now[:, :0]
+        if model.kind == "ae":
+            deviations, rates = found.coordinates, np.zeros_like(now)
+        elif states.shape:
+            shape, deviations = states.shape, states.of(found.states)
+            rates, motion = shape.motion(deviations[taken] + shape.reference, inputs[taken])
+            motion = motion - [0.0, shape.speed, 0.0]
+        else:
+            deviations = states.of(found.states)
+            rates = model.rhs_at(now, inputs[taken])
+    u, evaluations = online_inputs(model, inputs), found.counts[model.evaluations] + len(taken)
+    pair = deviations[taken], deviations[taken + 1]
+    return u[taken], u[taken + 1], *pair, rates, motion, outputs, evaluations
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """Principal components of deviations, each of mean square 1.
+
+    Attributes
+    ----------
+    forward, back
+        Components per deviation (r, n) and back (n, r).
+    """
+
+    forward: np.ndarray
+    back: np.ndarray
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if they don't fit each other."""
+        if self.forward.shape != self.back.T.shape:
+            raise ValueError("components")
+
+
+def components(samples: Samples, rank: int) -> Components:
+    """The first components of the samples, at most as many as they span.
+
+    States stand in SI units: scaled by their ranges, ringing of the wheels would come first, and
+    learned models of it were unstable.
+    """
+    _, sizes, rows = np.linalg.svd(samples.deviations, full_matrices=False)
+    sizes = sizes[:rank][sizes[:rank] > ROUNDING * sizes[0]] / np.sqrt(len(samples.deviations))
+    vectors = rows[: len(sizes)]
+    return Components(vectors / sizes[:, None], vectors.T * sizes)

@@ -1,0 +1,58 @@
+"""Dynamic mode decomposition with control, plain (DMDc) and extended by monomials (EDMDc).
+
+J. L. Proctor, S. L. Brunton, J. N. Kutz, Dynamic mode decomposition with control, SIAM J. Appl.
+Dyn. Syst. 15 (2016), 142-161; M. Korda, I. Mezic, Linear predictors for nonlinear dynamical
+systems: Koopman operator meets model predictive control, Automatica 93 (2018), 149-160.
+"""
+
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.learned.learned_model import (
+    LearnedModel,
+    LearnedSettings,
+    Learning,
+    columns,
+    monomials,
+    polynomials,
+)
+from vehiclemor.reduction.training import Training
+
+
+class DynamicModeSettings(LearnedSettings):
+    """Settings for every model with states."""
+
+    degree: int = Field(1, ge=1, le=4, description="of the observables: 1 is DMDc, more EDMDc")
+    ridge: float = Field(1e-8, ge=0.0, description="weight of the matrices' size in the fit")
+
+
+def fit(model: Any, training: Training, settings: DynamicModeSettings) -> LearnedModel:
+    """Fit one linear step of all observables; `InputError` without scikit-learn."""
+    with installed("dynamic_mode_decomposition", "scikit-learn"):
+        from sklearn.linear_model import Ridge
+    learning = Learning.of(model, training, settings, mapped=True)
+    s, r = learning.samples, len(learning.components.forward)
+    observables = monomials(r, settings.degree, s.constant)
+    values, following = (columns(observables, z) for z in learning.coordinates)
+    arguments = np.hstack([values, learning.inputs])
+    results = np.hstack([following - values, s.motion])
+    # Monomials are rare where they are large: each counts alike.
+    scale = np.sqrt((arguments**2).mean(axis=0))
+    linear = Ridge(settings.ridge * len(arguments), fit_intercept=False)
+    linear.fit(arguments / scale, results)
+    terms = monomials(arguments.shape[1], 1, constant=False)
+    equations = polynomials(terms, (linear.coef_ / scale).T, arguments.shape[1])
+    return learning.model(equations, observables)
+
+
+METHOD = Method(
+    name="dynamic_mode_decomposition",
+    summary="one linear step of components and their monomials (DMDc, EDMDc), by scikit-learn",
+    reference="10.1016/j.automatica.2018.03.046",
+    settings=dict.fromkeys(("ode", "dae", "structural"), DynamicModeSettings),
+    fit=fit,
+    packages=("scikit-learn",),
+)

@@ -1,0 +1,59 @@
+"""One-step model by Gaussian processes, by scikit-learn: kernels on what a linear step leaves.
+
+C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006.
+"""
+
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.learned.learned_model import (
+    LearnedModel,
+    LearnedSettings,
+    Learning,
+)
+from vehiclemor.reduction.training import Training
+
+# Samples on which lengths of the kernels are found, and the seed by which samples are taken.
+SOUGHT, SEED = 400, 0
+
+
+class GaussianProcessSettings(LearnedSettings):
+    """Settings for every model."""
+
+    samples: int = Field(1000, ge=10, le=4000, description="training samples, each a kernel")
+    length: float = Field(3.0, gt=0.0, description="of the kernels, from which it is sought")
+    noise: float = Field(1e-6, gt=0.0, description="variance of the noise, of the results' own")
+
+
+def fit(model: Any, training: Training, settings: GaussianProcessSettings) -> LearnedModel:
+    """Fit a linear step, then kernels on its residual; `InputError` without scikit-learn."""
+    with installed("gaussian_process", "scikit-learn"):
+        from sklearn.gaussian_process import GaussianProcessRegressor
+        from sklearn.gaussian_process.kernels import RBF
+    learning = Learning.of(model, training, settings, mapped=model.kind != "ae")
+    (arguments, _), (equations, left) = learning.regression, learning.linear()
+    order = np.random.default_rng(SEED).permutation(len(arguments))[: settings.samples]
+    scale = np.maximum(left.std(axis=0), 1e-300)
+    x, y = arguments[order], left[order] / scale
+    start = RBF(settings.length, (0.1, 1e3))
+    sought = GaussianProcessRegressor(start, alpha=settings.noise)
+    sought.fit(x[:SOUGHT], y[:SOUGHT])
+    found = GaussianProcessRegressor(sought.kernel_, alpha=settings.noise, optimizer=None)
+    found.fit(x, y)
+    lengths = np.broadcast_to(found.kernel_.length_scale, x.shape[1]).copy()
+    heights = np.ascontiguousarray(np.reshape(found.alpha_, y.shape) * scale)
+    parts = {"lengths": lengths, "centres": x / lengths, "heights": heights}
+    return learning.model(equations._replace(**parts))
+
+
+METHOD = Method(
+    name="gaussian_process",
+    summary="one linear step and Gaussian kernels on what it leaves, by scikit-learn",
+    reference="10.7551/mitpress/3206.001.0001",
+    settings=dict.fromkeys(("ae", "ode", "dae", "structural"), GaussianProcessSettings),
+    fit=fit,
+    packages=("scikit-learn",),
+)

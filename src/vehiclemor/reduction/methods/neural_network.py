@@ -1,0 +1,64 @@
+"""One-step model by a multilayer perceptron, by scikit-learn: added to a linear step.
+
+K. S. Narendra, K. Parthasarathy, Identification and control of dynamical systems using neural
+networks, IEEE Trans. Neural Netw. 1 (1990), 4-27.
+"""
+
+import warnings
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.learned.learned_model import (
+    LearnedModel,
+    LearnedSettings,
+    Learning,
+)
+from vehiclemor.reduction.training import Training
+
+SEED = 0
+
+
+class NeuralNetworkSettings(LearnedSettings):
+    """Settings for every model."""
+
+    width: int = Field(32, ge=1, le=512, description="neurons in each hidden layer")
+    layers: int = Field(2, ge=1, le=4, description="hidden layers, with tanh")
+    penalty: float = Field(1e-5, ge=0.0, description="weight of the squared weights in the fit")
+    epochs: int = Field(60, ge=1, le=2000, description="passes over the samples, at most")
+
+
+def fit(model: Any, training: Training, settings: NeuralNetworkSettings) -> LearnedModel:
+    """Fit a linear step, then a network on its residual; `InputError` without scikit-learn."""
+    with installed("neural_network", "scikit-learn"):
+        from sklearn.exceptions import ConvergenceWarning
+        from sklearn.neural_network import MLPRegressor
+    learning = Learning.of(model, training, settings, mapped=model.kind != "ae")
+    (arguments, _), (equations, left) = learning.regression, learning.linear()
+    scale = np.maximum(left.std(axis=0), 1e-300)
+    hidden = (settings.width,) * settings.layers
+    options: dict[str, Any] = {"activation": "tanh", "alpha": settings.penalty}
+    network = MLPRegressor(
+        hidden_layer_sizes=hidden, **options, max_iter=settings.epochs, random_state=SEED
+    )
+    with warnings.catch_warnings():
+        # The number of epochs is a setting: validation judges what they have reached.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        network.fit(arguments, left / scale)
+    weights, offsets = [*network.coefs_], [*network.intercepts_]
+    weights[-1], offsets[-1] = weights[-1] * scale, offsets[-1] * scale
+    flat = [part.ravel() for pair in zip(weights, offsets, strict=True) for part in pair]
+    widths = np.array([arguments.shape[1], *hidden, left.shape[1]], dtype=np.int64)
+    return learning.model(equations._replace(widths=widths, weights=np.concatenate(flat)))
+
+
+METHOD = Method(
+    name="neural_network",
+    summary="one linear step and a multilayer perceptron on what it leaves, by scikit-learn",
+    reference="10.1109/72.80202",
+    settings=dict.fromkeys(("ae", "ode", "dae", "structural"), NeuralNetworkSettings),
+    fit=fit,
+    packages=("scikit-learn",),
+)

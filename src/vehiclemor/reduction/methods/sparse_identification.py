@@ -1,0 +1,55 @@
+"""Sparse identification with control (SINDYc), by the library PySINDy: few polynomial terms.
+
+S. L. Brunton, J. L. Proctor, J. N. Kutz, Sparse identification of nonlinear dynamics with control,
+IFAC-PapersOnLine 49-18 (2016), 710-715.
+"""
+
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.learned.learned_model import (
+    LearnedModel,
+    LearnedSettings,
+    Learning,
+)
+from vehiclemor.reduction.training import Training
+
+
+class SparseIdentificationSettings(LearnedSettings):
+    """Settings for every model with states."""
+
+    rank: int = Field(6, ge=1, le=30, description="principal components, at most")
+    degree: int = Field(2, ge=1, le=4, description="of the polynomials of components and inputs")
+    threshold: float = Field(0.01, ge=0.0, description="terms of smaller coefficients are dropped")
+    ridge: float = Field(1e-6, ge=0.0, description="weight of the coefficients' size in the fit")
+
+
+def fit(model: Any, training: Training, settings: SparseIdentificationSettings) -> LearnedModel:
+    """Fit on the exact rates of the training runs; `InputError` without PySINDy."""
+    with installed("sparse_identification", "PySINDy"):
+        import pysindy
+    learning = Learning.of(model, training, settings, mapped=False)
+    arguments, results = learning.regression
+    r, samples = len(learning.components.forward), learning.samples
+    library = pysindy.SINDy(
+        optimizer=pysindy.STLSQ(threshold=settings.threshold, alpha=settings.ridge),
+        feature_library=pysindy.PolynomialLibrary(settings.degree, include_bias=samples.constant),
+    )
+    z, inputs = arguments[:, :r], arguments[:, r:]
+    library.fit(z, t=samples.spacing, x_dot=results[:, :r], u=inputs)
+    powers = np.asarray(library.feature_library.powers_)
+    terms = [tuple(np.repeat(np.arange(1, len(row) + 1), row).tolist()) for row in powers]
+    return learning.model(learning.with_motion(terms, library.coefficients().T))
+
+
+METHOD = Method(
+    name="sparse_identification",
+    summary="sparse polynomial rates of principal components (SINDYc), fitted by PySINDy",
+    reference="10.1016/j.ifacol.2016.10.249",
+    settings=dict.fromkeys(("ode", "dae", "structural"), SparseIdentificationSettings),
+    fit=fit,
+    packages=("pysindy",),
+)
