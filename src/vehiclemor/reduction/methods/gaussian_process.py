@@ -16,16 +16,16 @@ from vehiclemor.reduction.learned.learned_model import (
 )
 from vehiclemor.reduction.training import Training
 
-# Samples on which lengths of the kernels are found, and the seed by which samples are taken.
-SOUGHT, SEED = 400, 0
+# By which samples are taken.
+SEED = 0
 
 
 class GaussianProcessSettings(LearnedSettings):
     """Settings for every model."""
 
     samples: int = Field(1000, ge=10, le=4000, description="training samples, each a kernel")
-    length: float = Field(3.0, gt=0.0, description="of the kernels, from which it is sought")
-    noise: float = Field(1e-6, gt=0.0, description="variance of the noise, of the results' own")
+    length: float = Field(10.0, gt=0.0, description="of the kernels, in standard deviations")
+    noise: float = Field(1e-4, gt=0.0, description="variance of the noise, of the results' own")
 
 
 def fit(model: Any, training: Training, settings: GaussianProcessSettings) -> LearnedModel:
@@ -38,13 +38,11 @@ def fit(model: Any, training: Training, settings: GaussianProcessSettings) -> Le
     order = np.random.default_rng(SEED).permutation(len(arguments))[: settings.samples]
     scale = np.maximum(left.std(axis=0), 1e-300)
     x, y = arguments[order], left[order] / scale
-    start = RBF(settings.length, (0.1, 1e3))
-    sought = GaussianProcessRegressor(start, alpha=settings.noise)
-    sought.fit(x[:SOUGHT], y[:SOUGHT])
-    found = GaussianProcessRegressor(sought.kernel_, alpha=settings.noise, optimizer=None)
-    found.fit(x, y)
-    lengths = np.broadcast_to(found.kernel_.length_scale, x.shape[1]).copy()
-    heights = np.ascontiguousarray(np.reshape(found.alpha_, y.shape) * scale)
+    # Lengths of largest likelihood are too short: samples lie densely along runs, not beside them.
+    process = GaussianProcessRegressor(RBF(settings.length), alpha=settings.noise, optimizer=None)
+    process.fit(x, y)
+    lengths = np.full(x.shape[1], settings.length)
+    heights = np.ascontiguousarray(np.reshape(process.alpha_, y.shape) * scale)
     parts = {"lengths": lengths, "centres": x / lengths, "heights": heights}
     return learning.model(equations._replace(**parts))
 

@@ -39,9 +39,12 @@ def fit(model: Any, training: Training, settings: NeuralNetworkSettings) -> Lear
     (arguments, _), (equations, left) = learning.regression, learning.linear()
     scale = np.maximum(left.std(axis=0), 1e-300)
     hidden = (settings.width,) * settings.layers
-    options: dict[str, Any] = {"activation": "tanh", "alpha": settings.penalty}
     network = MLPRegressor(
-        hidden_layer_sizes=hidden, **options, max_iter=settings.epochs, random_state=SEED
+        hidden_layer_sizes=hidden,
+        activation="tanh",
+        alpha=settings.penalty,
+        max_iter=settings.epochs,
+        random_state=SEED,
     )
     with warnings.catch_warnings():
         # The number of epochs is a setting: validation judges what they have reached.
