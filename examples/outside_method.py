@@ -1,52 +1,45 @@
-"""A method that does not use this package: a stable linear model by least squares (DMDc).
+"""A method that does not use this package: outputs as polynomials of the inputs at the same time.
 
 Usage: python outside_method.py FOLDER predictions.nc, with what `vehiclemor dataset` has written.
 It needs NumPy, xarray and netCDF4.
 """
 
 import sys
+from itertools import combinations_with_replacement
 
 import numpy as np
 import xarray as xr
 
 FOLDER, OUT = sys.argv[1:]
+DEGREE = 3
+
+
+def histories(data: xr.Dataset, names: list[str]) -> np.ndarray:
+    """Quantities (samples, names) of all runs, one behind the other."""
+    return np.transpose([data[name].values for name in names])
+
+
+def products(u: np.ndarray) -> np.ndarray:
+    """Products (samples, terms) of at most so many inputs (samples, inputs)."""
+    columns = np.c_[np.ones(len(u)), u].T
+    picks = combinations_with_replacement(range(len(columns)), DEGREE)
+    return np.transpose([np.prod(columns[list(pick)], axis=0) for pick in picks])
+
+
 train, test = (
     xr.open_dataset(f"{FOLDER}/{name}.nc", decode_times=False) for name in ("training", "test")
 )
-INPUTS, STATES = (train.attrs[name].split() for name in ("inputs", "states"))
-BOUNDED = [name for name in train.attrs["outputs"].split() if "bound" in train[name].attrs]
-
-
-def runs(data: xr.Dataset, names: list[str]) -> list[np.ndarray]:
-    """Histories (samples, names) of each run."""
-    columns = np.transpose([data[name].values for name in names])
-    return np.split(columns, np.cumsum(data["row_size"].values)[:-1])
-
-
-def solved(known: list[np.ndarray], wanted: list[np.ndarray]) -> np.ndarray:
-    """Least squares over all samples of all runs, with a constant."""
-    rows = np.concatenate(known)
-    return np.linalg.lstsq(np.c_[rows, np.ones(len(rows))], np.concatenate(wanted), rcond=1e-6)[0]
-
-
-# From one sample to the next x' = [x u 1] A, outputs y = [x u 1] C.
-states, inputs = runs(train, STATES), runs(train, INPUTS)
-known = [np.c_[x, u] for x, u in zip(states, inputs, strict=True)]
-A = solved([rows[:-1] for rows in known], [x[1:] for x in states])
-C = solved(known, runs(train, BOUNDED))
-values, vectors = np.linalg.eig(A[: len(STATES)])
-values /= np.maximum(np.abs(values), 1.0)
-A[: len(STATES)] = (vectors * values @ np.linalg.inv(vectors)).real
-largest = np.abs(np.concatenate(inputs)).max(axis=0)
-found, trusted = [], []
-for x, run in zip(test["initial_state"].values, runs(test, INPUTS), strict=True):
-    trusted.append(int((np.abs(run) <= largest).all()))
-    for u in run:
-        row = np.r_[x, u, 1.0]
-        found.append(row @ C)
-        x = row @ A  # noqa: PLW2901
-columns = dict(zip(BOUNDED, np.transpose(found), strict=True))
-predictions = xr.Dataset({name: ("sample", column) for name, column in columns.items()})
-predictions["trusted"] = "run", trusted
-predictions.attrs = {name: test.attrs[name] for name in ("model", "test_set_digest")}
-predictions.assign_attrs(method="linear least squares").to_netcdf(OUT)
+bounded = [name for name in train.attrs["outputs"].split() if "bound" in train[name].attrs]
+known, new = (histories(data, train.attrs["inputs"].split()) for data in (train, test))
+largest = np.maximum(np.abs(known).max(axis=0), 1e-12)
+terms = products(known / largest)
+found = products(new / largest) @ np.linalg.lstsq(terms, histories(train, bounded), rcond=1e-9)[0]
+# It warns of runs whose inputs are larger than in the training.
+inside = (np.abs(new) <= largest).all(axis=1)
+ends = np.cumsum(test["row_size"].values)[:-1]
+trusted = [int(run.all()) for run in np.split(inside, ends)]
+predictions = {name: ("sample", column) for name, column in zip(bounded, found.T, strict=True)}
+same = {name: test.attrs[name] for name in ("model", "test_set_digest")}
+xr.Dataset(
+    {**predictions, "trusted": ("run", trusted)}, attrs={**same, "method": "polynomials"}
+).to_netcdf(OUT)

@@ -10,17 +10,8 @@ from cyclopts import App, CycloptsError, Parameter, UnknownOptionError
 from vehiclemor import __version__
 from vehiclemor.cli.names import cite, list_components, new_plugin, show
 from vehiclemor.cli.options import FAILED, strict
-from vehiclemor.cli.runs import export, plot, simulate
-from vehiclemor.cli.studies import (
-    compare,
-    convert,
-    dataset,
-    figures,
-    judge,
-    report,
-    run,
-    status,
-)
+from vehiclemor.cli.runs import dataset, export, judge, plot, simulate
+from vehiclemor.cli.studies import compare, convert, figures, report, run, status
 from vehiclemor.exceptions import MachineError, PlugInError, VehiclemorError, machine_reason
 from vehiclemor.resources import handbook_folder
 

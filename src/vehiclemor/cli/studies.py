@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -186,66 +186,6 @@ def convert(study: str, *, to: Format, out: Path | None = None, results: Results
         New file or folder; under the study's name here by default.
     """
     print(f"written: {vm.convert(study, to, out, results)}")
-
-
-def dataset(
-    model: str,
-    *,
-    out: Path | None = None,
-    to: Annotated[Literal["netcdf", "zarr"], Parameter(name="--format")] = "netcdf",
-) -> None:
-    """Write the training, validation and test runs of a protocol, for methods of other programs.
-
-    Parameters
-    ----------
-    model
-        A model, whose protocol is meant, or a study with bounds by its name or TOML file.
-    out
-        New folder; MODEL-dataset here by default.
-    to
-        netcdf or zarr.
-    """
-    with shown_progress():
-        print(f"written: {vm.dataset(model, out, to)}")
-
-
-def judge(
-    file: Path, *, dataset: Path, json_output: Json = False, results: Results = RESULTS
-) -> None:
-    """Judge predictions of a method of another program on the test set.
-
-    Parameters
-    ----------
-    file
-        Predictions: a netCDF file or a Zarr folder.
-    dataset
-        Folder that `vehiclemor dataset` has written.
-    """
-    from vehiclemor.report.labels import Column
-    from vehiclemor.report.printing import json_text, table
-
-    rows = vm.judge(file, dataset, results)
-    if json_output:
-        print(json_text(rows))
-        return
-    counts = {name: Column(name, ".0f") for name in ("missed", "undetected")}
-    errors = {name: Column(f"{name} error", ".3g") for name in ("worst", "median")}
-    whole = {
-        "label": Column("method"),
-        "runs": Column("runs"),
-        **counts,
-        "warned": Column("warned"),
-    }
-    whole |= errors | {"output": Column("worst output")}
-    if rows["seconds"].notna().any():
-        whole["seconds"] = Column("a run, ms", ".3g", scale=1e3)
-    print(table(rows[rows["kind"] == "method"], whole))
-    bound = {"bound": Column("bound", ".3g"), "unit": Column("unit")}
-    each = {"output": Column("output"), "measure": Column("error"), **bound, **counts, **errors}
-    print(f"\n{table(rows[rows['kind'] == 'output'], each)}")
-    print(
-        wrapped("(Errors are multiples of the bound; undetected runs miss it without a warning.)")
-    )
 
 
 # Without a terminal there is a line every so many seconds.

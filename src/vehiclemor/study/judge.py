@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,10 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-# What a file of predictions must have from the test set that it predicts.
-SAME = ("model", "test_set_digest")
-# Variables on the runs that it may have: whether a run is to be trusted, and what it has taken.
-TRUSTED, SECONDS = "trusted", "seconds"
+Bounds = Mapping[str, Bound]
 
 
 def judge(file: str | Path, dataset: str | Path, results: str | Path = "results") -> pd.DataFrame:
@@ -33,21 +30,20 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
     Parameters
     ----------
     file
-        netCDF file or Zarr folder with the attributes `model` and `test_set_digest` of the test
-        set, and one variable (samples,) for each bounded output, by its name and in its unit, in
-        the order of the test set.  May have: `trusted` (runs,), 0 where the method warns;
-        `seconds` (runs,); and the attribute `method`.
+        netCDF file or Zarr folder: attributes `model` and `test_set_digest` of the test set, and
+        each bounded output (samples,) by its name and in its unit, in the order of the test set.
+        It may have `trusted` (runs,), 0 where the method warns, `seconds` (runs,) and `method`.
     dataset
         Folder that `dataset` has written.
     results
-        Results folder: `replay` and the chosen method stand below, if its protocol was run there.
+        Results folder: `replay` and the chosen method stand below, if the study was run there.
 
     Returns
     -------
     pandas.DataFrame
-        Rows of two kinds: `method`, then `output` for each bounded output.  Of the `runs`, `missed`
-        ones violate a bound, `undetected` ones without a warning; errors `worst` and `median` are
-        multiples of the bound, infinite of a run with values that are not finite.
+        By `kind`: `method`, then `output`.  Of the `runs`, `misses` violate a bound, `silent` ones
+        without a warning; `score` and `median_score` of the errors are multiples of the bound, and
+        infinite of a run that is not finite.
 
     Raises
     ------
@@ -57,27 +53,30 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
     import pandas as pd
 
     path, folder = file_path("file", file), file_path("dataset", dataset)
-    places = [folder / "test.nc", folder / "test.zarr"]
-    known = next((place for place in places if place.exists()), None)
+    known = next((p for p in (folder / "test.nc", folder / "test.zarr") if p.exists()), None)
     if known is None:
-        raise FileError(f"{folder}: no test.nc; vehiclemor dataset MODEL writes such a folder")
+        raise FileError(f"{folder}: has no test.nc; vehiclemor dataset MODEL writes such a folder")
     truth, found = _read(known, "test set"), _read(path, "file of predictions")
-    if missing := {*SAME, "study", "outputs", "configuration"} - set(truth.attrs):
-        raise FileError(f"{known}: no test set of this package, it has no {min(missing)}")
+    if "configuration" not in truth.attrs or "apart" not in truth:
+        raise FileError(f"{known}: not the test set of a dataset of this package")
     bounds = StudyFile.model_validate_json(truth.attrs["configuration"]).bounds
     _check(path, found, truth, bounds)
-    judged = np.flatnonzero(truth["judged"].values)
-    if not len(judged):
-        raise InputError(f"{known}: no run is judged")
+    judged = truth["apart"].values == ""
+    if not judged.any():
+        raise InputError(f"{known}: no run can be judged")
     label = str(found.attrs.get("method", path.stem))
     part = _measured(found, truth, bounds).isel(scenario=judged)
-    scores = {output: _row(label, part, {output: bound}) for output, bound in bounds.items()}
-    rows = [{"kind": "method"} | _row(label, part, bounds)]
-    rows += [{"kind": "method"} | row for row in _stored(truth, judged, bounds, results)]
-    for output, row in scores.items():
-        meaning = {"measure": bounds[output].measure, "bound": bounds[output].bound}
-        units = truth[output].attrs["units"]
-        rows.append({"kind": "output"} | row | {"output": output, "unit": units} | meaning)
+    rows = [_row(label, part, bounds)]
+    stored = combined_path(file_path("results", results), truth.attrs["study"])
+    if stored.exists():
+        other = judged_part(read_dataset(stored, "source", "vehiclemor"))
+        if np.array_equal(other["scenario"].values, truth["label"].values[judged]):
+            shown = other["winner"].values | (other["method"].values == "replay")
+            names = other["label"].values[shown].tolist()
+            rows += [_row(name, other.sel(label=name), bounds) for name in names]
+    for output, bound in bounds.items():
+        own = {"kind": "output", "measure": bound.measure, "bound": bound.bound}
+        rows.append(_row(label, part, {output: bound}) | own | {"unit": truth[output].units})
     return pd.DataFrame(rows)
 
 
@@ -94,85 +93,67 @@ def _read(path: Path, kind: str) -> xr.Dataset:
         raise CorruptError(f"not a readable {kind} ({quoted(error)})", path) from None
 
 
-def _check(path: Path, found: xr.Dataset, truth: xr.Dataset, bounds: Mapping[str, Bound]) -> None:
+def _check(path: Path, found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> None:
     """Raise `InputError` if a file is not of predictions of this test set."""
-    for name in SAME:
+    for name in ("model", "test_set_digest"):
         if (given := found.attrs.get(name)) != (wanted := truth.attrs[name]):
-            raise InputError(
-                f"{path}: {name} is {quoted(given)}; of this test set it is {wanted!r}"
-            )
+            raise InputError(f"{path}: {name} is {quoted(given)}; the test set has {wanted!r}")
     if missing := [output for output in bounds if output not in found]:
         raise InputError(f"{path}: has no {missing[0]}; needed are {', '.join(bounds)}")
     sizes = dict.fromkeys(bounds, truth.sizes["sample"])
-    sizes |= {name: truth.sizes["run"] for name in (TRUSTED, SECONDS) if name in found}
+    sizes |= {name: truth.sizes["run"] for name in ("trusted", "seconds") if name in found}
     for name, size in sizes.items():
         if found[name].shape != (size,) or found[name].dtype.kind not in "biuf":
-            given = f"shape {found[name].shape} of {found[name].dtype}"
+            given = f"shape {found[name].shape} and type {found[name].dtype}"
             raise InputError(f"{path}: {name} has {given}; needed are {size} numbers")
 
 
-def _measured(found: xr.Dataset, truth: xr.Dataset, bounds: Mapping[str, Bound]) -> xr.Dataset:
-    """Errors of all runs, as a protocol has them of a method."""
+def _measured(found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> xr.Dataset:
+    """Errors and ends of all runs, as a protocol has them of a method."""
     import xarray as xr
 
-    names = truth.attrs["outputs"].split()
-    guesses, given = list(bounds), {name: found[name].values for name in found}
-    errors, ranges = [], []
-    ends = np.cumsum(truth["row_size"].values)
-    for end, size in zip(ends, truth["row_size"].values, strict=True):
-        full = {name: truth[name].values[end - size : end] for name in names}
-        error = [given[name][end - size : end] - full[name] for name in guesses]
-        # An error may be too large to be squared.
-        with np.errstate(all="ignore"):
-            errors.append([measure(np.transpose(error)) for measure in (rms, max_abs)])
-        ranges.append(signal_range(np.transpose([*full.values()])))
-    finite = np.isfinite(errors).all(axis=(1, 2))
-    trusted = given.get(TRUSTED, np.ones(len(finite))) > 0
+    names, ends = truth.attrs["outputs"].split(), np.cumsum(truth["row_size"].values)[:-1]
+    full = np.transpose([truth[name].values for name in names])
+    places = [names.index(name) for name in bounds]
+    error = np.full(full.shape, np.nan)
+    error[:, places] = np.transpose([found[name].values for name in bounds]) - full[:, places]
+
+    def by_run(measure: Callable[[np.ndarray], np.ndarray], histories: np.ndarray) -> tuple:
+        # What is finite may be too large to be squared.
+        with np.errstate(over="ignore", invalid="ignore"):
+            parts = np.array([measure(part) for part in np.split(histories, ends)])
+        return ("scenario", "output"), parts
+
+    finite = np.isfinite(by_run(max_abs, error)[1][:, places]).all(axis=1)
+    missing = np.full(len(finite), np.nan)
+    trusted = found["trusted"].values > 0 if "trusted" in found else True
     status = np.where(finite, np.where(trusted, "ok", "untrusted"), "diverged")
-    dimensions = "scenario", "output"
-    measured = {
-        name: (dimensions, column)
-        for name, column in zip(
-            ("rms_error", "max_error"), np.moveaxis(np.array(errors), 1, 0), strict=True
-        )
-    }
-    result = xr.Dataset(measured, {"output": guesses}).reindex(output=names)
-    return result.assign(
-        signal_range=(dimensions, np.array(ranges)),
-        output_unit=("output", [truth[name].attrs["units"] for name in names]),
-        status=("scenario", status),
-        trusted_until=("scenario", np.full(len(status), np.inf)),
-        seconds=("scenario", given.get(SECONDS, np.full(len(status), np.nan))),
+    return xr.Dataset(
+        {
+            "rms_error": by_run(rms, error),
+            "max_error": by_run(max_abs, error),
+            "signal_range": by_run(signal_range, full),
+            "status": ("scenario", status),
+            "trusted_until": ("scenario", missing),
+            "seconds": ("scenario", found["seconds"].values if "seconds" in found else missing),
+        },
+        {"output": names, "output_unit": ("output", [truth[name].units for name in names])},
     )
 
 
-def _row(label: str, part: xr.Dataset, bounds: Mapping[str, Bound]) -> dict[str, Any]:
+def _row(label: str, part: xr.Dataset, bounds: Bounds) -> dict[str, Any]:
     """How the runs of a method keep some bounds."""
     found = outcomes(part, bounds)
-    by_output = {name: outcomes(part, {name: bounds[name]}).scores.max() for name in bounds}
+    worst = {name: outcomes(part, {name: bounds[name]}).scores.max() for name in bounds}
     return {
+        "kind": "method",
         "label": label,
         "runs": len(found.scores),
-        "missed": int(found.missed.sum()),
-        "undetected": int(found.undetected.sum()),
-        "warned": int(found.warned.sum()),
-        "worst": float(found.scores.max()),
-        "median": float(np.median(found.scores)),
-        "output": max(by_output, key=lambda name: by_output[name]),
+        "misses": int(found.missed.sum()),
+        "silent": int(found.undetected.sum()),
+        "flagged": int(found.warned.sum()),
+        "score": float(found.scores.max()),
+        "median_score": float(np.median(found.scores)),
+        "output": max(worst, key=lambda name: worst[name]),
         "seconds": float(part["seconds"].mean()),
     }
-
-
-def _stored(
-    truth: xr.Dataset, judged: Sequence[int] | np.ndarray, bounds: Mapping[str, Bound], results: Any
-) -> Iterator[dict[str, Any]]:
-    """Replay and the chosen method, if a protocol's stored result is of the same runs."""
-    path = combined_path(file_path("results", results), truth.attrs["study"])
-    if not path.exists():
-        return
-    part = judged_part(read_dataset(path, "source", "vehiclemor"))
-    if part["scenario"].values.tolist() == truth["label"].values[judged].tolist():
-        for label in part["label"].values.tolist():
-            row = part.sel(label=label)
-            if row["winner"] or row["method"] == "replay":
-                yield _row(label, row, bounds)
