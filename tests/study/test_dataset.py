@@ -25,7 +25,7 @@ test = [{ maneuver = "lane_change", points = [[1.1, 1.2, 18.0]] }]
 """
 TRUCK = """
 bounds.roll = { measure = "relative", bound = 0.01 }
-training = [{ maneuver = "road:1", parameters = { payload = [500.0] } }]
+training = [{ maneuver = "road:1", parameters = { payload = [500.0] } }, { maneuver = "road:4" }]
 validation = [{ maneuver = "road:2" }]
 test = [{ maneuver = "road:3" }]
 """
@@ -141,7 +141,7 @@ def test_rates_are_those_of_the_states_and_histories_have_units(tmp_path):
 def test_a_truck_has_payloads_and_the_matrices_of_its_structure(tmp_path):
     study = small_study(tmp_path, TRUCK, "replay", model="flexible_truck")
     folder = vm.dataset(study, tmp_path / "data")
-    assert read(folder / "training.nc")["parameter_payload"].values.tolist() == [500.0]
+    assert read(folder / "training.nc")["parameter_payload"].values.tolist() == [500.0, 2000.0]
     matrices = {p.stem: mmread(p, spmatrix=False) for p in (folder / "matrices").iterdir()}
     structure = vm.model("flexible_truck").system.structure
     for name in ("mass", "stiffness", "dampers", "ports"):

@@ -8,7 +8,7 @@ from functools import partial
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 # Format -> ending.
 FORMATS = {"netcdf": "nc", "zarr": "zarr"}
-NOTE = "The test set with its truth: never train on it, nor choose settings by it."
+NOTE = "Train on training, choose settings by validation; never train or tune on test."
 
 
 def dataset(model: str | Path, out: str | Path | None = None, to: str = "netcdf") -> Path:
@@ -103,7 +103,7 @@ def _write(protocol: Protocol, ending: str, folder: Path) -> None:
             test_set=protocol.test_set if drawn else "listed",
             test_set_digest=digest,
             configuration=definition.model_dump_json(exclude_defaults=True),
-            comment=NOTE * (name == "test"),
+            comment=NOTE,
         )
         path = folder / f"{name}.{ending}"
         if ending == "zarr":
@@ -135,23 +135,25 @@ def _runs(model: Model, scenarios: Sequence[Scenario], work: str) -> xr.Dataset:
         q.name: ("sample", history, {"long_name": q.long_name, "units": q.unit}, {"zlib": True})
         for q, history in zip(columns, np.concatenate(blocks).T.copy(), strict=True)
     }
-    given = [(of_run.model_of_run(model, run), of_run.start_of(model, run)) for run in scenarios]
     known: dict[str, object] = {
         "row_size": [len(block) for block in blocks],
         "label": np.array([run.label for run in scenarios], object),
-        "initial_state": [own.start(start) for own, start in given],
     }
+    if states:
+        starts = ((of_run.model_of_run(model, s), of_run.start_of(model, s)) for s in scenarios)
+        known["initial_state"] = [own.start(start) for own, start in starts]
+        found["state"] = "state", np.array([state.name for state in states], object)
+        found["state_unit"] = "state", np.array([state.unit for state in states], object)
     if any(speeds := [of_run.speed_of(model, run) for run in scenarios]):
         known["initial_speed"] = speeds
     found |= variables(known, "run")
     found["row_size"][2]["sample_dimension"] = "sample"
     for name in sorted({name for run in scenarios for name, _ in run.parameters}):
-        values = [dict(run.parameters).get(name, np.nan) for run in scenarios]
+        usual: Any = dict(model.parameters.values()).get(name, np.nan)
+        values = [dict(run.parameters).get(name, usual) for run in scenarios]
         found[f"parameter_{name}"] = "run", values, described(model, f"{PARAMETER}{name}")
     names = {group: " ".join(q.name for q in quantities) for group, quantities in groups.items()}
-    texts = np.array([(state.name, state.unit) for state in states], object).reshape(-1, 2)
-    of_states = {"state": texts[:, 0], "state_unit": ("state", texts[:, 1])}
-    return xr.Dataset(found, of_states, names)
+    return xr.Dataset(found, attrs=names)
 
 
 def _samples(model: Model, scenario: Scenario, width: int) -> np.ndarray:
