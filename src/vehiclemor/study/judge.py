@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import file_path, quoted
-from vehiclemor.exceptions import CorruptError, FileError, InputError
+from vehiclemor.exceptions import CorruptError, FileError, InputError, printable
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.netcdf_file import opened, read_dataset
 from vehiclemor.study.plans.choice import outcomes
@@ -64,7 +64,7 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
     judged = truth["apart"].values == ""
     if not judged.any():
         raise InputError(f"{known}: no run can be judged")
-    label = str(found.attrs.get("method", path.stem))
+    label = printable(str(found.attrs.get("method", path.stem)))
     part = _measured(found, truth, bounds).isel(scenario=judged)
     rows = [_row(label, part, bounds)]
     stored = combined_path(file_path("results", results), truth.attrs["study"])
@@ -96,7 +96,7 @@ def _read(path: Path, kind: str) -> xr.Dataset:
 def _check(path: Path, found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> None:
     """Raise `InputError` if a file is not of predictions of this test set."""
     for name in ("model", "test_set_digest"):
-        if (given := found.attrs.get(name)) != (wanted := truth.attrs[name]):
+        if (given := str(found.attrs.get(name, "missing"))) != (wanted := truth.attrs[name]):
             raise InputError(f"{path}: {name} is {quoted(given)}; the test set has {wanted!r}")
     if missing := [output for output in bounds if output not in found]:
         raise InputError(f"{path}: has no {missing[0]}; needed are {', '.join(bounds)}")
