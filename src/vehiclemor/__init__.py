@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from vehiclemor.report.page import write_report as write_report
     from vehiclemor.report.study_formats import convert as convert
     from vehiclemor.simulation.batches import simulate_many as simulate_many
+    from vehiclemor.study.dataset import dataset as dataset
+    from vehiclemor.study.judge import judge as judge
 
 __version__ = "0.1.0"
 __all__ = [
@@ -41,10 +43,12 @@ __all__ = [
     "VehiclemorError",
     "compare",
     "convert",
+    "dataset",
     "describe",
     "errors",
     "export",
     "figures",
+    "judge",
     "load",
     "maneuver",
     "maneuvers",
@@ -72,9 +76,11 @@ _DEFINED_IN = {
     "VehiclemorError": "vehiclemor.exceptions",
     "compare": "vehiclemor.report.comparison",
     "convert": "vehiclemor.report.study_formats",
+    "dataset": "vehiclemor.study.dataset",
     "errors": "vehiclemor.metrics",
     "export": "vehiclemor.exporting.export",
     "figures": "vehiclemor.report.figures.catalogue",
+    "judge": "vehiclemor.study.judge",
     "maneuver": "vehiclemor.inputs.maneuver",
     "road": "vehiclemor.inputs.road",
     "simulate_many": "vehiclemor.simulation.batches",

@@ -1,4 +1,4 @@
-"""One run or one model: simulated, drawn, exported."""
+"""One run or one model: simulated, drawn, exported, given to other programs."""
 
 import inspect
 from pathlib import Path
@@ -10,6 +10,7 @@ import vehiclemor as vm
 from vehiclemor.api import RESULTS
 from vehiclemor.cli.options import (
     FAILED,
+    Json,
     ParameterFile,
     Parameters,
     Results,
@@ -185,3 +186,52 @@ def export(
         if method is not None:
             chosen = vm.reduce(chosen, method, **given)
     print(f"written: {vm.export(chosen, to, out, overwrite=overwrite, step=step)}")
+
+
+def dataset(
+    model: str,
+    *,
+    out: Path | None = None,
+    to: Annotated[Literal["netcdf", "zarr"], Parameter("--format")] = "netcdf",
+) -> None:
+    """Write the training, validation and test runs of a protocol, for methods of other programs.
+
+    Parameters
+    ----------
+    model
+        A model, whose protocol is meant; or name or TOML file of a study with bounds.
+    out
+        New folder; MODEL-dataset here by default.
+    to
+        netcdf or zarr.
+    """
+    from vehiclemor.cli.studies import shown_progress
+
+    with shown_progress():
+        print(f"written: {vm.dataset(model, out, to)}")
+
+
+def judge(
+    file: Path, *, dataset: Path, json_output: Json = False, results: Results = RESULTS
+) -> None:
+    """Judge predictions of a method of another program on the test set.
+
+    Parameters
+    ----------
+    file
+        Predictions: a netCDF file or a Zarr folder.
+    dataset
+        Folder that the command dataset has written.
+    """
+    from vehiclemor.report.printing import json_text, table
+
+    rows = vm.judge(file, dataset, results)
+    if json_output:
+        print(json_text(rows))
+        return
+    own, errors = ["label", "runs", "misses", "silent", "flagged"], ["score", "median_score"]
+    own += [*errors, "output"] + ["seconds"] * bool(rows["seconds"].notna().any())
+    methods, outputs = (rows.query(f"kind == {kind!r}") for kind in ("method", "output"))
+    print(table(methods, own))
+    each = ["output", "measure", "bound", "unit", "misses", "silent", *errors]
+    print(f"\n{table(outputs, each, explain=False)}")

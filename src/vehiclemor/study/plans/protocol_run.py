@@ -17,7 +17,7 @@ from vehiclemor.exceptions import FileError
 from vehiclemor.provenance import layout_digest
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
-from vehiclemor.study.experiment import complete_settings, make_experiment
+from vehiclemor.study.experiment import Experiment, complete_settings, make_experiment
 from vehiclemor.study.plans.choice import (
     MARGIN_OF_CHOSEN,
     TIE_OF_TIMES,
@@ -67,14 +67,7 @@ def run_protocol(
         name: [workers.result(of_row[number]) for of_row in experiments]
         for number, name in enumerate(sets)
     }
-    # The full order by another integrator than that of the references.
-    preset = "recommended" if model.kind == "ae" else "paper"
-    settings = complete_settings(model, "full_order", preset=preset)
-    seconds = {
-        name: make_experiment(model, "full_order", settings, (), sets[name], "errors")
-        for name in DRAWN
-        if name in sets
-    }
+    seconds = {name: second_runs(protocol, sets[name]) for name in DRAWN if name in sets}
     workers([[experiment] for experiment in seconds.values()])
     apart = {name: reasons(protocol, workers.result(e)) for name, e in seconds.items()}
     if "drawn" in sets and all(apart["drawn"]):
@@ -96,6 +89,14 @@ def run_protocol(
         lambda: (run_path(folder, key) for key in keys),
         content_hash(protocol.definition),
     )
+
+
+def second_runs(protocol: Protocol, scenarios: Scenarios) -> Experiment:
+    """The full order by another integrator than that of the references, see `reasons`."""
+    model = protocol.model
+    preset = "recommended" if model.kind == "ae" else "paper"
+    settings = complete_settings(model, "full_order", preset=preset)
+    return make_experiment(model, "full_order", settings, (), scenarios, "errors")
 
 
 def validate(

@@ -1,0 +1,187 @@
+"""Runs of a protocol as files, for methods that are written outside of this package."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from functools import partial
+from importlib.util import find_spec
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.arguments import file_path
+from vehiclemor.exceptions import FileError, InputError
+from vehiclemor.failure import Failure, attempt
+from vehiclemor.files import write_folder
+from vehiclemor.multibody.definition import Quantity
+from vehiclemor.netcdf_file import write_dataset
+from vehiclemor.progress import tell
+from vehiclemor.provenance import attributes
+from vehiclemor.registry import choice
+from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.run_timer import one_thread
+from vehiclemor.simulation.structures.model import StructuralModel
+from vehiclemor.study import scenario as of_run
+from vehiclemor.study.evaluate import evaluate, kept_reference, model_of
+from vehiclemor.study.plans.choice import reasons
+from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names, sampled_sets
+from vehiclemor.study.plans.protocol_run import second_runs
+from vehiclemor.study.plans.results import described
+from vehiclemor.study.plans.study_file import PARAMETER, SETS
+from vehiclemor.study.result import variables
+from vehiclemor.study.scenario import Scenario
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Format -> ending.
+FORMATS = {"netcdf": "nc", "zarr": "zarr"}
+NOTE = "Train on training, choose settings by validation; never train or tune on test."
+
+
+def dataset(model: str | Path, out: str | Path | None = None, to: str = "netcdf") -> Path:
+    """Write the training, validation and test runs of a protocol, for methods of others.
+
+    Parameters
+    ----------
+    model
+        Registered name, whose protocol is meant; or name or TOML file of a study with bounds.
+    out
+        New folder; `MODEL-dataset` here by default.
+    to
+        `netcdf` or `zarr`.
+
+    Returns
+    -------
+    Path
+        Folder with `training`, `validation` and `test`: full-order runs, one behind the other along
+        `sample`, with units and bounds as attributes, and along `run` what differs.  Kinematic
+        models have no rates; structural ones have neither states nor rates, but matrices.
+
+    Raises
+    ------
+    VehiclemorError
+        If there is no such study, it has no bounds, a package is missing, or the folder exists.
+    """
+    choice("format", to, FORMATS)
+    if to == "zarr" and not find_spec("zarr"):
+        raise InputError("zarr needs the package zarr: pip install 'vehiclemor[zarr]'")
+    name = str(file_path("model", model))
+    path = Path(f"{Path(name).stem}-dataset") if out is None else file_path("out", out)
+    if path.exists():
+        raise FileError(f"{path}: exists already; move it away")
+    protocol = load_protocol(protocol_names().get(name, name))
+    with one_thread():
+        return write_folder(path, partial(_write, protocol, FORMATS[to]))
+
+
+def _write(protocol: Protocol, ending: str, folder: Path) -> None:
+    folder.mkdir()
+    definition, drawn = protocol.definition, sampled_sets(protocol).get("drawn", ())
+    sets = {name: protocol.sets[name] for name in SETS} | ({"test": drawn} if drawn else {})
+    second = second_runs(protocol, sets["test"])
+    # Its references are kept: those of the test are simulated once.
+    model = model_of(second)
+    labels = [run.label for run in sets["test"]]
+    same = definition.model_dump_json(include={"model", "parameters", "bounds"})
+    digest = hashlib.sha256("\n".join([same, *labels]).encode()).hexdigest()[:16]
+    for name in ("training", "validation", "test"):
+        found = _runs(model, sets[name], f"{name} of {protocol.study}")
+        for output, bound in definition.bounds.items():
+            found[output].attrs |= {"bound": bound.bound, "bound_measure": bound.measure}
+        if name == "test":
+            apart = reasons(protocol, evaluate(second)) if drawn else [""] * len(labels)
+            found = found.assign(variables({"apart": np.array(apart, object)}, "run"))
+        found.attrs |= attributes(
+            f"{name} runs of {protocol.study}",
+            model.kernel_hash,
+            model=model.name,
+            study=protocol.study,
+            test_set=protocol.test_set if drawn else "listed",
+            test_set_digest=digest,
+            configuration=definition.model_dump_json(exclude_defaults=True),
+            comment=NOTE,
+        )
+        path = folder / f"{name}.{ending}"
+        if ending == "zarr":
+            found.drop_encoding().to_zarr(path, consolidated=False)
+        else:
+            write_dataset(found, path)
+    if isinstance(model, StructuralModel):
+        _write_matrices(model, folder / "matrices")
+
+
+def _runs(model: Model, scenarios: Sequence[Scenario], work: str) -> xr.Dataset:
+    """Full-order runs, one behind the other (contiguous ragged arrays of the CF conventions)."""
+    import xarray as xr
+
+    definition = model.definition
+    states = (*definition.coordinates, *definition.speeds)
+    rates = [
+        Quantity(f"rate_of_{state.name}", f"{state.unit}/s", f"rate of: {state.long_name}")
+        for state in (states if definition.speeds else ())
+    ]
+    groups = {"inputs": definition.inputs, "states": states, "rates": rates}
+    groups |= {"outputs": definition.outputs}
+    columns = [Quantity("time", "s", "time"), *chain(*groups.values())]
+    blocks: list[np.ndarray] = []
+    for scenario in scenarios:
+        blocks.append(_samples(model, scenario, len(columns)))
+        tell(work, len(blocks), len(scenarios))
+    found: dict[str, tuple] = {
+        q.name: ("sample", history, {"long_name": q.long_name, "units": q.unit}, {"zlib": True})
+        for q, history in zip(columns, np.concatenate(blocks).T.copy(), strict=True)
+    }
+    known: dict[str, object] = {
+        "row_size": [len(block) for block in blocks],
+        "label": np.array([run.label for run in scenarios], object),
+    }
+    if states:
+        starts = ((of_run.model_of_run(model, s), of_run.start_of(model, s)) for s in scenarios)
+        known["initial_state"] = [own.start(start) for own, start in starts]
+        found["state"] = "state", np.array([state.name for state in states], object)
+        found["state_unit"] = "state", np.array([state.unit for state in states], object)
+    if any(speeds := [of_run.speed_of(model, run) for run in scenarios]):
+        known["initial_speed"] = speeds
+    found |= variables(known, "run")
+    found["row_size"][2]["sample_dimension"] = "sample"
+    for name in sorted({name for run in scenarios for name, _ in run.parameters}):
+        usual: Any = dict(model.parameters.values()).get(name, np.nan)
+        values = [dict(run.parameters).get(name, usual) for run in scenarios]
+        found[f"parameter_{name}"] = "run", values, described(model, f"{PARAMETER}{name}")
+    names = {group: " ".join(q.name for q in quantities) for group, quantities in groups.items()}
+    return xr.Dataset(found, attrs=names)
+
+
+def _samples(model: Model, scenario: Scenario, width: int) -> np.ndarray:
+    """Histories (samples, width); not a number where the full order has no solution."""
+    run = attempt(partial(kept_reference, model, scenario))
+    if isinstance(run, Failure):
+        times = scenario.maneuver.times
+        return np.column_stack((times, np.full((len(times), width - 1), np.nan)))
+    own, rates = of_run.model_of_run(model, scenario), run.states[:, :0]
+    if own.speeds:
+        rates = own.values_at("derivative", run.states, run.inputs, finite=True)
+    return np.column_stack((run.times, run.inputs, run.states, rates, run.outputs))
+
+
+def _write_matrices(model: StructuralModel, folder: Path) -> None:
+    """Matrices of the structure; by online parameters the change of its mass."""
+    from scipy.io import mmwrite
+
+    structure = model.system.structure
+    found = {name: getattr(structure, name) for name in ("mass", "stiffness", "dampers", "ports")}
+    of = ("position", "speed", "acceleration", "force")
+    found |= {f"outputs_{n}": part for n, part in zip(of, structure.outputs, strict=True)}
+    values = dict(model.parameters.values())
+    for name in model.definition.online:
+        other = model.definition.structure(values | {name: values[name] + 1.0})
+        found[f"mass_by_{name}"] = other.mass - structure.mass
+    equation = "M q'' + (W W' + d K) q' + K q = load + B f(B' q, B' q', u)"
+    folder.mkdir()
+    for name, matrix in found.items():
+        comment = f"{equation}, d = {structure.damping_time!r} s"
+        mmwrite(folder / f"{name}.mtx", matrix, comment=comment)

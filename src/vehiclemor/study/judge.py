@@ -1,0 +1,159 @@
+"""Predictions of methods that are written outside of this package, judged as protocols judge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.arguments import file_path, quoted
+from vehiclemor.exceptions import CorruptError, FileError, InputError, printable
+from vehiclemor.metrics import max_abs, rms, signal_range
+from vehiclemor.netcdf_file import opened, read_dataset
+from vehiclemor.study.plans.choice import outcomes
+from vehiclemor.study.plans.results import judged_part
+from vehiclemor.study.plans.study_file import Bound, StudyFile
+from vehiclemor.study.store import combined_path
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+Bounds = Mapping[str, Bound]
+
+
+def judge(file: str | Path, dataset: str | Path, results: str | Path = "results") -> pd.DataFrame:
+    """Judge predictions of the test runs that `dataset` has written.
+
+    Parameters
+    ----------
+    file
+        netCDF file or Zarr folder: attributes `model` and `test_set_digest` of the test set, and
+        each bounded output (samples,) by its name and in its unit, in the order of the test set.
+        It may have `trusted` (runs,), 0 where the method warns, `seconds` (runs,) and `method`.
+    dataset
+        Folder that `dataset` has written.
+    results
+        Results folder: `replay` and the chosen method stand below, if the study was run there.
+
+    Returns
+    -------
+    pandas.DataFrame
+        By `kind`: `method`, then `output`.  Of the `runs`, `misses` violate a bound, `silent` ones
+        without a warning; `score` and `median_score` of the errors are multiples of the bound, and
+        infinite of a run that is not finite.
+
+    Raises
+    ------
+    VehiclemorError
+        If a file can't be read, is of another test set, or lacks values.
+    """
+    import pandas as pd
+
+    path, folder = file_path("file", file), file_path("dataset", dataset)
+    known = next((p for p in (folder / "test.nc", folder / "test.zarr") if p.exists()), None)
+    if known is None:
+        raise FileError(f"{folder}: has no test.nc; vehiclemor dataset MODEL writes such a folder")
+    truth, found = _read(known, "test set"), _read(path, "file of predictions")
+    if "configuration" not in truth.attrs or "apart" not in truth:
+        raise FileError(f"{known}: not the test set of a dataset of this package")
+    bounds = StudyFile.model_validate_json(truth.attrs["configuration"]).bounds
+    _check(path, found, truth, bounds)
+    judged = truth["apart"].values == ""
+    if not judged.any():
+        raise InputError(f"{known}: no run can be judged")
+    label = printable(str(found.attrs.get("method", path.stem)))
+    part = _measured(found, truth, bounds).isel(scenario=judged)
+    rows = [_row(label, part, bounds)]
+    stored = combined_path(file_path("results", results), truth.attrs["study"])
+    if stored.exists():
+        other = judged_part(read_dataset(stored, "source", "vehiclemor"))
+        if np.array_equal(other["scenario"].values, truth["label"].values[judged]):
+            shown = other["winner"].values | (other["method"].values == "replay")
+            names = other["label"].values[shown].tolist()
+            rows += [_row(name, other.sel(label=name), bounds) for name in names]
+    for output, bound in bounds.items():
+        own = {"kind": "output", "measure": bound.measure, "bound": bound.bound}
+        rows.append(_row(label, part, {output: bound}) | own | {"unit": truth[output].units})
+    return pd.DataFrame(rows)
+
+
+def _read(path: Path, kind: str) -> xr.Dataset:
+    import xarray as xr
+    from xarray.backends import NetCDF4DataStore
+
+    if not path.is_dir():
+        with opened(path, kind) as file:
+            return xr.open_dataset(NetCDF4DataStore(file), decode_times=False).load()
+    try:
+        return xr.open_zarr(path, consolidated=False, decode_times=False).load()
+    except (ImportError, LookupError, OSError, TypeError, ValueError) as error:
+        raise CorruptError(f"not a readable {kind} ({quoted(error)})", path) from None
+
+
+def _check(path: Path, found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> None:
+    """Raise `InputError` if a file is not of predictions of this test set."""
+    for name in ("model", "test_set_digest"):
+        if (given := str(found.attrs.get(name, "missing"))) != (wanted := truth.attrs[name]):
+            raise InputError(f"{path}: {name} is {quoted(given)}; the test set has {wanted!r}")
+    if missing := [output for output in bounds if output not in found]:
+        raise InputError(f"{path}: has no {missing[0]}; needed are {', '.join(bounds)}")
+    sizes = dict.fromkeys(bounds, truth.sizes["sample"])
+    sizes |= {name: truth.sizes["run"] for name in ("trusted", "seconds") if name in found}
+    for name, size in sizes.items():
+        if found[name].shape != (size,) or found[name].dtype.kind not in "biuf":
+            given = f"shape {found[name].shape} and type {found[name].dtype}"
+            raise InputError(f"{path}: {name} has {given}; needed are {size} numbers")
+
+
+def _measured(found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> xr.Dataset:
+    """Errors and ends of all runs, as a protocol has them of a method."""
+    import xarray as xr
+
+    names, ends = truth.attrs["outputs"].split(), np.cumsum(truth["row_size"].values)[:-1]
+    full = np.transpose([truth[name].values for name in names])
+    places = [names.index(name) for name in bounds]
+    error = np.full(full.shape, np.nan)
+    error[:, places] = np.transpose([found[name].values for name in bounds]) - full[:, places]
+
+    def by_run(measure: Callable[[np.ndarray], np.ndarray], histories: np.ndarray) -> tuple:
+        # What is finite may be too large to be squared.
+        with np.errstate(over="ignore", invalid="ignore"):
+            parts = np.array([measure(part) for part in np.split(histories, ends)])
+        return ("scenario", "output"), parts
+
+    finite = np.isfinite(by_run(max_abs, error)[1][:, places]).all(axis=1)
+    missing = np.full(len(finite), np.nan)
+    trusted = found["trusted"].values > 0 if "trusted" in found else True
+    status = np.where(finite, np.where(trusted, "ok", "untrusted"), "diverged")
+    return xr.Dataset(
+        {
+            "rms_error": by_run(rms, error),
+            "max_error": by_run(max_abs, error),
+            "signal_range": by_run(signal_range, full),
+            "status": ("scenario", status),
+            "trusted_until": ("scenario", missing),
+            "seconds": ("scenario", found["seconds"].values if "seconds" in found else missing),
+        },
+        {"output": names, "output_unit": ("output", [truth[name].units for name in names])},
+    )
+
+
+def _row(label: str, part: xr.Dataset, bounds: Bounds) -> dict[str, Any]:
+    """How the runs of a method keep some bounds."""
+    found = outcomes(part, bounds)
+    worst = {name: outcomes(part, {name: bounds[name]}).scores.max() for name in bounds}
+    return {
+        "kind": "method",
+        "label": label,
+        "runs": len(found.scores),
+        "misses": int(found.missed.sum()),
+        "silent": int(found.undetected.sum()),
+        "flagged": int(found.warned.sum()),
+        "score": float(found.scores.max()),
+        "median_score": float(np.median(found.scores)),
+        "output": max(worst, key=lambda name: worst[name]),
+        "seconds": float(part["seconds"].mean()),
+    }
