@@ -115,14 +115,6 @@ def test_a_method_of_another_program_competes(truth, capsys):
     assert 0.0 < row["median_score"] < row["score"] < other["score"]
 
 
-def test_zarr_holds_the_same(truth):
-    vm.dataset("small.toml", "zarr", "zarr")
-    written = xr.open_zarr("zarr/test.zarr", consolidated=False)
-    xr.testing.assert_equal(written, read("data/test.nc"))
-    truth.to_zarr("found.zarr", consolidated=False)
-    assert vm.judge("found.zarr", "zarr")["score"].tolist() == [0.0] * 3
-
-
 def test_rates_are_those_of_the_states_and_histories_have_units(tmp_path):
     study = small_study(tmp_path, CAR, "replay", model="independent_suspension_vehicle")
     data = read(vm.dataset(study, tmp_path / "data") / "test.nc")

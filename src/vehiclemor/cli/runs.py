@@ -188,12 +188,7 @@ def export(
     print(f"written: {vm.export(chosen, to, out, overwrite=overwrite, step=step)}")
 
 
-def dataset(
-    model: str,
-    *,
-    out: Path | None = None,
-    to: Annotated[Literal["netcdf", "zarr"], Parameter("--format")] = "netcdf",
-) -> None:
+def dataset(model: str, *, out: Path | None = None) -> None:
     """Write the training, validation and test runs of a protocol, for methods of other programs.
 
     Parameters
@@ -202,13 +197,11 @@ def dataset(
         A model, whose protocol is meant; or name or TOML file of a study with bounds.
     out
         New folder; MODEL-dataset here by default.
-    to
-        netcdf or zarr.
     """
     from vehiclemor.cli.studies import shown_progress
 
     with shown_progress():
-        print(f"written: {vm.dataset(model, out, to)}")
+        print(f"written: {vm.dataset(model, out)}")
 
 
 def judge(
@@ -219,7 +212,7 @@ def judge(
     Parameters
     ----------
     file
-        Predictions: a netCDF file or a Zarr folder.
+        Predictions: a netCDF file.
     dataset
         Folder that the command dataset has written.
     """

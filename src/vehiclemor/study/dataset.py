@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from functools import partial
-from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,14 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import file_path
-from vehiclemor.exceptions import FileError, InputError
+from vehiclemor.exceptions import FileError
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.files import write_folder
 from vehiclemor.multibody.definition import Quantity
 from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.progress import tell
 from vehiclemor.provenance import attributes
-from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.simulation.structures.model import StructuralModel
@@ -37,12 +35,10 @@ from vehiclemor.study.scenario import Scenario
 if TYPE_CHECKING:
     import xarray as xr
 
-# Format -> ending.
-FORMATS = {"netcdf": "nc", "zarr": "zarr"}
 NOTE = "Train on training, choose settings by validation; never train or tune on test."
 
 
-def dataset(model: str | Path, out: str | Path | None = None, to: str = "netcdf") -> Path:
+def dataset(model: str | Path, out: str | Path | None = None) -> Path:
     """Write the training, validation and test runs of a protocol, for methods of others.
 
     Parameters
@@ -51,34 +47,29 @@ def dataset(model: str | Path, out: str | Path | None = None, to: str = "netcdf"
         Registered name, whose protocol is meant; or name or TOML file of a study with bounds.
     out
         New folder; `MODEL-dataset` here by default.
-    to
-        `netcdf` or `zarr`.
 
     Returns
     -------
     Path
-        Folder with `training`, `validation` and `test`: full-order runs, one behind the other along
-        `sample`, with units and bounds as attributes, and along `run` what differs.  Kinematic
-        models have no rates; structural ones have neither states nor rates, but matrices.
+        Folder with `training.nc`, `validation.nc` and `test.nc`: full-order runs, one behind the
+        other along `sample`, with units and bounds as attributes, and along `run` what differs.
+        Kinematic models have no rates; structural ones have matrices, but no states.
 
     Raises
     ------
     VehiclemorError
-        If there is no such study, it has no bounds, a package is missing, or the folder exists.
+        If there is no such study, it has no bounds, or the folder exists.
     """
-    choice("format", to, FORMATS)
-    if to == "zarr" and not find_spec("zarr"):
-        raise InputError("zarr needs the package zarr: pip install 'vehiclemor[zarr]'")
     name = str(file_path("model", model))
     path = Path(f"{Path(name).stem}-dataset") if out is None else file_path("out", out)
     if path.exists():
         raise FileError(f"{path}: exists already; move it away")
     protocol = load_protocol(protocol_names().get(name, name))
     with one_thread():
-        return write_folder(path, partial(_write, protocol, FORMATS[to]))
+        return write_folder(path, partial(_write, protocol))
 
 
-def _write(protocol: Protocol, ending: str, folder: Path) -> None:
+def _write(protocol: Protocol, folder: Path) -> None:
     folder.mkdir()
     definition, drawn = protocol.definition, sampled_sets(protocol).get("drawn", ())
     sets = {name: protocol.sets[name] for name in SETS} | ({"test": drawn} if drawn else {})
@@ -105,11 +96,7 @@ def _write(protocol: Protocol, ending: str, folder: Path) -> None:
             configuration=definition.model_dump_json(exclude_defaults=True),
             comment=NOTE,
         )
-        path = folder / f"{name}.{ending}"
-        if ending == "zarr":
-            found.drop_encoding().to_zarr(path, consolidated=False)
-        else:
-            write_dataset(found, path)
+        write_dataset(found, folder / f"{name}.nc")
     if isinstance(model, StructuralModel):
         _write_matrices(model, folder / "matrices")
 

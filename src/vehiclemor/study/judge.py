@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import file_path, quoted
-from vehiclemor.exceptions import CorruptError, FileError, InputError, printable
+from vehiclemor.exceptions import FileError, InputError, printable
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.netcdf_file import opened, read_dataset
 from vehiclemor.study.plans.choice import outcomes
@@ -30,7 +30,7 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
     Parameters
     ----------
     file
-        netCDF file or Zarr folder: attributes `model` and `test_set_digest` of the test set, and
+        netCDF file: attributes `model` and `test_set_digest` of the test set, and
         each bounded output (samples,) by its name and in its unit, in the order of the test set.
         It may have `trusted` (runs,), 0 where the method warns, `seconds` (runs,) and `method`.
     dataset
@@ -53,8 +53,8 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
     import pandas as pd
 
     path, folder = file_path("file", file), file_path("dataset", dataset)
-    known = next((p for p in (folder / "test.nc", folder / "test.zarr") if p.exists()), None)
-    if known is None:
+    known = folder / "test.nc"
+    if not known.exists():
         raise FileError(f"{folder}: has no test.nc; vehiclemor dataset MODEL writes such a folder")
     truth, found = _read(known, "test set"), _read(path, "file of predictions")
     if "configuration" not in truth.attrs or "apart" not in truth:
@@ -84,13 +84,8 @@ def _read(path: Path, kind: str) -> xr.Dataset:
     import xarray as xr
     from xarray.backends import NetCDF4DataStore
 
-    if not path.is_dir():
-        with opened(path, kind) as file:
-            return xr.open_dataset(NetCDF4DataStore(file), decode_times=False).load()
-    try:
-        return xr.open_zarr(path, consolidated=False, decode_times=False).load()
-    except (ImportError, LookupError, OSError, TypeError, ValueError) as error:
-        raise CorruptError(f"not a readable {kind} ({quoted(error)})", path) from None
+    with opened(path, kind) as file:
+        return xr.open_dataset(NetCDF4DataStore(file), decode_times=False).load()
 
 
 def _check(path: Path, found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> None:

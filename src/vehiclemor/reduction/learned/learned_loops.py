@@ -1,9 +1,11 @@
 """Learned equations in time: polynomials, layers of a network, kernels of a Gaussian process."""
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Float, Int, IntMatrix, IntVector, Matrix, Vector, vector
+from vehiclemor.sizes import require, shaped
 
 # Beyond this magnitude of a standardised coordinate a run has diverged.
 LARGEST = 1e3
@@ -31,6 +33,23 @@ class Equations(NamedTuple):
     lengths: Vector
     centres: Matrix
     heights: Matrix
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Numbers of arguments, without the constant, and of results."""
+        return len(self.lengths), self.coefficients.shape[1]
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the loop would read beyond these arrays."""
+        arguments, m = self.sizes
+        terms, layers, kernels = self.terms, self.widths.tolist(), len(self.centres)
+        require(terms.ndim == 2 and terms.shape[1] > 0, "terms")
+        require(bool(((terms >= 0) & (terms <= arguments)).all()), "terms")
+        shaped("coefficients", (self.coefficients, len(terms), m))
+        shaped("kernels", (self.centres, kernels, arguments), (self.heights, kernels, m))
+        if layers:
+            require(min(layers) > 0 and (layers[0], layers[-1]) == (arguments, m), "widths")
+            shaped("weights", (self.weights, sum((a + 1) * b for a, b in pairwise(layers))))
 
 
 def evaluate(equations: Equations, v: Vector, buffer: Vector, result: Vector) -> None:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations_with_replacement, pairwise
+from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +29,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.sizes import require, shaped
+from vehiclemor.sizes import require
 
 # Runge-Kutta steps: longest as a multiple of the fastest linear time, and how many a sample at
 # most.
@@ -210,7 +210,7 @@ class LearnedModel(ShortRepr):
         Which states are meant, and their components.
     equations
         Of components and standardised inputs, see `Learning`.
-    step, mapped
+    time_step, mapped
         In s; whether the equations give what changes in a step, or rates.
     input_scale
         Magnitudes of the inputs (inputs,).
@@ -223,7 +223,7 @@ class LearnedModel(ShortRepr):
     states: States
     components: Components
     equations: Equations
-    step: float
+    time_step: float
     mapped: bool
     input_scale: np.ndarray
     lifted: np.ndarray
@@ -236,23 +236,16 @@ class LearnedModel(ShortRepr):
         return self.states.model
 
     def check_sizes(self) -> None:
-        """Raise `ValueError` if the loop would read or write beyond these arrays."""
-        e, m = self.equations, self.equations.coefficients.shape[1]
-        arguments = len(e.lengths) + 1
-        kinds = self.model.kind == "ae"
-        inputs = len(self.input_scale) * (1 if kinds or not self.mapped else 2)
-        require(arguments == 1 + inputs + (0 if kinds else self.order), "arguments")
-        require(
-            m == (len(self.model.coordinates) if kinds else self.order + self.states.planar), "m"
-        )
-        shaped("equations", (e.coefficients, len(e.terms), m), (e.heights, len(e.centres), m))
-        shaped("centres", (e.centres, len(e.centres), arguments - 1))
-        require(bool(((e.terms >= 0) & (e.terms < arguments)).all()), "terms")
-        sizes = e.widths.tolist()
-        if sizes:
-            require(min(sizes) > 0 and (sizes[0], sizes[-1]) == (arguments - 1, m), "widths")
-            count = sum((a + 1) * b for a, b in pairwise(sizes))
-            shaped("weights", (e.weights, count))
+        """Raise `ValueError` if the equations are none of these coordinates and inputs."""
+        arguments, m = self.equations.sizes
+        static, inputs = self.model.kind == "ae", len(self.input_scale)
+        if static:
+            require((arguments, m) == (inputs, len(self.model.coordinates)), "equations")
+        else:
+            inputs *= 1 + self.mapped
+            own = self.order + inputs, self.order + self.states.planar
+            require((arguments, m) == own, "equations")
+        require(self.time_step > 0.0, "time_step")
         r = len(self.components.forward)
         require(bool(((self.lifted >= 0) & (self.lifted <= r)).all()), "lifted")
 
@@ -277,7 +270,7 @@ class LearnedModel(ShortRepr):
             return model.trajectory(times, inputs, path, nothing.tolist(), seconds)
         begun = model.start(start)
         (path, reached), seconds = timed(lambda: self._path(maneuver, begun))
-        known = self.step * np.arange(len(path))
+        known = self.time_step * np.arange(len(path))
         late = times > known[reached - 1] + 1e-9
         failure = ""
         if reached < len(path):
@@ -321,15 +314,15 @@ class LearnedModel(ShortRepr):
 
     def _path(self, maneuver: Maneuver, begun: np.ndarray) -> tuple[np.ndarray, int]:
         """Coordinates and quadratures at all steps of a run, and how many rows are reached."""
-        steps = max(int(np.ceil(maneuver.duration / self.step - 1e-9)), 1)
-        halves = 0.5 * self.step * np.arange(2 * steps + 1)
+        steps = max(int(np.ceil(maneuver.duration / self.time_step - 1e-9)), 1)
+        halves = 0.5 * self.time_step * np.arange(2 * steps + 1)
         inputs = maneuver.at(np.minimum(halves, maneuver.duration))
         scaled = online_inputs(self.model, inputs) / self.input_scale
         path = np.empty((steps + 1, self.equations.coefficients.shape[1]))
         path[0] = self._encoded(begun)
         buffer = self._buffer(path.shape[1])
         found = learned_loop("march")(
-            self.equations, self.order, self.step, int(self.mapped), scaled, path, buffer
+            self.equations, self.order, self.time_step, int(self.mapped), scaled, path, buffer
         )
         return path, found
 

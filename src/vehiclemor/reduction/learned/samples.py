@@ -157,7 +157,7 @@ def _gathered(model: Any, runs: tuple[Any, ...], steps: int, skipped: float) -> 
     *histories, evaluations = zip(*parts, strict=True)
     arrays = [np.concatenate(history) for history in histories]
     seconds = time.process_time() - began
-    return Samples(states, spacings[0], *arrays, sum(evaluations), seconds)
+    return Samples(states, spacings[0], *arrays, evaluations=sum(evaluations), seconds=seconds)
 
 
 def _of_run(

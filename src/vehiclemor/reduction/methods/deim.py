@@ -8,7 +8,7 @@ share nearly all that they compute, few rows cost nearly as much (see the findin
 """
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -30,8 +30,23 @@ class DeimSettings(DynamicPodSettings):
 
     rank: int = Field(11, ge=1, description="basis vectors of the states")
     rows: int = Field(20, ge=1, description="rows of the equations, at least as many as the rank")
-    formulation: Literal["state"] = Field("state", description="all states in one basis")
+    formulation: Literal["state"] = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        "state", description="all states in one basis"
+    )
     snapshots: int = Field(500, ge=2, description="equidistant snapshots of each training run")
+
+
+@dataclass(frozen=True, eq=False)
+class InterpolatedProjection(DynamicProjection):
+    """A projection whose rates are interpolated; `within` (r, 2 n) projects the start."""
+
+    within: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def encode(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """The nearest state (2 n,) in the subspace: that of few rows alone would be another."""
+        del inputs
+        mean = self.spaces.means[0]
+        return mean + self.within @ (state - mean) @ self.spaces.trial_basis[0]
 
 
 def check(model: DynamicModel, settings: DeimSettings) -> None:
@@ -42,7 +57,7 @@ def check(model: DynamicModel, settings: DeimSettings) -> None:
         raise InputError(f"rows is {settings.rows}; it must be from rank {settings.rank} to {most}")
 
 
-def fit(model: DynamicModel, training: Training, settings: DeimSettings) -> DynamicProjection:
+def fit(model: DynamicModel, training: Training, settings: DeimSettings) -> InterpolatedProjection:
     """POD with one basis, then rows for its rates; `InputError` if pyMOR is missing."""
     with installed("deim", "pyMOR"):
         from pymor.algorithms.ei import deim
@@ -66,10 +81,14 @@ def fit(model: DynamicModel, training: Training, settings: DeimSettings) -> Dyna
     oblique = np.zeros_like(test)
     oblique[:, rows] = (test * scale) @ basis @ np.linalg.inv(basis[rows]) / scale[rows]
     evaluations = projected.offline.evaluations + len(rates)
-    return replace(
-        projected,
-        spaces=replace(spaces, test_basis=oblique[None]),
-        offline=OfflineCost(time.process_time() - began, evaluations),
+    return InterpolatedProjection(
+        model,
+        replace(spaces, test_basis=oblique[None]),
+        OfflineCost(time.process_time() - began, evaluations),
+        settings.solver,
+        settings.tolerance,
+        projected.bases,
+        within=test,
     )
 
 

@@ -39,8 +39,9 @@ def fit(model: Any, training: Training, settings: GaussianProcessSettings) -> Le
     scale = np.maximum(left.std(axis=0), 1e-300)
     x, y = arguments[order], left[order] / scale
     # Lengths of largest likelihood are too short: samples lie densely along runs, not beside them.
-    process = GaussianProcessRegressor(RBF(settings.length), alpha=settings.noise, optimizer=None)
-    process.fit(x, y)
+    kernel: Any = RBF(settings.length)
+    options: Any = {"alpha": settings.noise, "optimizer": None}
+    process = GaussianProcessRegressor(kernel, **options).fit(x, y)
     lengths = np.full(x.shape[1], settings.length)
     heights = np.ascontiguousarray(np.reshape(process.alpha_, y.shape) * scale)
     parts = {"lengths": lengths, "centres": x / lengths, "heights": heights}

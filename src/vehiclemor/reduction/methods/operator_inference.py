@@ -37,7 +37,8 @@ def fit(model: Any, training: Training, settings: OperatorInferenceSettings) -> 
     arguments, results = learning.regression
     r, u = len(learning.components.forward), learning.inputs.shape[1]
     form = "c" * learning.samples.constant + FORMS[settings.form]
-    library = opinf.models.ContinuousModel(form, solver=opinf.lstsq.L2Solver(settings.ridge))
+    solver = opinf.lstsq.L2Solver(settings.ridge)
+    library: Any = opinf.models.ContinuousModel(form, solver=solver)
     z, inputs = arguments[:, :r].T, arguments[:, r:].T
     library.fit(states=z, ddts=results[:, :r].T, inputs=inputs)
     terms: dict[str, list[tuple[int, ...]]] = {

@@ -34,7 +34,7 @@ def fit(model: Any, training: Training, settings: SparseIdentificationSettings) 
     learning = Learning.of(model, training, settings, mapped=False)
     arguments, results = learning.regression
     r, samples = len(learning.components.forward), learning.samples
-    library = pysindy.SINDy(
+    library: Any = pysindy.SINDy(
         optimizer=pysindy.STLSQ(threshold=settings.threshold, alpha=settings.ridge),
         feature_library=pysindy.PolynomialLibrary(settings.degree, include_bias=samples.constant),
     )
