@@ -70,7 +70,9 @@ def test_motions_without_mass_are_for_krylov_alone():
     mass, stiffness = diags_array([1.0, 2.0, 0.0], format="csc"), csc_array(np.eye(3) + 1.0)
     b, w = csc_array([[1.0], [0.0], [0.0]]), csc_array((3, 0))
     structure = SimpleNamespace(mass=mass, stiffness=stiffness, ports=b, dampers=w)
-    model = SimpleNamespace(name="plate", size=3, system=SimpleNamespace(structure=structure))
+    model = SimpleNamespace(
+        kind="structural", name="plate", size=3, system=SimpleNamespace(structure=structure)
+    )
     assert krylov.krylov_vectors(model, 1.0, 9).shape == (3, 2)
     with pytest.raises(InputError, match="plate has motions without mass"):
         balanced_truncation.METHOD.check(
@@ -84,7 +86,9 @@ def test_what_does_not_fit_is_refused(truck, monkeypatch):
     with pytest.raises(InputError, match="rank is 175; flexible_truck allows at most 174"):
         fitted(balanced_truncation, truck, rank=175)
     with pytest.raises(InputError, match="moments is 3; it allows at most 2"):
-        krylov.METHOD.check(SimpleNamespace(name="it", size=3), krylov.KrylovSettings(moments=3))
+        krylov.METHOD.check(
+            SimpleNamespace(kind="structural", name="it", size=3), krylov.KrylovSettings(moments=3)
+        )
     monkeypatch.setitem(sys.modules, "pymor.models.iosys", None)
     with pytest.raises(InputError, match=r'pip install "vehiclemor\[contenders\]"'):
         fitted(balanced_truncation, truck)

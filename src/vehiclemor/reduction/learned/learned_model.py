@@ -44,7 +44,7 @@ class LearnedSettings(Settings):
     """What all general learners share."""
 
     rank: int = Field(10, ge=1, le=100, description="principal components, at most")
-    steps: int = Field(4, ge=1, le=100, description="samples in the time between output times")
+    steps: int = Field(1, ge=1, le=100, description="samples in the time between output times")
     skipped: float = Field(
         1.5, ge=0.0, le=100.0, description="first seconds of a run that are not learned from"
     )
@@ -79,6 +79,16 @@ def polynomials(terms: Terms, coefficients: np.ndarray, arguments: int) -> Equat
         np.zeros(0),
         *nothing,
     )
+
+
+def stable_step(equations: Equations, r: int, longest: float) -> float:
+    """A whole part of a time step in s that is stable for the linear rates of r components."""
+    linear = np.zeros((r, r))
+    for term, row in zip(equations.terms, equations.coefficients, strict=True):
+        if 0 < term[0] <= r <= len(row) and not term[1:].any():
+            linear[term[0] - 1] = row[:r]
+    fastest = np.abs(np.linalg.eigvals(linear)).max()
+    return longest / float(np.clip(np.ceil(longest * fastest / STABLE), 1, MOST_STEPS))
 
 
 class Regression(NamedTuple):
@@ -183,19 +193,12 @@ class Learning:
             known = np.hstack([self.coordinates[0], s.inputs / self.input_scale])
             known = np.column_stack([known, np.ones(len(known))])
             outputs = np.linalg.lstsq(known, s.outputs, rcond=CUT)[0]
-        step = s.spacing
-        if not self.mapped and len(equations.coefficients):
-            speeds = np.zeros((r, r))
-            for term, row in zip(equations.terms, equations.coefficients, strict=True):
-                if 0 < term[0] <= r and not term[1:].any():
-                    speeds[term[0] - 1] = row[:r]
-            fastest = np.abs(np.linalg.eigvals(speeds)).max()
-            step /= np.clip(np.ceil(step * fastest / STABLE), 1, MOST_STEPS)
+        step = s.spacing if self.mapped else stable_step(equations, r, s.spacing)
         count = max(map(len, lifted), default=1)
         table = np.array([[*term, *[0] * (count - len(term))] for term in lifted], dtype=np.int64)
         cost = OfflineCost(time.process_time() - self.began, s.evaluations)
         return LearnedModel(
-            *(s.states, self.components, equations, float(step), self.mapped),
+            *(s.states, self.components, equations, step, self.mapped),
             *(self.input_scale, table.reshape(-1, count), outputs, cost),
         )
 

@@ -9,7 +9,7 @@ share nearly all that they compute, few rows cost nearly as much (see the findin
 
 import time
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -17,7 +17,9 @@ from pydantic import Field
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method, OfflineCost, installed
 from vehiclemor.reduction.projection import dynamic
+from vehiclemor.reduction.projection.bases import Rank
 from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, DynamicProjection
+from vehiclemor.reduction.settings import AT_MOST_COORDINATES
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.dynamic import DynamicModel
 
@@ -28,8 +30,10 @@ ROUNDING = 1e-8
 class DeimSettings(DynamicPodSettings):
     """Settings for equations of motion."""
 
-    rank: int = Field(11, ge=1, description="basis vectors of the states")
-    rows: int = Field(20, ge=1, description="rows of the equations, at least as many as the rank")
+    rank: Rank = 4
+    rows: Annotated[int, AT_MOST_COORDINATES] = Field(
+        14, ge=1, description="rows of the equations, at least as many as the rank"
+    )
     formulation: Literal["state"] = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
         "state", description="all states in one basis"
     )

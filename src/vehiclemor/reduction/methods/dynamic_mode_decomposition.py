@@ -15,6 +15,7 @@ from vehiclemor.reduction.learned.learned_model import (
     LearnedModel,
     LearnedSettings,
     Learning,
+    Terms,
     columns,
     monomials,
     polynomials,
@@ -29,11 +30,10 @@ class DynamicModeSettings(LearnedSettings):
     ridge: float = Field(1e-8, ge=0.0, description="weight of the matrices' size in the fit")
 
 
-def fit(model: Any, training: Training, settings: DynamicModeSettings) -> LearnedModel:
-    """Fit one linear step of all observables; `InputError` without scikit-learn."""
+def trained(learning: Learning, settings: DynamicModeSettings) -> tuple[Any, np.ndarray, Terms]:
+    """The library's linear step, the units of its arguments, and the observables."""
     with installed("dynamic_mode_decomposition", "scikit-learn"):
         from sklearn.linear_model import Ridge
-    learning = Learning.of(model, training, settings, mapped=True)
     s, r = learning.samples, len(learning.components.forward)
     observables = monomials(r, settings.degree, s.constant)
     values, following = (columns(observables, z) for z in learning.coordinates)
@@ -42,9 +42,15 @@ def fit(model: Any, training: Training, settings: DynamicModeSettings) -> Learne
     # Monomials are rare where they are large: each counts alike.
     scale = np.sqrt((arguments**2).mean(axis=0))
     linear = Ridge(settings.ridge * len(arguments), fit_intercept=False)
-    linear.fit(arguments / scale, results)
-    terms = monomials(arguments.shape[1], 1, constant=False)
-    equations = polynomials(terms, (linear.coef_ / scale).T, arguments.shape[1])
+    return linear.fit(arguments / scale, results), scale, observables
+
+
+def fit(model: Any, training: Training, settings: DynamicModeSettings) -> LearnedModel:
+    """One linear step of all observables, run by our loop; `InputError` without the library."""
+    learning = Learning.of(model, training, settings, mapped=True)
+    linear, scale, observables = trained(learning, settings)
+    terms = monomials(len(scale), 1, constant=False)
+    equations = polynomials(terms, (linear.coef_ / scale).T, len(scale))
     return learning.model(equations, observables)
 
 

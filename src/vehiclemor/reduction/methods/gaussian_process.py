@@ -9,11 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, installed
-from vehiclemor.reduction.learned.learned_model import (
-    LearnedModel,
-    LearnedSettings,
-    Learning,
-)
+from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
 from vehiclemor.reduction.training import Training
 
 # By which samples are taken.
@@ -28,22 +24,28 @@ class GaussianProcessSettings(LearnedSettings):
     noise: float = Field(1e-4, gt=0.0, description="variance of the noise, of the results' own")
 
 
-def fit(model: Any, training: Training, settings: GaussianProcessSettings) -> LearnedModel:
-    """Fit a linear step, then kernels on its residual; `InputError` without scikit-learn."""
+def trained(learning: Learning, settings: GaussianProcessSettings) -> tuple[Any, np.ndarray]:
+    """The library's process of what a linear step leaves, in units (m,) of that."""
     with installed("gaussian_process", "scikit-learn"):
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import RBF
-    learning = Learning.of(model, training, settings, mapped=model.kind != "ae")
-    (arguments, _), (equations, left) = learning.regression, learning.linear()
+    (arguments, _), (_, left) = learning.regression, learning.linear()
     order = np.random.default_rng(SEED).permutation(len(arguments))[: settings.samples]
     scale = np.maximum(left.std(axis=0), 1e-300)
     x, y = arguments[order], left[order] / scale
     # Lengths of largest likelihood are too short: samples lie densely along runs, not beside them.
     kernel: Any = RBF(settings.length)
     options: Any = {"alpha": settings.noise, "optimizer": None}
-    process = GaussianProcessRegressor(kernel, **options).fit(x, y)
+    return GaussianProcessRegressor(kernel, **options).fit(x, y), scale
+
+
+def fit(model: Any, training: Training, settings: GaussianProcessSettings) -> LearnedModel:
+    """A linear step and the library's kernels, run by our loop; `InputError` without it."""
+    learning = Learning.of(model, training, settings, mapped=model.kind != "ae")
+    (equations, _), (process, scale) = learning.linear(), trained(learning, settings)
+    x = process.X_train_
     lengths = np.full(x.shape[1], settings.length)
-    heights = np.ascontiguousarray(np.reshape(process.alpha_, y.shape) * scale)
+    heights = np.ascontiguousarray(np.reshape(process.alpha_, (len(x), len(scale))) * scale)
     parts = {"lengths": lengths, "centres": x / lengths, "heights": heights}
     return learning.model(equations._replace(**parts))
 

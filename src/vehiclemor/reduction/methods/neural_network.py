@@ -11,11 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, installed
-from vehiclemor.reduction.learned.learned_model import (
-    LearnedModel,
-    LearnedSettings,
-    Learning,
-)
+from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
 from vehiclemor.reduction.training import Training
 
 SEED = 0
@@ -30,17 +26,15 @@ class NeuralNetworkSettings(LearnedSettings):
     epochs: int = Field(60, ge=1, le=2000, description="passes over the samples, at most")
 
 
-def fit(model: Any, training: Training, settings: NeuralNetworkSettings) -> LearnedModel:
-    """Fit a linear step, then a network on its residual; `InputError` without scikit-learn."""
+def trained(learning: Learning, settings: NeuralNetworkSettings) -> tuple[Any, np.ndarray]:
+    """The library's network of what a linear step leaves, in units (m,) of that."""
     with installed("neural_network", "scikit-learn"):
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.neural_network import MLPRegressor
-    learning = Learning.of(model, training, settings, mapped=model.kind != "ae")
-    (arguments, _), (equations, left) = learning.regression, learning.linear()
+    (arguments, _), (_, left) = learning.regression, learning.linear()
     scale = np.maximum(left.std(axis=0), 1e-300)
-    hidden = (settings.width,) * settings.layers
     network = MLPRegressor(
-        hidden_layer_sizes=hidden,
+        hidden_layer_sizes=(settings.width,) * settings.layers,
         activation="tanh",
         alpha=settings.penalty,
         max_iter=settings.epochs,
@@ -49,11 +43,17 @@ def fit(model: Any, training: Training, settings: NeuralNetworkSettings) -> Lear
     with warnings.catch_warnings():
         # The number of epochs is a setting: validation judges what they have reached.
         warnings.simplefilter("ignore", ConvergenceWarning)
-        network.fit(arguments, left / scale)
+        return network.fit(arguments, left / scale), scale
+
+
+def fit(model: Any, training: Training, settings: NeuralNetworkSettings) -> LearnedModel:
+    """A linear step and the library's network, run by our loop; `InputError` without it."""
+    learning = Learning.of(model, training, settings, mapped=model.kind != "ae")
+    (equations, _), (network, scale) = learning.linear(), trained(learning, settings)
     weights, offsets = [*network.coefs_], [*network.intercepts_]
     weights[-1], offsets[-1] = weights[-1] * scale, offsets[-1] * scale
     flat = [part.ravel() for pair in zip(weights, offsets, strict=True) for part in pair]
-    widths = np.array([arguments.shape[1], *hidden, left.shape[1]], dtype=np.int64)
+    widths = np.array([len(weights[0]), *map(len, offsets)], dtype=np.int64)
     return learning.model(equations._replace(widths=widths, weights=np.concatenate(flat)))
 
 

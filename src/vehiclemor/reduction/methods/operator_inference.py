@@ -10,11 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, installed
-from vehiclemor.reduction.learned.learned_model import (
-    LearnedModel,
-    LearnedSettings,
-    Learning,
-)
+from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
 from vehiclemor.reduction.training import Training
 
 FORMS = {"linear": "AB", "bilinear": "ABN", "quadratic": "AHBN"}
@@ -29,18 +25,23 @@ class OperatorInferenceSettings(LearnedSettings):
     ridge: float = Field(1e-6, ge=0.0, description="weight of the operators' size in the fit")
 
 
-def fit(model: Any, training: Training, settings: OperatorInferenceSettings) -> LearnedModel:
-    """Fit the operators on the exact rates of the training runs; `InputError` without opinf."""
+def trained(learning: Learning, settings: OperatorInferenceSettings) -> Any:
+    """The library's model, fitted on the exact rates of the training runs."""
     with installed("operator_inference", "opinf"):
         import opinf
-    learning = Learning.of(model, training, settings, mapped=False)
-    arguments, results = learning.regression
-    r, u = len(learning.components.forward), learning.inputs.shape[1]
+    (arguments, results), r = learning.regression, len(learning.components.forward)
     form = "c" * learning.samples.constant + FORMS[settings.form]
     solver = opinf.lstsq.L2Solver(settings.ridge)
     library: Any = opinf.models.ContinuousModel(form, solver=solver)
     z, inputs = arguments[:, :r].T, arguments[:, r:].T
-    library.fit(states=z, ddts=results[:, :r].T, inputs=inputs)
+    return library.fit(states=z, ddts=results[:, :r].T, inputs=inputs)
+
+
+def fit(model: Any, training: Training, settings: OperatorInferenceSettings) -> LearnedModel:
+    """Operators by the library, run by our loop; `InputError` without opinf."""
+    learning = Learning.of(model, training, settings, mapped=False)
+    library, u = trained(learning, settings), learning.inputs.shape[1]
+    r, form = len(learning.components.forward), "c" * learning.samples.constant
     terms: dict[str, list[tuple[int, ...]]] = {
         "c": [()],
         "A": [(i,) for i in range(1, r + 1)],
@@ -49,7 +50,7 @@ def fit(model: Any, training: Training, settings: OperatorInferenceSettings) -> 
         "N": [(r + j, i) for j in range(1, u + 1) for i in range(1, r + 1)],
     }
     entries = [np.reshape(operator.entries, (r, -1)).T for operator in library.operators]
-    listed = [term for name in form for term in terms[name]]
+    listed = [term for name in form + FORMS[settings.form] for term in terms[name]]
     return learning.model(learning.with_motion(listed, np.vstack(entries)))
 
 

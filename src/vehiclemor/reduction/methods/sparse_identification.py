@@ -10,11 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, installed
-from vehiclemor.reduction.learned.learned_model import (
-    LearnedModel,
-    LearnedSettings,
-    Learning,
-)
+from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
 from vehiclemor.reduction.training import Training
 
 
@@ -27,11 +23,10 @@ class SparseIdentificationSettings(LearnedSettings):
     ridge: float = Field(1e-6, ge=0.0, description="weight of the coefficients' size in the fit")
 
 
-def fit(model: Any, training: Training, settings: SparseIdentificationSettings) -> LearnedModel:
-    """Fit on the exact rates of the training runs; `InputError` without PySINDy."""
+def trained(learning: Learning, settings: SparseIdentificationSettings) -> Any:
+    """The library's model, fitted on the exact rates of the training runs."""
     with installed("sparse_identification", "PySINDy"):
         import pysindy
-    learning = Learning.of(model, training, settings, mapped=False)
     arguments, results = learning.regression
     r, samples = len(learning.components.forward), learning.samples
     library: Any = pysindy.SINDy(
@@ -39,7 +34,13 @@ def fit(model: Any, training: Training, settings: SparseIdentificationSettings) 
         feature_library=pysindy.PolynomialLibrary(settings.degree, include_bias=samples.constant),
     )
     z, inputs = arguments[:, :r], arguments[:, r:]
-    library.fit(z, t=samples.spacing, x_dot=results[:, :r], u=inputs)
+    return library.fit(z, t=samples.spacing, x_dot=results[:, :r], u=inputs)
+
+
+def fit(model: Any, training: Training, settings: SparseIdentificationSettings) -> LearnedModel:
+    """Terms by the library, run by our loop; `InputError` without PySINDy."""
+    learning = Learning.of(model, training, settings, mapped=False)
+    library = trained(learning, settings)
     powers = np.asarray(library.feature_library.powers_)
     terms = [tuple(np.repeat(np.arange(1, len(row) + 1), row).tolist()) for row in powers]
     return learning.model(learning.with_motion(terms, library.coefficients().T))

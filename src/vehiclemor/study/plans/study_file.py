@@ -232,9 +232,7 @@ class StudyFile(FileSchema):
     """
 
     title: Line = Field(description="one line")
-    extends: str = Field(
-        "", description="study, or TOML file, that gives all that is not given here but its methods"
-    )
+    extends: str = Field("", description="study or file that gives all but methods, where not here")
     rows: list[str] = _list("labels of methods of the extended study that are rows here too")
     studies: list[str] = _list("of a collection: names of studies, or TOML files")
     model: str = Field("", description="registered name; needed for a grid")

@@ -163,7 +163,7 @@ def test_what_cannot_be_learned_is_said_in_one_line(car, runs, monkeypatch):
         learned(operator_inference, car, [runs[0], faster], steps=1)
     monkeypatch.setitem(sys.modules, "opinf", None)
     with pytest.raises(InputError, match=r'operator_inference needs opinf; .*\[contenders\]"'):
-        operator_inference.fit(car, runs, None)
+        vm.reduce(car, "operator_inference", training="lane_change")
     with pytest.raises(InputError, match="reduces kind"):
         vm.reduce("double_wishbone", "sparse_identification")
     with pytest.raises(InputError, match="rows is 3; it must be from rank 4 to 28"):
