@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -36,6 +37,34 @@ def protocol(tmp_path_factory, protocol_text):
     path = tmp_path_factory.mktemp("draws") / "small.toml"
     path.write_text(protocol_text)
     return load_protocol(str(path))
+
+
+def test_a_study_that_extends_another_has_its_sets_and_the_rows_it_names(
+    tmp_path, protocol_text, protocol, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.toml").write_text(protocol_text)
+    more = """
+        title = "more"
+        extends = "small.toml"
+        rows = ["replay", "newton"]
+        targets = []
+        methods = [{ label = "one vector", method = "fixed_basis", candidates = [{ rank = 1 }] }]
+    """
+    (tmp_path / "more.toml").write_text(more)
+    found = load_protocol("more.toml")
+    assert [entry.label for entry in found.entries] == ["replay", "newton", "one vector"]
+    assert (found.definition.title, found.definition.targets) == ("more", [])
+    assert found.test_set == protocol.test_set
+    assert (found.sets, sampled_sets(found)) == (protocol.sets, sampled_sets(protocol))
+    for old, new, words in (
+        ("replay", "rerun", "unknown row of the extended study 'rerun'"),
+        ("small.toml", "none.toml", "none.toml: no such file"),
+        ("small.toml", "other.toml", "other.toml extends a study itself"),
+    ):
+        (tmp_path / "other.toml").write_text(more.replace(old, new, 1))
+        with pytest.raises(FileError, match=re.escape(words)):
+            load_protocol("other.toml")
 
 
 # What the files of the package say

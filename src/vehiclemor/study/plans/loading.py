@@ -29,10 +29,12 @@ def read_study(path: Path) -> StudyFile:
     `FileError` if one of them is missing or wrong.
     """
     content = toml_content(path)
-    name, rows = content.pop("extends", ""), content.pop("rows", [])
-    if name:
+    rows = content.pop("rows", [])
+    if name := str(content.get("extends", "")):
         try:
-            base = toml_content(study_path(str(name)))
+            base = toml_content(study_path(name))
+            if "extends" in base:
+                raise InputError(f"{name} extends a study itself")
             entries = {e.get("label", e.get("method")): e for e in base.pop("methods", [])}
             methods = [entries[choice("row of the extended study", row, entries)] for row in rows]
         except InputError as error:

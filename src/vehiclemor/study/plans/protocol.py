@@ -93,8 +93,9 @@ class Protocol:
 
     @property
     def test_set(self) -> str:
-        """Name of its sampled test set, with the seed."""
-        return f"{self.path.stem}-{self.definition.version}, seed {self.seed}"
+        """Name of its sampled test set, with the seed; that of the study that it extends."""
+        name = Path(self.definition.extends or self.path).stem
+        return f"{name}-{self.definition.version}, seed {self.seed}"
 
 
 def protocol_names() -> dict[str, str]:
