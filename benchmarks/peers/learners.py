@@ -3,12 +3,14 @@
 Usage: python benchmarks/peers/learners.py [MODEL]
 
 Ten validation runs of a vehicle's protocol; CPU time of the thread.  The difference is that of the
-components, of magnitude 1, at the end of the runs: what is timed is the same model.
+components, of magnitude 1, at the end of the runs: what is timed is the same model.  Integrators of
+the libraries know nothing of break points of the inputs.
 """
 
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from itertools import pairwise
 from time import thread_time
 from typing import Any
 
@@ -42,7 +44,7 @@ def stepped(learning: Learning, fitted: Any, z: np.ndarray, times: np.ndarray, u
     library, scale, *_ = fitted
     (equations, _), r, path = learning.linear(), len(z), [z]
     names = monomials(len(equations.lengths), 1, constant=False)
-    for now, after in zip(times, times[1:], strict=False):
+    for now, after in pairwise(times):
         v = np.concatenate([path[-1], u(now), u(after)])[None]
         if hasattr(library, "coef_"):
             change = library.predict(v / scale)
