@@ -1,0 +1,132 @@
+/* CVODE of SUNDIALS (BDF, dense) on an exported model: a run, a step, a batch, all in C.
+   The wheel that brings the libraries has no headers: the few prototypes are declared here. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "vehiclemor_model.h"
+
+#define N VEHICLEMOR_STATES
+#define U VEHICLEMOR_INPUTS
+typedef void *Any;
+typedef int (*Rhs)(double, Any, Any, Any);
+int SUNContext_Create(int, Any *);
+Any N_VNew_Serial(int, Any);
+double *N_VGetArrayPointer(Any);
+Any SUNDenseMatrix(int, int, Any);
+Any SUNLinSol_Dense(Any, Any, Any);
+Any CVodeCreate(int, Any);
+int CVodeInit(Any, Rhs, double, Any), CVodeReInit(Any, double, Any), CVodeSetUserData(Any, Any);
+int CVodeSVtolerances(Any, double, Any), CVodeSetLinearSolver(Any, Any, Any);
+int CVodeSetMaxNumSteps(Any, long), CVodeSetStopTime(Any, double);
+int CVode(Any, double, Any, double *, int), CVodeGetNumRhsEvals(Any, long *);
+int CVodeGetNumLinRhsEvals(Any, long *), CVodeGetNumSteps(Any, long *);
+int CVodeGetNumJacEvals(Any, long *);
+
+typedef struct {
+    Any cvode, state, tolerances;
+    double size, rate, begin, u[U], c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
+    int moves;
+    long counts[4]; /* right-hand sides of steps, of Jacobians, steps, Jacobians */
+} Solver;
+
+static int rhs(double t, Any x, Any dx, Any data)
+{
+    Solver *s = data;
+    if (s->moves) {
+        const double a = s->rate * (t - s->begin);
+        s->u[0] = s->size * (sin(a) - 0.5 * sin(2.0 * a));
+        if (U > 1) {
+            s->u[U > 1] = s->size * s->rate * (cos(a) - cos(2.0 * a));
+            s->u[U - 1] = s->size * s->rate * s->rate * (2.0 * sin(2.0 * a) - sin(a));
+        }
+    }
+    vehiclemor_derivative(N_VGetArrayPointer(x), s->u, s->c, N_VGetArrayPointer(dx));
+    return 0;
+}
+
+Any make(void)
+{
+    Solver *s = calloc(1, sizeof *s);
+    Any context, matrix;
+    SUNContext_Create(0, &context);
+    s->state = N_VNew_Serial(N, context);
+    s->tolerances = N_VNew_Serial(N, context);
+    vehiclemor_constants(vehiclemor_parameters, s->c);
+    memcpy(N_VGetArrayPointer(s->state), vehiclemor_start_equilibrium, N * sizeof(double));
+    s->cvode = CVodeCreate(2, context); /* CV_BDF */
+    CVodeInit(s->cvode, rhs, 0.0, s->state);
+    CVodeSetUserData(s->cvode, s);
+    matrix = SUNDenseMatrix(N, N, context);
+    for (int i = 0; i < N; i++)
+        N_VGetArrayPointer(s->tolerances)[i] = 1e-3;
+    CVodeSVtolerances(s->cvode, 1e-3, s->tolerances);
+    CVodeSetLinearSolver(s->cvode, SUNLinSol_Dense(s->state, matrix, context), matrix);
+    CVodeSetMaxNumSteps(s->cvode, 1000000);
+    return s;
+}
+
+void tolerance(Solver *s, double relative, const double *scale)
+{
+    double *a = N_VGetArrayPointer(s->tolerances);
+    for (int i = 0; i < N; i++)
+        a[i] = relative * scale[i];
+    CVodeSVtolerances(s->cvode, relative, s->tolerances);
+}
+
+static void count(Solver *s)
+{
+    long more[4];
+    CVodeGetNumRhsEvals(s->cvode, more);
+    CVodeGetNumLinRhsEvals(s->cvode, more + 1);
+    CVodeGetNumSteps(s->cvode, more + 2);
+    CVodeGetNumJacEvals(s->cvode, more + 3);
+    for (int i = 0; i < 4; i++)
+        s->counts[i] += more[i];
+}
+
+/* States, or the lateral position alone if `column` isn't negative, at the times [0, edges[3]];
+   outputs as well unless there is no room for them. */
+int run(Solver *s, const double *pulse, const double *times, const int *edges, int column,
+        double *states, double *outputs, long *counts)
+{
+    double *x = N_VGetArrayPointer(s->state), t;
+    int failed = 0;
+    s->size = pulse[0], s->rate = pulse[1], s->begin = pulse[2];
+    memset(s->counts, 0, sizeof s->counts);
+    memcpy(x, vehiclemor_start_equilibrium, N * sizeof(double));
+    for (int part = 0; part < 3 && !failed; part++) {
+        s->moves = part == 1;
+        memset(s->u, 0, sizeof s->u);
+        CVodeReInit(s->cvode, times[edges[part]], s->state);
+        CVodeSetStopTime(s->cvode, times[edges[part + 1]]);
+        for (int k = edges[part]; k <= edges[part + 1] && !failed; k++) {
+            if (k > edges[part])
+                failed = CVode(s->cvode, times[k], s->state, &t, 1) < 0;
+            if (column < 0)
+                memcpy(states + (size_t)k * N, x, N * sizeof(double));
+            else
+                states[k] = x[column];
+            if (outputs)
+                vehiclemor_outputs(x, s->u, s->c, outputs + (size_t)k * VEHICLEMOR_OUTPUTS);
+        }
+        count(s);
+    }
+    memcpy(counts, s->counts, sizeof s->counts);
+    return failed;
+}
+
+/* One step with held inputs. */
+int step(Solver *s, double *state, const double *u, double dt)
+{
+    double *x = N_VGetArrayPointer(s->state), t;
+    int failed;
+    s->moves = 0;
+    memcpy(s->u, u, sizeof s->u);
+    memcpy(x, state, N * sizeof(double));
+    CVodeReInit(s->cvode, 0.0, s->state);
+    CVodeSetStopTime(s->cvode, dt);
+    failed = CVode(s->cvode, dt, s->state, &t, 1) < 0;
+    memcpy(state, x, N * sizeof(double));
+    return failed;
+}
