@@ -26,7 +26,7 @@ from vehiclemor.registry import component
 
 # Length (s) of calls from which on they aren't repeated within a round, from which on rounds are
 # few, and beyond which no tighter tolerance of a curve is tried.
-SHORT, LONG, TOO_LONG = 5e-3, 0.15, 1.2
+SHORT, LONG, TOO_LONG = 5e-3, 0.05, 1.2
 ROUNDS, ROUNDS_OF_LONG, REPEATS = 9, 3, 4
 # Above (times the loosest target) nothing is timed.
 FAR_OFF = 10.0
@@ -209,7 +209,8 @@ def measured(curves: Mapping[str, Curve], case: Case, tell: Callable = print) ->
         for turn in range(ROUNDS):
             for point, call in ready:
                 expected = point["seconds"][0]
-                if turn < (ROUNDS_OF_LONG if expected > LONG else ROUNDS):
+                rounds = ROUNDS_OF_LONG if expected > LONG else ROUNDS
+                if turn < (1 if expected > TOO_LONG else rounds):
                     point["seconds"].append(seconds_of(call, expected, clock))
     finally:
         gc.enable()
@@ -327,7 +328,7 @@ def structure() -> Case:
     """Ride of the truck over a rough road, outputs as part of their ranges, by step size."""
     model, maneuver = vm.model("flexible_truck"), vm.maneuver("road")
     maneuver = replace(maneuver, duration=2.5, samples=251)
-    exact = model.run(maneuver, step=2.5e-3 / 128).outputs
+    exact = model.run(maneuver, step=10e-3 / 256).outputs
     ranges = np.ptp(exact, axis=0)
     steps = [10e-3 / count for count in (2, 4, 8, 16, 32)]
     title = f"flexible_truck, {model.size} coordinates, road, 2.5 s, by step size"
