@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import sksundae
-from clock import Case, Curve, decades
+from clock import COMPILER, Case, Curve, decades
 
 import vehiclemor as vm
 from vehiclemor.inputs import steering
@@ -24,6 +24,8 @@ FLAGS = ("-O3", "-march=native", "-shared", "-fPIC", "-w")
 @cache
 def compiled(name: str) -> ctypes.CDLL:
     """The library of a model."""
+    if COMPILER is None:
+        raise FileNotFoundError("no C compiler")
     wheel = Path(sksundae.__file__).parents[1] / "scikit_sundae.libs"
     libraries = [next(wheel.glob(f"libsundials_{part}-*")) for part in LIBRARIES]
     with tempfile.TemporaryDirectory() as folder:
@@ -31,7 +33,7 @@ def compiled(name: str) -> ctypes.CDLL:
         parts = [Path(__file__).with_name("cvode.c"), source / "vehiclemor_model.c"]
         made = Path(folder) / "peer.so"
         link = [*libraries, f"-Wl,-rpath,{wheel}", "-lm"]
-        subprocess.run(["cc", *FLAGS, f"-I{source}", *parts, *link, "-o", made], check=True)  # noqa: S603, S607
+        subprocess.run([COMPILER, *FLAGS, f"-I{source}", *parts, *link, "-o", made], check=True)  # noqa: S603
         library = ctypes.CDLL(str(made))
     library.make.restype = ctypes.c_void_p
     return library
@@ -60,6 +62,7 @@ def pulse(case: Case, amplitude: float = 1.0, speed: float = 1.0) -> np.ndarray:
 
 def run(case: Case) -> dict[str, Curve]:
     """Whole runs: states alone, and all outputs beside them."""
+    compiled(case.model.name)
     times, counts = case.maneuver.times, np.zeros(4, dtype=np.int64)
     edges = np.array([0, *(last for _, last, _ in case.spans())], dtype=np.int32)
     given, shape = pulse(case), (len(times), len(case.start))
@@ -89,6 +92,7 @@ def run(case: Case) -> dict[str, Curve]:
 
 def steps(case: Case) -> dict[str, Curve]:
     """A loop in Python over steps in C, each of which starts afresh."""
+    compiled(case.model.name)
 
     def make(tolerance: float) -> Any:
         library, own = solver(case, tolerance)
@@ -110,6 +114,7 @@ def steps(case: Case) -> dict[str, Curve]:
 
 def batch(case: Case) -> dict[str, Curve]:
     """Run after run."""
+    compiled(case.model.name)
     counts = np.zeros(4, dtype=np.int64)
 
     def make(tolerance: float) -> Any:

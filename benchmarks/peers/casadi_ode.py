@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from clock import Case, Curve, decades, pulse
+from clock import COMPILER, Case, Curve, decades, pulse
 
 import vehiclemor as vm
 from vehiclemor.exporting.export import system_of
@@ -34,7 +34,16 @@ def translated(function: ca.Function) -> ca.Function:
         generator.add(function)
         generator.add(function.jacobian())
         generator.generate(f"{folder}/")
-        command = ["cc", "-O2", "-march=native", "-fPIC", "-shared", "peer.c", "-o", "peer.so"]
+        command = [
+            str(COMPILER),
+            "-O2",
+            "-march=native",
+            "-fPIC",
+            "-shared",
+            "peer.c",
+            "-o",
+            "peer.so",
+        ]
         subprocess.run(command, cwd=folder, check=True)  # noqa: S603
         return ca.external("rates", str(Path(folder, "peer.so")))
 
@@ -63,10 +72,11 @@ def run(case: Case) -> dict[str, Curve]:
 
         return lambda: case.by_parts(part)
 
-    read, scan = (lambda states: states[:, case.lateral]), decades(1e-2, 1e-9)
+    read = lambda states: states[:, case.lateral]  # noqa: E731
     return {
-        label: Curve(partial(make, compiled=compiled), scan, read)
+        label: Curve(partial(make, compiled=compiled), decades(1e-2, 1e-9, 2 + 2 * compiled), read)
         for label, compiled in LABELS.items()
+        if COMPILER or not compiled
     }
 
 

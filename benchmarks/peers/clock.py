@@ -8,6 +8,8 @@ import gc
 import importlib
 import json
 import math
+import os
+import shutil
 import statistics
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,9 +29,15 @@ from vehiclemor.registry import component
 # Length (s) of calls from which on they aren't repeated within a round, from which on rounds are
 # few, and beyond which no tighter tolerance of a curve is tried.
 SHORT, LONG, TOO_LONG = 5e-3, 0.05, 1.2
-ROUNDS, ROUNDS_OF_LONG, REPEATS = 9, 3, 4
+ROUNDS, ROUNDS_OF_LONG, REPEATS = 9, 2, 4
+# Where peers have what they generate compiled; none without a compiler.
+COMPILER = shutil.which(os.environ.get("CC", "cc"))
 # Above (times the loosest target) nothing is timed.
 FAR_OFF = 10.0
+
+
+class LeftOutError(Exception):
+    """Why a peer has no curve for a case."""
 
 
 class Curve(NamedTuple):
@@ -167,6 +175,8 @@ def collected(peers: Iterable[str], case: Case) -> tuple[dict[str, Curve], dict[
             continue
         try:
             curves |= getattr(peer, case.kind, lambda _: {})(case)
+        except LeftOutError as error:
+            missing[name] = str(error)
         except Exception as error:  # noqa: BLE001  (what a peer raises is a row, no crash)
             missing[name] = f"failed: {type(error).__name__}: {error}".splitlines()[0]
     return curves, missing

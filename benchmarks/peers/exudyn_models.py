@@ -3,9 +3,14 @@
 from typing import Any
 
 import exudyn as exu
-import exudyn.itemInterface as item
 import numpy as np
 from clock import Case, Curve, decades
+from exudyn.itemInterface import (
+    MarkerBodyRigid,
+    NodeGenericODE2,
+    ObjectGenericODE2,
+    ObjectJointGeneric,
+)
 from exudyn.rigidBodyUtilities import RigidBodyInertia
 from scipy.sparse import csr_matrix, diags_array
 
@@ -40,14 +45,14 @@ def mechanism(case: Case) -> dict[str, Curve]:
                 localPosition1=outer - points["wheel_centre"],
                 distance=float(np.linalg.norm(outer - inner)),
             )
-            fixed = mbs.AddMarker(item.MarkerBodyRigid(bodyNumber=ground, localPosition=place))
-            wheel = mbs.AddMarker(item.MarkerBodyRigid(bodyNumber=carrier))
+            fixed = mbs.AddMarker(MarkerBodyRigid(bodyNumber=ground, localPosition=place))
+            wheel = mbs.AddMarker(MarkerBodyRigid(bodyNumber=carrier))
 
             def height(_mbs: Any, t: float, _item: int, _parameters: Any) -> list[float]:
                 return [0.0, 0.0, heights[round(t * (len(times) - 1))], 0.0, 0.0, 0.0]
 
             mbs.AddObject(
-                item.ObjectJointGeneric(
+                ObjectJointGeneric(
                     markerNumbers=[fixed, wheel],
                     constrainedAxes=[0, 0, 1, 0, 0, 0],
                     offsetUserFunction=height,
@@ -112,7 +117,7 @@ def structure(case: Case) -> dict[str, Curve]:
         def march() -> np.ndarray:
             mbs, zeros = exu.SystemContainer().AddSystem(), np.zeros(n)
             node = mbs.AddNode(
-                item.NodeGenericODE2(
+                NodeGenericODE2(
                     referenceCoordinates=zeros,
                     initialCoordinates=zeros,
                     initialCoordinates_t=zeros,
@@ -120,7 +125,7 @@ def structure(case: Case) -> dict[str, Curve]:
                 )
             )
             mbs.AddObject(
-                item.ObjectGenericODE2(
+                ObjectGenericODE2(
                     nodeNumbers=[node],
                     massMatrix=container(s.mass),
                     stiffnessMatrix=container(s.stiffness),
@@ -134,7 +139,10 @@ def structure(case: Case) -> dict[str, Curve]:
             def record(mbs: Any, t: float) -> bool:
                 if round(t / h) % every == 0:
                     data = mbs.systemData
-                    q, v = np.array(data.GetODE2Coordinates()), np.array(data.GetODE2Coordinates_t())
+                    q, v = (
+                        np.array(data.GetODE2Coordinates()),
+                        np.array(data.GetODE2Coordinates_t()),
+                    )
                     forces = at(t, q, v)[:, 0] + law.static[1]
                     a = np.array(data.GetODE2Coordinates_tt())
                     found[round(t / spacing)] = cq @ q + cv @ v + ca @ a + cf @ forces

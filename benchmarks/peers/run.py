@@ -17,18 +17,30 @@ import report
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.provenance import machine
 
-# Files of peers -> distributions that they need; the first is ours.
+VEHICLE, PARTS = ("run", "steps", "batch"), ("mechanism", "structure")
+# File of a peer -> distributions that it needs, and the kinds of cases that it can do.
 PEERS = {
-    "ours": ("vehiclemor", "numba", "numpy"),
-    "c_cvode": ("scikit-sundae",),
-    "sundae": ("scikit-sundae",),
-    "casadi_ode": ("casadi",),
-    "scipy_ode": ("scipy",),
-    "jax_diffrax": ("jax", "diffrax"),
-    "structures": ("scipy", "pymor"),
-    "exudyn_models": ("exudyn",),
-    "mujoco_scene": ("mujoco",),
-    "commonroad": ("commonroad-vehicle-models",),
+    "ours": (("vehiclemor", "numpy", "numba"), (*VEHICLE, *PARTS)),
+    "c_cvode": (("scikit-sundae",), VEHICLE),
+    "sundae": (("scikit-sundae",), ("run", "steps")),
+    "casadi_ode": (("casadi",), ("run", "steps", "mechanism")),
+    "scipy_ode": (("scipy",), ("run", "mechanism")),
+    "jax_diffrax": (("jax", "diffrax"), ("batch",)),
+    "structures": (("scipy",), ("structure",)),
+    "exudyn_models": (("exudyn",), PARTS),
+    "mujoco_scene": (("mujoco",), ("context",)),
+    "commonroad": (("commonroad-vehicle-models",), ("context",)),
+}
+NO_TIRES = "no Magic Formula and no Fiala tire: its car would be another one"
+# Kind -> tools that a user would think of, and why they are no row.
+CANNOT = {
+    "run": {
+        "Exudyn": NO_TIRES,
+        "MuJoCo": f"{NO_TIRES}; constraints and contacts are soft",
+        "pyMOR": "no integrator for nonlinear equations but Euler's",
+    },
+    "mechanism": {"MuJoCo": "constraints are soft: errors do not fall with a tolerance"},
+    "structure": {"pyMOR": "linear; springs, stops and tires of the truck are not"},
 }
 CONTEXT = "other-vehicles"
 PANELS = {"run": "a run", "steps": "a step of 10 ms", "batch": "a run of a batch"}
@@ -37,7 +49,8 @@ PANELS = {"run": "a run", "steps": "a step of 10 ms", "batch": "a run of a batch
 def compared(name: str) -> dict[str, Any]:
     """Measure one comparison."""
     case = clock.cases()[name]()
-    curves, missing = clock.collected(PEERS, case)
+    names = [peer for peer, (_, kinds) in PEERS.items() if case.kind in kinds]
+    curves, missing = clock.collected(names, case)
     content: dict[str, Any] = {
         "title": case.title,
         "panel": PANELS.get(case.kind, case.title),
@@ -47,12 +60,14 @@ def compared(name: str) -> dict[str, Any]:
     }
     if "per" in case.more:
         content["per"] = case.more["per"]
+    missing |= CANNOT.get(case.kind, {})
     return content | {"curves": clock.measured(curves, case), "missing": missing}
 
 
 def others() -> dict[str, Any]:
     """Time other vehicles and scenes of other tools: no comparison, since nothing is equal."""
-    found, missing = clock.others(PEERS)
+    scenes = [peer for peer, (_, kinds) in PEERS.items() if "context" in kinds]
+    found, missing = clock.others(scenes)
     title = "Other vehicles, for scale alone: none of them is one of ours"
     return {"title": title, "clock": "CPU time of the process", "rows": found, "missing": missing}
 
@@ -73,7 +88,7 @@ def main() -> None:
         print(f"{name} ({time.monotonic() - began:.0f} s)", flush=True)
         found = others() if name == CONTEXT else compared(name)
         date = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
-        packages = sorted({package for needed in PEERS.values() for package in needed})
+        packages = sorted({package for needed, _ in PEERS.values() for package in needed})
         found |= {"about": f"{machine()}; {date}", "versions": clock.versions(packages)}
         clock.store(path, content | {name: found})
     content = clock.stored(path)

@@ -28,7 +28,7 @@ def run(case: Case) -> dict[str, Curve]:
 
         return lambda: case.by_parts(part)
 
-    read, scan = (lambda states: states[:, case.lateral]), decades(1e-3, 1e-9, 2)
+    read, scan = (lambda states: states[:, case.lateral]), decades(1e-3, 1e-8, 2)
     labels = {"SciPy odeint": "odeint"} | {f"SciPy {method}": method for method in METHODS}
     return {
         label: Curve(partial(make, method=method), scan, read) for label, method in labels.items()
