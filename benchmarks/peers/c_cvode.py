@@ -1,6 +1,7 @@
 """CVODE all in C: the exported model, compiled with about a hundred lines around SUNDIALS.
 
-The libraries are those inside the wheel of scikit-sundae; a C compiler is needed.
+The libraries are those inside the wheel of scikit-sundae; a C compiler is needed.  The right-hand
+side is the exported one, or that of `model.bare`, whose address a user may pass on as well.
 """
 
 import ctypes
@@ -19,6 +20,7 @@ from vehiclemor.inputs import steering
 
 LIBRARIES = ("core", "cvode", "nvecserial", "sunmatrixdense", "sunlinsoldense")
 FLAGS = ("-O3", "-march=native", "-shared", "-fPIC", "-w")
+BARE = "CVODE in C, bare rhs"
 
 
 @cache
@@ -36,20 +38,21 @@ def compiled(name: str) -> ctypes.CDLL:
         subprocess.run([COMPILER, *FLAGS, f"-I{source}", *parts, *link, "-o", made], check=True)  # noqa: S603
         library = ctypes.CDLL(str(made))
     library.make.restype = ctypes.c_void_p
+    library.calls.restype = ctypes.c_long
     return library
 
 
-def solver(case: Case, tolerance: float) -> tuple[ctypes.CDLL, ctypes.c_void_p]:
+def address(array: np.ndarray | None) -> ctypes.c_void_p:
+    """Address of an array, which must live on; none of no array."""
+    return ctypes.c_void_p(None if array is None else array.ctypes.data)
+
+
+def solver(case: Case, tolerance: float, bare: bool) -> tuple[ctypes.CDLL, ctypes.c_void_p]:
     """A solver with its memory, which all runs share."""
-    library = compiled(case.model.name)
-    own = ctypes.c_void_p(library.make())
-    library.tolerance(own, ctypes.c_double(tolerance), pointer(case.model.error_scale))
-    return library, own
-
-
-def pointer(array: np.ndarray) -> ctypes.c_void_p:
-    """Address of an array, which must live on."""
-    return ctypes.c_void_p(array.ctypes.data)
+    library, rhs = compiled(case.model.name), case.model.bare("rhs")
+    how = ctypes.c_double(tolerance), address(case.model.error_scale)
+    rates = ctypes.c_void_p(rhs.address if bare else None)
+    return library, ctypes.c_void_p(library.make(rates, address(rhs.constants), *how))
 
 
 def pulse(case: Case, amplitude: float = 1.0, speed: float = 1.0) -> np.ndarray:
@@ -63,30 +66,28 @@ def pulse(case: Case, amplitude: float = 1.0, speed: float = 1.0) -> np.ndarray:
 def run(case: Case) -> dict[str, Curve]:
     """Whole runs: states alone, and all outputs beside them."""
     compiled(case.model.name)
-    times, counts = case.maneuver.times, np.zeros(4, dtype=np.int64)
+    times, given = case.maneuver.times, pulse(case)
     edges = np.array([0, *(last for _, last, _ in case.spans())], dtype=np.int32)
-    given, shape = pulse(case), (len(times), len(case.start))
 
-    def make(tolerance: float, outputs: bool) -> Any:
-        library, own = solver(case, tolerance)
-        fixed = own, pointer(given), pointer(times), pointer(edges), -1
+    def make(tolerance: float, bare: bool = True, outputs: bool = False) -> Any:
+        library, own = solver(case, tolerance, bare)
 
-        def whole() -> tuple[np.ndarray, np.ndarray]:
-            states, found = np.empty(shape), None
+        def whole() -> tuple[np.ndarray, int]:
+            states, found = np.empty((len(times), len(case.start))), None
             if outputs:
                 found = np.empty((len(times), len(case.model.outputs)))
-            address = None if found is None else pointer(found)
-            if library.run(*fixed, pointer(states), address, pointer(counts)):
+            arrays = map(address, (given, times, edges))
+            if library.run(own, *arrays, -1, address(states), address(found)):
                 raise ArithmeticError("CVODE failed")
-            return states, counts.copy()
+            return states, library.calls(own)
 
         return whole
 
-    read, scan = (lambda r: r[0][:, case.lateral]), decades(1e-2, 1e-9)
-    evaluations = lambda r: r[1][:2].sum()  # noqa: E731
+    read, scan, calls = (lambda r: r[0][:, case.lateral]), decades(1e-2, 1e-9), lambda r: r[1]
     return {
-        "CVODE in C": Curve(partial(make, outputs=False), scan, read, "states", evaluations),
-        "CVODE in C, outputs": Curve(partial(make, outputs=True), scan, read, "outputs"),
+        "CVODE in C": Curve(partial(make, bare=False), scan, read, counts=calls),
+        BARE: Curve(make, scan, read, counts=calls),
+        f"{BARE}, outputs": Curve(partial(make, outputs=True), scan, read, "outputs", calls),
     }
 
 
@@ -95,55 +96,45 @@ def steps(case: Case) -> dict[str, Curve]:
     compiled(case.model.name)
 
     def make(tolerance: float) -> Any:
-        library, own = solver(case, tolerance)
+        library, own = solver(case, tolerance, bare=True)
         length, state = ctypes.c_double(0.01), case.start
-        inputs = [(u, pointer(u)) for u in case.more["held"]]
+        inputs = [(u, address(u)) for u in case.more["held"]]
 
         def loop() -> np.ndarray:
             state[:] = case.start
-            found, address = np.empty(len(case.reference)), pointer(state)
+            found, place = np.empty(len(case.reference)), address(state)
             for k, (_, u) in enumerate(inputs):
-                library.step(own, address, u, length)
+                library.step(own, place, u, length)
                 found[k] = state[case.lateral]
             return found
 
         return loop
 
-    return {"CVODE in C": Curve(make, decades(1e-1, 1e-7, 2), np.asarray)}
+    return {BARE: Curve(make, decades(1e-1, 1e-7, 2), np.asarray)}
 
 
 def batch(case: Case) -> dict[str, Curve]:
     """Run after run."""
     compiled(case.model.name)
-    counts = np.zeros(4, dtype=np.int64)
+    runs = []
+    for signal in case.more["signals"]:
+        times = np.union1d(signal.times, signal.break_points)
+        ends = [0.0, *signal.break_points, signal.duration]
+        edges = np.searchsorted(times, ends).astype(np.int32)
+        given = pulse(case, signal.amplitude_factor, signal.frequency_factor)
+        runs.append((np.isin(times, signal.times), (given, times, edges)))
 
     def make(tolerance: float) -> Any:
-        library, own = solver(case, tolerance)
-        runs = []
-        for signal in case.more["signals"]:
-            begin = [steering.BEGIN, steering.BEGIN + steering.LANE_CHANGE_LENGTH]
-            breaks = [begin[0], begin[0] + (begin[1] - begin[0]) / signal.frequency_factor]
-            times = np.union1d(signal.times, breaks)
-            edges = np.searchsorted(times, [0.0, *breaks, signal.duration]).astype(np.int32)
-            kept = np.isin(times, signal.times)
-            given = pulse(case, signal.amplitude_factor, signal.frequency_factor)
-            runs.append((given, times, edges, kept))
+        library, own = solver(case, tolerance, bare=True)
 
         def all_runs() -> np.ndarray:
             found = np.empty(case.reference.shape)
-            for row, (given, times, edges, kept) in zip(found, runs, strict=True):
-                all_times = np.empty(len(times))
-                library.run(
-                    own,
-                    *map(pointer, (given, times, edges)),
-                    case.lateral,
-                    pointer(all_times),
-                    None,
-                    pointer(counts),
-                )
-                row[:] = all_times[kept]
+            for row, (kept, arrays) in zip(found, runs, strict=True):
+                lateral, given = np.empty(len(kept)), map(address, arrays)
+                library.run(own, *given, case.lateral, address(lateral), address(None))
+                row[:] = lateral[kept]
             return found
 
         return all_runs
 
-    return {"CVODE in C": Curve(make, decades(1e-2, 1e-7, 2), np.asarray, "lateral position")}
+    return {BARE: Curve(make, decades(1e-3, 1e-9, 2), np.asarray, "lateral position")}

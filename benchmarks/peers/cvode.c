@@ -10,6 +10,7 @@
 #define U VEHICLEMOR_INPUTS
 typedef void *Any;
 typedef int (*Rhs)(double, Any, Any, Any);
+typedef void (*Rates)(const double *, const double *, const double *, double *);
 int SUNContext_Create(int, Any *);
 Any N_VNew_Serial(int, Any);
 double *N_VGetArrayPointer(Any);
@@ -19,15 +20,16 @@ Any CVodeCreate(int, Any);
 int CVodeInit(Any, Rhs, double, Any), CVodeReInit(Any, double, Any), CVodeSetUserData(Any, Any);
 int CVodeSVtolerances(Any, double, Any), CVodeSetLinearSolver(Any, Any, Any);
 int CVodeSetMaxNumSteps(Any, long), CVodeSetStopTime(Any, double);
-int CVode(Any, double, Any, double *, int), CVodeGetNumRhsEvals(Any, long *);
-int CVodeGetNumLinRhsEvals(Any, long *), CVodeGetNumSteps(Any, long *);
-int CVodeGetNumJacEvals(Any, long *);
+int CVode(Any, double, Any, double *, int);
+int CVodeGetNumRhsEvals(Any, long *), CVodeGetNumLinRhsEvals(Any, long *);
 
 typedef struct {
-    Any cvode, state, tolerances;
+    Any cvode, state;
+    Rates rates;
+    const double *constants;
     double size, rate, begin, u[U], c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
     int moves;
-    long counts[4]; /* right-hand sides of steps, of Jacobians, steps, Jacobians */
+    long calls; /* of the right-hand side, those for Jacobians too */
 } Solver;
 
 static int rhs(double t, Any x, Any dx, Any data)
@@ -41,59 +43,44 @@ static int rhs(double t, Any x, Any dx, Any data)
             s->u[U - 1] = s->size * s->rate * s->rate * (2.0 * sin(2.0 * a) - sin(a));
         }
     }
-    vehiclemor_derivative(N_VGetArrayPointer(x), s->u, s->c, N_VGetArrayPointer(dx));
+    s->rates(N_VGetArrayPointer(x), s->u, s->constants, N_VGetArrayPointer(dx));
     return 0;
 }
 
-Any make(void)
+/* A solver of the exported right-hand side, or of another one with its constants. */
+Any make(Rates rates, const double *constants, double tolerance, const double *scale)
 {
     Solver *s = calloc(1, sizeof *s);
-    Any context, matrix;
+    Any context, matrix, tolerances;
     SUNContext_Create(0, &context);
     s->state = N_VNew_Serial(N, context);
-    s->tolerances = N_VNew_Serial(N, context);
+    tolerances = N_VNew_Serial(N, context);
+    for (int i = 0; i < N; i++)
+        N_VGetArrayPointer(tolerances)[i] = tolerance * scale[i];
     vehiclemor_constants(vehiclemor_parameters, s->c);
+    s->rates = rates ? rates : vehiclemor_derivative;
+    s->constants = rates ? constants : s->c;
     memcpy(N_VGetArrayPointer(s->state), vehiclemor_start_equilibrium, N * sizeof(double));
     s->cvode = CVodeCreate(2, context); /* CV_BDF */
     CVodeInit(s->cvode, rhs, 0.0, s->state);
     CVodeSetUserData(s->cvode, s);
+    CVodeSVtolerances(s->cvode, tolerance, tolerances);
     matrix = SUNDenseMatrix(N, N, context);
-    for (int i = 0; i < N; i++)
-        N_VGetArrayPointer(s->tolerances)[i] = 1e-3;
-    CVodeSVtolerances(s->cvode, 1e-3, s->tolerances);
     CVodeSetLinearSolver(s->cvode, SUNLinSol_Dense(s->state, matrix, context), matrix);
     CVodeSetMaxNumSteps(s->cvode, 1000000);
     return s;
 }
 
-void tolerance(Solver *s, double relative, const double *scale)
-{
-    double *a = N_VGetArrayPointer(s->tolerances);
-    for (int i = 0; i < N; i++)
-        a[i] = relative * scale[i];
-    CVodeSVtolerances(s->cvode, relative, s->tolerances);
-}
-
-static void count(Solver *s)
-{
-    long more[4];
-    CVodeGetNumRhsEvals(s->cvode, more);
-    CVodeGetNumLinRhsEvals(s->cvode, more + 1);
-    CVodeGetNumSteps(s->cvode, more + 2);
-    CVodeGetNumJacEvals(s->cvode, more + 3);
-    for (int i = 0; i < 4; i++)
-        s->counts[i] += more[i];
-}
-
 /* States, or the lateral position alone if `column` isn't negative, at the times [0, edges[3]];
    outputs as well unless there is no room for them. */
 int run(Solver *s, const double *pulse, const double *times, const int *edges, int column,
-        double *states, double *outputs, long *counts)
+        double *states, double *outputs)
 {
     double *x = N_VGetArrayPointer(s->state), t;
+    long calls[2];
     int failed = 0;
     s->size = pulse[0], s->rate = pulse[1], s->begin = pulse[2];
-    memset(s->counts, 0, sizeof s->counts);
+    s->calls = 0;
     memcpy(x, vehiclemor_start_equilibrium, N * sizeof(double));
     for (int part = 0; part < 3 && !failed; part++) {
         s->moves = part == 1;
@@ -110,9 +97,10 @@ int run(Solver *s, const double *pulse, const double *times, const int *edges, i
             if (outputs)
                 vehiclemor_outputs(x, s->u, s->c, outputs + (size_t)k * VEHICLEMOR_OUTPUTS);
         }
-        count(s);
+        CVodeGetNumRhsEvals(s->cvode, calls);
+        CVodeGetNumLinRhsEvals(s->cvode, calls + 1);
+        s->calls += calls[0] + calls[1];
     }
-    memcpy(counts, s->counts, sizeof s->counts);
     return failed;
 }
 
@@ -129,4 +117,9 @@ int step(Solver *s, double *state, const double *u, double dt)
     failed = CVode(s->cvode, dt, s->state, &t, 1) < 0;
     memcpy(state, x, N * sizeof(double));
     return failed;
+}
+
+long calls(const Solver *s)
+{
+    return s->calls;
 }

@@ -74,7 +74,7 @@ def batch(case: Case) -> dict[str, Curve]:
     read = lambda found: found["values"].values[:, :, 0]  # noqa: E731
     return {
         f"ours {solver}": Curve(
-            partial(make, solver=solver), decades(1e-1, 1e-6, 2), read, "lateral position"
+            partial(make, solver=solver), decades(1e-1, 1e-7, 2), read, "lateral position"
         )
         for solver in SOLVERS
     }
