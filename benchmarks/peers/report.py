@@ -95,6 +95,23 @@ def rows(case: Mapping[str, Any], target: float, delivers: str) -> list[tuple[st
     return found
 
 
+def summary(cases: Mapping[str, Mapping[str, Any]]) -> str:
+    """Of each comparison and target error who is first, and the fastest of all others."""
+    body = []
+    for name, case in cases.items():
+        for delivers in dict.fromkeys(c["delivers"] for c in case["curves"].values()):
+            for target in case["targets"]:
+                reached = [row for row in rows(case, target, delivers) if row[3]]
+                own = next((row for row in reached if row[0].startswith(OURS)), None)
+                other = next((row for row in reached if not row[0].startswith(OURS)), None)
+                if own and other:
+                    pair = sorted([own, other], key=reached.index)
+                    cells = (f"{row[0]} {row[1]}" for row in pair)
+                    body.append((name, delivers, f"{target:g} {case['unit']}", *cells, other[3]))
+    header = ("case", "delivers", "error", "first", "then", "other over ours")
+    return "\n".join(["## In short: ours, and the fastest other", "", *table(header, body)])
+
+
 def time_text(seconds: float) -> str:
     """Seconds with three digits and a unit."""
     for unit, size in (("s", 1.0), ("ms", 1e-3)):

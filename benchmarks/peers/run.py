@@ -93,12 +93,12 @@ def main() -> None:
         clock.store(path, content | {name: found})
     content = clock.stored(path)
     make_folder(given.results / "figures")
-    texts = []
-    for name in [n for n in names if n in content]:
-        text = report.context_text if name == CONTEXT else report.case_text
-        texts.append(text(content[name]))
-    for model in dict.fromkeys(name.split("-")[0] for name in content if name != CONTEXT):
-        of_model = {k: c for k, c in content.items() if k.split("-")[0] == model}
+    measured = {name: content[name] for name in names if name in content}
+    texts = [report.summary({k: c for k, c in measured.items() if k != CONTEXT})]
+    for name, case in measured.items():
+        texts.append((report.context_text if name == CONTEXT else report.case_text)(case))
+    for model in dict.fromkeys(name.split("-")[0] for name in measured if name != CONTEXT):
+        of_model = {k: c for k, c in measured.items() if k.split("-")[0] == model}
         report.figure(of_model, given.results / "figures" / f"peers-{model}")
     write_text(given.results / "peers.md", "\n\n".join(texts) + "\n")
     print("\n\n".join(texts))
