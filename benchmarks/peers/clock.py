@@ -26,10 +26,10 @@ from vehiclemor.files import write_text
 from vehiclemor.inputs import steering
 from vehiclemor.registry import component
 
-# Length (s) of calls from which on they aren't repeated within a round, from which on rounds are
-# few, and beyond which no tighter tolerance of a curve is tried.
-SHORT, LONG, TOO_LONG = 5e-3, 0.05, 1.2
-ROUNDS, ROUNDS_OF_LONG, REPEATS = 9, 2, 4
+# Calls of a round, the first a warm-up, of what takes less than so many seconds.
+REPEATS, SHORT = 4, 5e-3
+# Seconds of a call -> rounds at most; and those beyond which no tighter tolerance is tried.
+ROUNDS, TOO_LONG = {0.05: 9, 1.2: 2, math.inf: 1}, 4.5
 # Where peers have what they generate compiled; none without a compiler.
 COMPILER = shutil.which(os.environ.get("CC", "cc"))
 # Above (times the loosest target) nothing is timed.
@@ -216,11 +216,10 @@ def measured(curves: Mapping[str, Curve], case: Case, tell: Callable = print) ->
     gc.collect()
     gc.disable()
     try:
-        for turn in range(ROUNDS):
+        for turn in range(max(ROUNDS.values())):
             for point, call in ready:
                 expected = point["seconds"][0]
-                rounds = ROUNDS_OF_LONG if expected > LONG else ROUNDS
-                if turn < (1 if expected > TOO_LONG else rounds):
+                if turn < next(r for length, r in ROUNDS.items() if expected < length):
                     point["seconds"].append(seconds_of(call, expected, clock))
     finally:
         gc.enable()
@@ -342,7 +341,7 @@ def structure() -> Case:
     ranges = np.ptp(exact, axis=0)
     steps = [10e-3 / count for count in (2, 4, 8, 16, 32)]
     title = f"flexible_truck, {model.size} coordinates, road, 2.5 s, by step size"
-    more, targets = {"ranges": ranges, "steps": steps}, (3e-2, 1e-2, 1e-3)
+    more, targets = {"ranges": ranges, "steps": steps}, (2e-2, 5e-3, 2e-3)
     unit = "of an output's range"
     return Case("structure", title, unit, targets, model, maneuver, exact / ranges, more=more)
 

@@ -10,7 +10,7 @@ import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
-from clock import Case, Curve, LeftOutError, decades, pulse
+from clock import Case, Curve, LeftOutError, pulse
 
 import vehiclemor as vm
 from vehiclemor.inputs import steering
@@ -48,5 +48,4 @@ def batch(case: Case) -> dict[str, Curve]:
 
     compiled = jax.jit(jax.vmap(single, (0, None)))
     make = lambda tolerance: lambda: np.asarray(compiled(factors, tolerance))  # noqa: E731
-    tolerances = decades(1e-4, 1e-6, 1)
-    return {"JAX diffrax Tsit5": Curve(make, tolerances, np.asarray, "lateral position")}
+    return {"JAX diffrax Tsit5": Curve(make, (1e-4, 1e-6), np.asarray, "lateral position")}

@@ -9,7 +9,7 @@ import numpy as np
 from vehiclemor.report.figures import theme
 
 OURS = "ours"
-HEADER = ("who", "CPU time", "spread", "over ours", "at tolerance", "error")
+HEADER = ("who", "CPU time", "spread", "over ours", "at tolerance", "error", "rhs calls")
 # Beginning of a label -> its line; those of one package that begin alike are drawn as the best.
 LINES: dict[str, dict[str, Any]] = {
     "ours ros34pw2": {"color": "black", "linestyle": (0, (1, 1))},
@@ -87,11 +87,12 @@ def rows(case: Mapping[str, Any], target: float, delivers: str) -> list[tuple[st
         low, _, high = (time_text(s / case.get("per", [1])[0]) for s in point["spread"])
         seconds = time_text(point["seconds"] / case.get("per", [1])[0])
         tolerance, error = f"{point['tolerance']:.1e}", f"{point['error']:.1e}"
-        found.append((label, seconds, f"{low} to {high}", verdict, tolerance, error))
+        calls = str(point.get("evaluations", ""))
+        found.append((label, seconds, f"{low} to {high}", verdict, tolerance, error, calls))
     for label, curve in curves.items():
         if chosen[label] is None:
             least = min((p["error"] for p in curve["points"]), default=np.nan)
-            found.append((label, "not reached", "", "", "", f"at best {least:.1e}"))
+            found.append((label, "not reached", "", "", "", f"at best {least:.1e}", ""))
     return found
 
 
