@@ -17,7 +17,8 @@ SCENE = """
 <mujoco><option timestep="{step}" integrator="implicitfast"/>
 <worldbody><geom type="plane" size="0 0 1"/>
 <body pos="0 0 0.35"><freejoint/>
-<geom type="box" size="2 0.7 0.2" pos="0 0 0.3" mass="1400"/>{wheels}</body></worldbody></mujoco>"""
+<geom type="box" size="2 0.7 0.2" pos="0 0 0.3" mass="1400" contype="0" conaffinity="0"/>
+{wheels}</body></worldbody></mujoco>"""
 
 
 def context() -> dict[str, tuple[Callable[[], object], float, str]]:
