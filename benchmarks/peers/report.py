@@ -81,9 +81,9 @@ def rows(case: Mapping[str, Any], target: float, delivers: str) -> list[tuple[st
     found = []
     for label, point in sorted(reached.items(), key=lambda pair: pair[1]["seconds"]):
         ratio = point["seconds"] / own
-        text = f"{ratio:.2g}" if ratio < 10.0 else f"{ratio:.0f}"
-        faster = ratio < 1.0 and not label.startswith(OURS)
-        verdict = f"{text}: FASTER THAN OURS" if faster else text
+        verdict = f"{ratio:.2g}" if ratio < 10.0 else f"{ratio:.0f}"
+        if not label.startswith(OURS) and not ratio >= 1.0:
+            verdict = f"{verdict}: FASTER THAN OURS" if own > 0.0 else "OURS DO NOT REACH IT"
         low, _, high = (time_text(s / case.get("per", [1])[0]) for s in point["spread"])
         seconds = time_text(point["seconds"] / case.get("per", [1])[0])
         tolerance, error = f"{point['tolerance']:.1e}", f"{point['error']:.1e}"
@@ -105,10 +105,10 @@ def summary(cases: Mapping[str, Mapping[str, Any]]) -> str:
                 reached = [row for row in rows(case, target, delivers) if row[3]]
                 own = next((row for row in reached if row[0].startswith(OURS)), None)
                 other = next((row for row in reached if not row[0].startswith(OURS)), None)
-                if own and other:
-                    pair = sorted([own, other], key=reached.index)
-                    cells = (f"{row[0]} {row[1]}" for row in pair)
-                    body.append((name, delivers, f"{target:g} {case['unit']}", *cells, other[3]))
+                pair = sorted([row for row in (own, other) if row], key=reached.index)
+                first, then = ([f"{row[0]} {row[1]}" for row in pair] + ["", ""])[:2]
+                ratio = other[3] if other else ""
+                body.append((name, delivers, f"{target:g} {case['unit']}", first, then, ratio))
     header = ("case", "delivers", "error", "first", "then", "other over ours")
     return "\n".join(["## In short: ours, and the fastest other", "", *table(header, body)])
 
