@@ -37,7 +37,7 @@ CANNOT = {
     "run": {
         "Exudyn": NO_TIRES,
         "MuJoCo": f"{NO_TIRES}; constraints and contacts are soft",
-        "pyMOR": "no integrator for nonlinear equations but Euler's",
+        "pyMOR": "equal steps of Euler's methods and the midpoint rule alone",
     },
     "mechanism": {"MuJoCo": "constraints are soft: errors do not fall with a tolerance"},
     "structure": {"pyMOR": "linear; springs, stops and tires of the truck are not"},
