@@ -11,7 +11,6 @@ import numpy as np
 from clock import COMPILER, Case, Curve, decades, pulse
 
 import vehiclemor as vm
-from vehiclemor.exporting.export import system_of
 
 LABELS = {"CasADi CVODES": False, "CasADi CVODES, C code": True}
 
@@ -20,7 +19,7 @@ LABELS = {"CasADi CVODES": False, "CasADi CVODES, C code": True}
 def rates(name: str, compiled: bool) -> ca.Function:
     """f(z, u) of states in their error scale, since CVODES takes one absolute tolerance here."""
     model = vm.model(name)
-    scale, values = model.error_scale, system_of(model).values
+    scale, values = model.error_scale, model.parameter_values
     z, u = ca.SX.sym("z", len(scale)), ca.SX.sym("u", len(model.inputs))
     dx = vm.export(model, "casadi")(z * scale, u, values)[0]
     function = ca.Function("rates", [z, u], [dx / scale], ["z", "u"], ["dz"])
