@@ -5,7 +5,6 @@ side is the exported one, or that of `model.bare`, whose address a user may pass
 """
 
 import ctypes
-import subprocess
 import tempfile
 from functools import cache, partial
 from pathlib import Path
@@ -13,33 +12,27 @@ from typing import Any
 
 import numpy as np
 import sksundae
-from clock import COMPILER, Case, Curve, decades
+from clock import Case, Curve, decades, library, pulse_shape
 
 import vehiclemor as vm
 from vehiclemor.inputs import steering
 
 LIBRARIES = ("core", "cvode", "nvecserial", "sunmatrixdense", "sunlinsoldense")
-FLAGS = ("-O3", "-march=native", "-shared", "-fPIC", "-w")
 BARE = "CVODE in C, bare rhs"
 
 
 @cache
 def compiled(name: str) -> ctypes.CDLL:
     """The library of a model."""
-    if COMPILER is None:
-        raise FileNotFoundError("no C compiler")
     wheel = Path(sksundae.__file__).parents[1] / "scikit_sundae.libs"
     libraries = [next(wheel.glob(f"libsundials_{part}-*")) for part in LIBRARIES]
     with tempfile.TemporaryDirectory() as folder:
         source = vm.export(name, "c", f"{folder}/model")
-        parts = [Path(__file__).with_name("cvode.c"), source / "vehiclemor_model.c"]
-        made = Path(folder) / "peer.so"
-        link = [*libraries, f"-Wl,-rpath,{wheel}", "-lm"]
-        subprocess.run([COMPILER, *FLAGS, f"-I{source}", *parts, *link, "-o", made], check=True)  # noqa: S603
-        library = ctypes.CDLL(str(made))
-    library.make.restype = ctypes.c_void_p
-    library.calls.restype = ctypes.c_long
-    return library
+        parts = Path(__file__).with_name("cvode.c"), source / "vehiclemor_model.c"
+        link = *libraries, f"-Wl,-rpath,{wheel}", "-lm"
+        found = ctypes.CDLL(library(folder, "-O3", f"-I{source}", *parts, *link))
+    found.make.restype, found.run.restype = ctypes.c_void_p, ctypes.c_long
+    return found
 
 
 def address(array: np.ndarray | None) -> ctypes.c_void_p:
@@ -47,94 +40,90 @@ def address(array: np.ndarray | None) -> ctypes.c_void_p:
     return ctypes.c_void_p(None if array is None else array.ctypes.data)
 
 
-def solver(case: Case, tolerance: float, bare: bool) -> tuple[ctypes.CDLL, ctypes.c_void_p]:
+def solver(case: Case, tolerance: float, bare: bool = True) -> ctypes.c_void_p:
     """A solver with its memory, which all runs share."""
-    library, rhs = compiled(case.model.name), case.model.bare("rhs")
+    rhs = case.model.bare("rhs")
     how = ctypes.c_double(tolerance), address(case.model.error_scale)
     rates = ctypes.c_void_p(rhs.address if bare else None)
-    return library, ctypes.c_void_p(library.make(rates, address(rhs.constants), *how))
+    made = compiled(case.model.name).make(rates, address(rhs.constants), *how)
+    return ctypes.c_void_p(made)
 
 
-def pulse(case: Case, amplitude: float = 1.0, speed: float = 1.0) -> np.ndarray:
+def lane_change(case: Case, *factors: float) -> np.ndarray:
     """Size, rate and begin of a lane change."""
-    racked = len(case.model.inputs) > 1
-    size = steering.RACK_AMPLITUDE if racked else steering.LANE_CHANGE_AMPLITUDE
-    rate = 2.0 * np.pi * speed / steering.LANE_CHANGE_LENGTH
-    return np.array([amplitude * size, rate, steering.BEGIN])
+    return np.array([*pulse_shape(case.racked, *factors), steering.BEGIN])
 
 
 def run(case: Case) -> dict[str, Curve]:
     """Whole runs: states alone, and all outputs beside them."""
-    compiled(case.model.name)
-    times, given = case.maneuver.times, pulse(case)
+    library, times, pulse = compiled(case.model.name), case.maneuver.times, lane_change(case)
     edges = np.array([0, *(last for _, last, _ in case.spans())], dtype=np.int32)
 
     def make(tolerance: float, bare: bool = True, outputs: bool = False) -> Any:
-        library, own = solver(case, tolerance, bare)
+        own = solver(case, tolerance, bare)
 
         def whole() -> tuple[np.ndarray, int]:
-            states, found = np.empty((len(times), len(case.start))), None
-            if outputs:
-                found = np.empty((len(times), len(case.model.outputs)))
-            arrays = map(address, (given, times, edges))
-            if library.run(own, *arrays, -1, address(states), address(found)):
+            states = np.empty((len(times), len(case.start)))
+            found = np.empty((len(times), len(case.model.outputs))) if outputs else None
+            arrays = map(address, (pulse, times, edges))
+            calls = library.run(own, *arrays, -1, address(states), address(found))
+            if calls < 0:
                 raise ArithmeticError("CVODE failed")
-            return states, library.calls(own)
+            return states, calls
 
         return whole
 
-    read, scan, calls = (lambda r: r[0][:, case.lateral]), decades(1e-2, 1e-9), lambda r: r[1]
-    return {
-        "CVODE in C": Curve(partial(make, bare=False), scan, read, counts=calls),
-        BARE: Curve(make, scan, read, counts=calls),
-        f"{BARE}, outputs": Curve(partial(make, outputs=True), scan, read, "outputs", calls),
-    }
+    def curve(delivers: str = "states", **how: bool) -> Curve:
+        made, read = partial(make, **how), lambda r: case.lateral_of(r[0])
+        return Curve(made, decades(1e-2, 1e-9), read, delivers, lambda r: r[1])
+
+    found = {"CVODE in C": curve(bare=False), BARE: curve()}
+    return found | {f"{BARE}, outputs": curve("outputs", outputs=True)}
 
 
 def steps(case: Case) -> dict[str, Curve]:
     """A loop in Python over steps in C, each of which starts afresh."""
-    compiled(case.model.name)
+    library, inputs = compiled(case.model.name), [address(u) for u in case.more]
 
     def make(tolerance: float) -> Any:
-        library, own = solver(case, tolerance, bare=True)
-        length, state = ctypes.c_double(0.01), case.start
-        inputs = [(u, address(u)) for u in case.more["held"]]
+        own, length, state = solver(case, tolerance), ctypes.c_double(0.01), case.start
+        place = address(state)
+
+        def step(_: np.ndarray, u: ctypes.c_void_p) -> np.ndarray:
+            library.step(own, place, u, length)
+            return state
 
         def loop() -> np.ndarray:
             state[:] = case.start
-            found, place = np.empty(len(case.reference)), address(state)
-            for k, (_, u) in enumerate(inputs):
-                library.step(own, place, u, length)
-                found[k] = state[case.lateral]
-            return found
+            return case.loop(step, state, inputs)
 
         return loop
 
-    return {BARE: Curve(make, decades(1e-1, 1e-7, 2), np.asarray)}
+    return {BARE: Curve(make, decades(1e-1, 1e-7, 2))}
 
 
 def batch(case: Case) -> dict[str, Curve]:
     """Run after run."""
-    compiled(case.model.name)
-    runs = []
-    for signal in case.more["signals"]:
+    library, runs = compiled(case.model.name), []
+    for signal in case.more:
         times = np.union1d(signal.times, signal.break_points)
         ends = [0.0, *signal.break_points, signal.duration]
         edges = np.searchsorted(times, ends).astype(np.int32)
-        given = pulse(case, signal.amplitude_factor, signal.frequency_factor)
-        runs.append((np.isin(times, signal.times), (given, times, edges)))
+        pulse = lane_change(case, signal.amplitude_factor, signal.frequency_factor)
+        runs.append((np.isin(times, signal.times), (pulse, times, edges)))
 
     def make(tolerance: float) -> Any:
-        library, own = solver(case, tolerance, bare=True)
+        own = solver(case, tolerance)
 
         def all_runs() -> np.ndarray:
             found = np.empty(case.reference.shape)
             for row, (kept, arrays) in zip(found, runs, strict=True):
-                lateral, given = np.empty(len(kept)), map(address, arrays)
-                library.run(own, *given, case.lateral, address(lateral), address(None))
+                lateral = np.empty(len(kept))
+                given = [*map(address, arrays), case.lateral, address(lateral), address(None)]
+                library.run(own, *given)
                 row[:] = lateral[kept]
             return found
 
         return all_runs
 
-    return {BARE: Curve(make, decades(1e-3, 1e-9, 2), np.asarray, "lateral position")}
+    return {BARE: Curve(make, decades(1e-3, 1e-9, 2), delivers="lateral position")}

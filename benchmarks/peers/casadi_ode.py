@@ -1,18 +1,14 @@
 """CasADi: CVODES with a sparse analytic Jacobian, by its virtual machine and by generated C."""
 
-import subprocess
 import tempfile
 from functools import cache, partial
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from clock import COMPILER, Case, Curve, decades, pulse
+from clock import Case, Curve, decades, library, pulse
 
 import vehiclemor as vm
-
-LABELS = {"CasADi CVODES": False, "CasADi CVODES, C code": True}
 
 
 @cache
@@ -33,31 +29,19 @@ def translated(function: ca.Function) -> ca.Function:
         generator.add(function)
         generator.add(function.jacobian())
         generator.generate(f"{folder}/")
-        command = [
-            str(COMPILER),
-            "-O2",
-            "-march=native",
-            "-fPIC",
-            "-shared",
-            "peer.c",
-            "-o",
-            "peer.so",
-        ]
-        subprocess.run(command, cwd=folder, check=True)  # noqa: S603
-        return ca.external("rates", str(Path(folder, "peer.so")))
+        return ca.external("rates", library(folder, "-O2", f"{folder}/peer.c"))
 
 
 def run(case: Case) -> dict[str, Curve]:
     """Runs that deliver the states."""
+    scale, rest = case.model.error_scale, np.zeros(len(case.model.inputs))
 
     def make(tolerance: float, compiled: bool) -> Any:
-        function, scale = rates(case.model.name, compiled), case.model.error_scale
+        function = rates(case.model.name, compiled)
         # Compiled functions are called; the virtual machine is faster over one flat list.
         kind = ca.MX if compiled else ca.SX
         t, z, size = kind.sym("t"), kind.sym("z", len(scale)), kind.sym("size")
-        steered = ca.vertcat(*pulse(t, ca, len(case.model.inputs) > 1, size))
-        # Without a steering wheel that moves, which CasADi can't know.
-        rest = np.zeros(len(case.model.inputs))
+        steered = ca.vertcat(*pulse(t, ca, case.racked, size))
         how = {"reltol": tolerance, "abstol": tolerance, "max_num_steps": 100_000}
         parts = {}
         for first, last, moves in case.spans():
@@ -71,41 +55,33 @@ def run(case: Case) -> dict[str, Curve]:
 
         return lambda: case.by_parts(part)
 
-    read = lambda states: states[:, case.lateral]  # noqa: E731
-    return {
-        label: Curve(partial(make, compiled=compiled), decades(1e-2, 1e-9, 2 + 2 * compiled), read)
-        for label, compiled in LABELS.items()
-        if COMPILER or not compiled
-    }
+    def curve(compiled: bool, each: int) -> Curve:
+        return Curve(partial(make, compiled=compiled), decades(1e-2, 1e-9, each), case.lateral_of)
+
+    return {"CasADi CVODES": curve(False, 2), "CasADi CVODES, C code": curve(True, 4)}
 
 
 def steps(case: Case) -> dict[str, Curve]:
-    """Integrators over 10 ms: CVODES, and Runge-Kutta of order 4 by its number of steps."""
+    """Integrators over 10 ms: CVODES, and Runge-Kutta of order 4 by its length of steps."""
+    scale, function = case.model.error_scale, rates(case.model.name, compiled=True)
+    z, u = ca.MX.sym("z", len(scale)), ca.MX.sym("u", len(case.model.inputs))
+    ode, start = {"x": z, "p": u, "ode": function(z, u)}, case.start / scale
 
-    def make(tolerance: float, name: str) -> Any:
-        function, scale = rates(case.model.name, compiled=True), case.model.error_scale
-        z, u = ca.MX.sym("z", len(scale)), ca.MX.sym("u", len(case.model.inputs))
-        how: dict[str, Any] = {"reltol": tolerance, "abstol": tolerance}
-        if name == "rk":
-            how = {"number_of_finite_elements": round(0.01 / tolerance)}
-        ode = {"x": z, "p": u, "ode": function(z, u)}
-        advance = ca.integrator("step", name, ode, 0.0, 0.01, how)
+    def make(method: str, **how: Any) -> Any:
+        advance = ca.integrator("step", method, ode, 0.0, 0.01, how)
+        return lambda: case.loop(lambda x, u: advance(x0=x, p=u)["xf"], start, case.more)
 
-        def loop() -> np.ndarray:
-            state, found = case.start / scale, np.empty(len(case.reference))
-            for k, held in enumerate(case.more["held"]):
-                state = advance(x0=state, p=held)["xf"]
-                found[k] = state[case.lateral] * scale[case.lateral]
-            return found
+    def cvodes(tolerance: float) -> Any:
+        return make("cvodes", reltol=tolerance, abstol=tolerance)
 
-        return loop
+    def runge_kutta(length: float) -> Any:
+        return make("rk", number_of_finite_elements=round(0.01 / length))
 
+    read = lambda found: found * scale[case.lateral]  # noqa: E731
     lengths = [0.01 / count for count in (4, 6, 8, 10, 14, 20, 40)]
     return {
-        "CasADi CVODES, C code": Curve(
-            partial(make, name="cvodes"), decades(1e-2, 1e-6, 2), np.asarray
-        ),
-        "CasADi Runge-Kutta 4, C code": Curve(partial(make, name="rk"), lengths, np.asarray),
+        "CasADi CVODES, C code": Curve(cvodes, decades(1e-2, 1e-8, 2), read),
+        "CasADi Runge-Kutta 4, C code": Curve(runge_kutta, lengths, read),
     }
 
 
@@ -153,10 +129,9 @@ def mechanism(case: Case) -> dict[str, Curve]:
     def make(tolerance: float) -> Any:
         q, u, residual, outputs = closures(case)
         problem = ca.Function("closed", [q, u], [ca.vertcat(*residual)])
-        how = {"abstol": tolerance}
-        solved = ca.rootfinder("solved", "fast_newton", problem, how)
+        solved = ca.rootfinder("solved", "fast_newton", problem, {"abstol": tolerance})
         path = solved.mapaccum(inputs.shape[1])
         read = ca.Function("read", [q, u], [ca.vertcat(*outputs)]).map(inputs.shape[1])
         return lambda: read(path(case.model.start(), inputs), inputs).full().T
 
-    return {"CasADi Newton": Curve(make, decades(1e-4, 1e-13, 1), np.asarray, "outputs")}
+    return {"CasADi Newton": Curve(make, decades(1e-4, 1e-13, 1), delivers="outputs")}

@@ -1,4 +1,4 @@
-"""What all peers share: what is to be computed, the clock, errors, and the file of what was found.
+"""What all peers share: cases, the clock, errors, and the file of what was found.
 
 A comparison is a set of curves over one tolerance, or step size: error and seconds of each point.
 Seconds are those of whole calls, states or outputs delivered, in interleaved rounds.
@@ -9,13 +9,12 @@ import importlib
 import json
 import math
 import os
-import shutil
 import statistics
+import subprocess
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,75 +23,40 @@ import numpy as np
 import vehiclemor as vm
 from vehiclemor.files import write_text
 from vehiclemor.inputs import steering
-from vehiclemor.registry import component
 
 # Calls of a round, the first a warm-up, of what takes less than so many seconds.
 REPEATS, SHORT = 4, 5e-3
 # Seconds of a call -> rounds at most; and those beyond which no tighter tolerance is tried.
 ROUNDS, TOO_LONG = {0.05: 9, 1.2: 2, math.inf: 1}, 4.5
-# Where peers have what they generate compiled; none without a compiler.
-COMPILER = shutil.which(os.environ.get("CC", "cc"))
 # Above (times the loosest target) nothing is timed.
 FAR_OFF = 10.0
 
 
-class LeftOutError(Exception):
-    """Why a peer has no curve for a case."""
-
-
 class Curve(NamedTuple):
-    """One way to compute a case.
+    """One way to compute a case: a scan over tolerances, the loosest first."""
 
-    Attributes
-    ----------
-    make
-        Tolerance -> a call without arguments, ready to run again and again.
-    tolerances
-        The scan, loosest first.
-    read
-        What the call returned -> what is compared with the reference.
-    delivers
-        What the call gives: `states`, `outputs`, or what else.
-    counts
-        What the call returned -> evaluations of the right-hand side; none where it isn't told.
-    """
-
-    make: Callable[[float], Callable[[], Any]]
+    make: Callable[[float], Callable[[], Any]]  # a call that is ready to run again and again
     tolerances: Sequence[float]
-    read: Callable[[Any], np.ndarray]
+    read: Callable[[Any], np.ndarray] = np.asarray  # of what is returned, for the reference
     delivers: str = "states"
-    counts: Callable[[Any], int] | None = None
+    counts: Callable[[Any], int] | None = None  # of what is returned: calls of the rhs
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """What is computed: a model, its maneuver and start, and the reference.
+    """What is computed: a model, its maneuver and start, and the reference."""
 
-    Attributes
-    ----------
-    kind
-        `run`, `steps`, `batch`, `mechanism` or `structure`: the function of a peer that is asked.
-    title, unit
-        What errors are of.
-    targets
-        Errors for which peers are compared.
-    reference
-        What curves are compared with.
-    clock
-        Whose CPU time: of the thread, or of the process where a peer starts threads.
-    more
-        What else peers of this kind need.
-    """
-
-    kind: str
+    kind: str  # the function of a peer that is asked
     title: str
     unit: str
-    targets: tuple[float, ...]
+    targets: tuple[float, ...]  # errors for which peers are compared
     model: Any
     maneuver: Any
     reference: np.ndarray
-    clock: str = "thread_time"
-    more: Mapping[str, Any] = field(default_factory=dict)
+    more: Any = None  # held inputs, signals of a batch, or step sizes of a structure
+    per: tuple[int, str] = (1, "")  # what times are divided by
+    scale: Any = 1.0  # of errors
+    clock: str = "thread_time"  # of the process instead where a peer starts threads
 
     @property
     def start(self) -> np.ndarray:
@@ -100,9 +64,18 @@ class Case:
         return self.model.start("equilibrium")
 
     @property
+    def racked(self) -> bool:
+        """Whether the inputs are place, speed and acceleration of the rack."""
+        return len(self.model.inputs) > 1
+
+    @property
     def lateral(self) -> int:
         """Place of the lateral position among the states."""
         return int(self.model.planar[1])
+
+    def lateral_of(self, states: np.ndarray) -> np.ndarray:
+        """Lateral position of a run of states."""
+        return states[:, self.lateral]
 
     def spans(self) -> list[tuple[int, int, bool]]:
         """First and last output time of each smooth part, and whether the steering moves in it."""
@@ -121,6 +94,14 @@ class Case:
             states[first : last + 1] = part(states[first], times[first : last + 1], moves)
         return states
 
+    def loop(self, step: Callable[[Any, Any], Any], state: Any, inputs: Iterable) -> np.ndarray:
+        """Lateral position after each step, a call of Python: (state, input) -> state."""
+        found = np.empty(len(self.reference))
+        for k, u in enumerate(inputs):
+            state = step(state, u)
+            found[k] = state[self.lateral]
+        return found
+
 
 def decades(first: float, last: float, each: int = 4) -> list[float]:
     """Tolerances from the loosest to the tightest, so many in each decade."""
@@ -133,8 +114,7 @@ def pulse(time_: Any, functions: Any, racked: bool, amplitude: Any = 1.0, speed:
 
     Peers call back into it: `maneuver.at`, for arrays of times, would cost more than the car.
     """
-    rate = 2.0 * math.pi * speed / steering.LANE_CHANGE_LENGTH
-    size = amplitude * (steering.RACK_AMPLITUDE if racked else steering.LANE_CHANGE_AMPLITUDE)
+    size, rate = pulse_shape(racked, amplitude, speed)
     a = rate * (time_ - steering.BEGIN)
     sine, sine_2 = functions.sin(a), functions.sin(2.0 * a)
     found = [size * (sine - 0.5 * sine_2)]
@@ -144,9 +124,15 @@ def pulse(time_: Any, functions: Any, racked: bool, amplitude: Any = 1.0, speed:
     return found
 
 
-def callback(case: Case) -> Callable[[bool], Callable[[float, np.ndarray], np.ndarray]]:
-    """The fastest documented right-hand side for Python: f(t, x), of parts that steer or don't."""
-    rhs, racked = case.model.bare("rhs"), len(case.model.inputs) > 1
+def pulse_shape(racked: bool, amplitude: Any = 1.0, speed: Any = 1.0) -> tuple[Any, Any]:
+    """Size and angular frequency of a lane change."""
+    size = steering.RACK_AMPLITUDE if racked else steering.LANE_CHANGE_AMPLITUDE
+    return amplitude * size, 2.0 * math.pi * speed / steering.LANE_CHANGE_LENGTH
+
+
+def callback(case: Case, moves: bool) -> Callable[[float, np.ndarray], np.ndarray]:
+    """The fastest documented right-hand side for Python: f(t, x), of a part that steers or not."""
+    rhs, racked = case.model.bare("rhs"), case.racked
     rates, state, u = np.empty(len(case.start)), case.start, np.zeros(len(case.model.inputs))
 
     def steered(t: float, x: np.ndarray) -> np.ndarray:
@@ -157,77 +143,80 @@ def callback(case: Case) -> Callable[[bool], Callable[[float, np.ndarray], np.nd
 
     def straight(_: float, x: np.ndarray) -> np.ndarray:
         state[:] = x
-        u[:] = 0.0
         rhs(state, u, rates)
         return rates
 
-    return lambda moves: steered if moves else straight
+    return steered if moves else straight
 
 
-def collected(peers: Iterable[str], case: Case) -> tuple[dict[str, Curve], dict[str, str]]:
-    """Curves of all peers for a case by label, and label of a peer -> why it has none."""
-    curves, missing = {}, {}
+def library(folder: str, *arguments: object) -> str:
+    """Path of a shared library, by the C compiler of this machine."""
+    path, compiler = f"{folder}/peer.so", os.environ.get("CC", "cc")
+    command = [compiler, "-march=native", "-shared", "-fPIC", "-w", *arguments, "-o", path]
+    subprocess.run(list(map(str, command)), check=True)  # noqa: S603
+    return path
+
+
+def collected(peers: Iterable[str], kind: str, *given: Case) -> tuple[dict, dict[str, str]]:
+    """What the peers have of a kind by label, and name of a peer -> why it has none."""
+    found, missing = {}, {}
     for name in peers:
         try:
-            peer = importlib.import_module(name)
+            found |= getattr(importlib.import_module(name), kind)(*given)
         except ImportError as error:
             missing[name] = f"not installed ({error})"
-            continue
-        try:
-            curves |= getattr(peer, case.kind, lambda _: {})(case)
-        except LeftOutError as error:
-            missing[name] = str(error)
         except Exception as error:  # noqa: BLE001  (what a peer raises is a row, no crash)
             missing[name] = f"failed: {type(error).__name__}: {error}".splitlines()[0]
-    return curves, missing
+    return found, missing
 
 
-def measured(curves: Mapping[str, Curve], case: Case, tell: Callable = print) -> dict[str, Any]:
-    """Error and seconds of all points of all curves; a point that fails is left out."""
-    clock = getattr(time, case.clock)
-    found, ready = {}, []
+def measured(curves: Mapping[str, Curve], case: Case) -> dict[str, Any]:
+    """Error and seconds of all points of all curves, timed in rounds over all of them."""
+    clock, found, calls = getattr(time, case.clock), {}, []
     for label, curve in curves.items():
-        points: list[dict[str, Any]] = []
-        found[label], failures = {"delivers": curve.delivers, "points": points}, []
-        for tolerance in curve.tolerances:
-            try:
-                call = curve.make(tolerance)
-                call()
-                began = clock()
-                result = call()
-                first = clock() - began
-                off = np.asarray(curve.read(result)) - case.reference
-            except Exception as error:  # noqa: BLE001  (as above)
-                failures.append(f"{tolerance:.1e}: {type(error).__name__}: {error}"[:160])
-                continue
-            error = float(np.abs(off).max())
-            if not error < FAR_OFF * max(case.targets):
-                continue
-            point = {"tolerance": tolerance, "error": error, "seconds": [first]}
-            if curve.counts is not None:
-                point["evaluations"] = int(curve.counts(result))
-            points.append(point)
-            ready.append((point, call))
-            if first > TOO_LONG:
-                break
-        if failures:
-            found[label]["failures"] = failures
-        tell(f"  {label}: {len(points)} points")
+        found[label], ready = scanned(curve, case, clock)
+        calls += zip(found[label]["points"], ready, strict=True)
+        print(f"  {label}: {len(ready)} points", flush=True)
+    seconds: list[list[float]] = [[] for _ in calls]
     gc.collect()
     gc.disable()
-    try:
-        for turn in range(max(ROUNDS.values())):
-            for point, call in ready:
-                expected = point["seconds"][0]
-                if turn < next(r for length, r in ROUNDS.items() if expected < length):
-                    point["seconds"].append(seconds_of(call, expected, clock))
-    finally:
-        gc.enable()
-    for point, _ in ready:
-        seconds = point["seconds"][1:]
-        point["spread"] = [min(seconds), statistics.median(seconds), max(seconds)]
-        point["seconds"] = min(seconds)
+    for turn in range(max(ROUNDS.values())):
+        for (point, call), listed in zip(calls, seconds, strict=True):
+            expected = point["seconds"]
+            if turn < next(rounds for length, rounds in ROUNDS.items() if expected < length):
+                listed.append(seconds_of(call, expected, clock))
+    gc.enable()
+    for (point, _), listed in zip(calls, seconds, strict=True):
+        point["spread"] = [min(listed), statistics.median(listed), max(listed)]
+        point["seconds"] = min(listed)
     return found
+
+
+def scanned(curve: Curve, case: Case, clock: Callable[[], float]) -> tuple[dict, list[Callable]]:
+    """Points of a curve with the seconds of a first call, and their calls; one that fails isn't."""
+    points, ready, failures = [], [], []
+    for tolerance in curve.tolerances:
+        try:
+            call = curve.make(tolerance)
+            call()
+            began = clock()
+            result = call()
+            first = clock() - began
+            off = (curve.read(result) - case.reference) / case.scale
+            error = float(np.abs(off).max())
+        except Exception as raised:  # noqa: BLE001  (as above)
+            failures.append(f"{tolerance:.1e}: {type(raised).__name__}: {raised}"[:160])
+            continue
+        if not error < FAR_OFF * max(case.targets):
+            continue
+        points.append({"tolerance": tolerance, "error": error, "seconds": first})
+        if curve.counts is not None:
+            points[-1]["evaluations"] = int(curve.counts(result))
+        ready.append(call)
+        if first > TOO_LONG:
+            break
+    found = {"delivers": curve.delivers, "points": points}
+    return found | ({"failures": failures} if failures else {}), ready
 
 
 def seconds_of(call: Callable[[], Any], expected: float, clock: Callable[[], float]) -> float:
@@ -242,35 +231,6 @@ def seconds_of(call: Callable[[], Any], expected: float, clock: Callable[[], flo
         call()
         seconds.append(clock() - began)
     return statistics.median(seconds[1:])
-
-
-def others(peers: Iterable[str]) -> tuple[dict[str, dict[str, Any]], dict[str, str]]:
-    """CPU seconds of a simulated second of the scenes of peers (`context`), and who is missing."""
-    found: dict[str, dict[str, Any]] = {}
-    missing = {}
-    for name in peers:
-        try:
-            scenes = getattr(importlib.import_module(name), "context", dict)()
-            for label, (call, simulated, what) in scenes.items():
-                call()
-                seconds = [seconds_of(call, SHORT, time.process_time) for _ in range(3)]
-                found[label] = {"seconds": min(seconds) / simulated, "what": what}
-        except ImportError as error:
-            missing[name] = f"not installed ({error})"
-        except Exception as error:  # noqa: BLE001  (as above)
-            missing[name] = f"failed: {type(error).__name__}: {error}".splitlines()[0]
-    return found, missing
-
-
-def versions(packages: Iterable[str]) -> dict[str, str]:
-    """Distribution -> its version, or that it isn't installed."""
-    found = {}
-    for package in packages:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    return found
 
 
 def stored(path: Path) -> dict[str, Any]:
@@ -295,33 +255,31 @@ def vehicle(name: str) -> Case:
 
 def held_steps(name: str) -> Case:
     """The same lane change in 500 steps of 10 ms, as a controller sends it: held inputs."""
-    model, maneuver = vm.model(name), vm.maneuver(component("model", name).maneuver)
+    model = vm.model(name)
+    maneuver = vm.maneuver(model.definition.maneuver)
     held = [np.array(u) for u in maneuver.at(np.arange(500) * 0.01)]
-    exact, state, lateral = vm.reduce(model, "full_order", solver="dopri5", tolerance=1e-11), [], []
+    exact, lateral = vm.reduce(model, "full_order", solver="dopri5", tolerance=1e-11), []
     state = model.start("equilibrium")
     for u in held:
         state = exact.step(state, u, 0.01)
         lateral.append(state[model.planar[1]])
     title = f"{name}, 500 steps of 10 ms with held inputs, from Python"
-    more = {"held": held, "per": (len(held), "step")}
-    targets = 2e-2, 1e-3, 3e-5
-    return Case("steps", title, "m", targets, model, maneuver, np.array(lateral), more=more)
+    targets, per = (2e-2, 1e-3, 3e-5), (len(held), "step")
+    return Case("steps", title, "m", targets, model, maneuver, np.array(lateral), held, per)
 
 
 def batch(name: str, runs: int = 200) -> Case:
     """Lane changes of other length and size, at all output times of the first 10 s."""
-    model, maneuver = vm.model(name), vm.maneuver(component("model", name).maneuver)
-    maneuver = replace(maneuver, duration=10.0, samples=501)
+    model = vm.model(name)
+    maneuver = replace(vm.maneuver(model.definition.maneuver), duration=10.0, samples=501)
     factors = np.random.default_rng(1).uniform([0.8, 0.5], [1.2, 1.2], (runs, 2))
     signals = [maneuver.perturbed(*pair) for pair in factors.tolist()]
-    how: dict[str, Any] = {"solver": "exponential_adams", "tolerance": 1e-10}
-    exact = vm.reduce(model, "full_order", **how)
+    exact = vm.reduce(model, "full_order", solver="exponential_adams", tolerance=1e-10)
     found = vm.simulate_many(exact, signals, "equilibrium", outputs=["lateral_position"])
     title = f"{name}, {runs} lane changes of 10 s"
-    more = {"signals": signals, "per": (runs, "run")}
-    reference = found["values"].values[:, :, 0]
-    targets, clock = (2e-2, 1e-3, 3e-5), "process_time"
-    return Case("batch", title, "m", targets, model, maneuver, reference, clock, more)
+    reference, targets, per = found["values"].values[:, :, 0], (2e-2, 1e-3, 3e-5), (runs, "run")
+    more = {"more": signals, "per": per, "clock": "process_time"}
+    return Case("batch", title, "m", targets, model, maneuver, reference, **more)
 
 
 def mechanism() -> Case:
@@ -338,12 +296,10 @@ def structure() -> Case:
     model, maneuver = vm.model("flexible_truck"), vm.maneuver("road")
     maneuver = replace(maneuver, duration=2.5, samples=251)
     exact = model.run(maneuver, step=10e-3 / 256).outputs
-    ranges = np.ptp(exact, axis=0)
     steps = [10e-3 / count for count in (2, 4, 8, 16, 32)]
     title = f"flexible_truck, {model.size} coordinates, road, 2.5 s, by step size"
-    more, targets = {"ranges": ranges, "steps": steps}, (2e-2, 5e-3, 2e-3)
-    unit = "of an output's range"
-    return Case("structure", title, unit, targets, model, maneuver, exact / ranges, more=more)
+    unit, targets, ranges = "of an output's range", (2e-2, 5e-3, 2e-3), np.ptp(exact, axis=0)
+    return Case("structure", title, unit, targets, model, maneuver, exact, steps, scale=ranges)
 
 
 def cases() -> dict[str, Callable[[], Case]]:

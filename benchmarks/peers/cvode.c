@@ -29,7 +29,6 @@ typedef struct {
     const double *constants;
     double size, rate, begin, u[U], c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
     int moves;
-    long calls; /* of the right-hand side, those for Jacobians too */
 } Solver;
 
 static int rhs(double t, Any x, Any dx, Any data)
@@ -71,25 +70,24 @@ Any make(Rates rates, const double *constants, double tolerance, const double *s
     return s;
 }
 
-/* States, or the lateral position alone if `column` isn't negative, at the times [0, edges[3]];
-   outputs as well unless there is no room for them. */
-int run(Solver *s, const double *pulse, const double *times, const int *edges, int column,
+/* States, or one of them if `column` isn't negative, at the times [0, edges[3]]; outputs as well
+   unless there is no room for them.  Calls of the right-hand side, those for Jacobians too, or -1
+   where it fails. */
+long run(Solver *s, const double *pulse, const double *times, const int *edges, int column,
         double *states, double *outputs)
 {
     double *x = N_VGetArrayPointer(s->state), t;
-    long calls[2];
-    int failed = 0;
+    long calls = 0, further[2];
     s->size = pulse[0], s->rate = pulse[1], s->begin = pulse[2];
-    s->calls = 0;
     memcpy(x, vehiclemor_start_equilibrium, N * sizeof(double));
-    for (int part = 0; part < 3 && !failed; part++) {
+    for (int part = 0; part < 3; part++) {
         s->moves = part == 1;
         memset(s->u, 0, sizeof s->u);
         CVodeReInit(s->cvode, times[edges[part]], s->state);
         CVodeSetStopTime(s->cvode, times[edges[part + 1]]);
-        for (int k = edges[part]; k <= edges[part + 1] && !failed; k++) {
-            if (k > edges[part])
-                failed = CVode(s->cvode, times[k], s->state, &t, 1) < 0;
+        for (int k = edges[part]; k <= edges[part + 1]; k++) {
+            if (k > edges[part] && CVode(s->cvode, times[k], s->state, &t, 1) < 0)
+                return -1;
             if (column < 0)
                 memcpy(states + (size_t)k * N, x, N * sizeof(double));
             else
@@ -97,29 +95,22 @@ int run(Solver *s, const double *pulse, const double *times, const int *edges, i
             if (outputs)
                 vehiclemor_outputs(x, s->u, s->c, outputs + (size_t)k * VEHICLEMOR_OUTPUTS);
         }
-        CVodeGetNumRhsEvals(s->cvode, calls);
-        CVodeGetNumLinRhsEvals(s->cvode, calls + 1);
-        s->calls += calls[0] + calls[1];
+        CVodeGetNumRhsEvals(s->cvode, further);
+        CVodeGetNumLinRhsEvals(s->cvode, further + 1);
+        calls += further[0] + further[1];
     }
-    return failed;
+    return calls;
 }
 
 /* One step with held inputs. */
-int step(Solver *s, double *state, const double *u, double dt)
+void step(Solver *s, double *state, const double *u, double dt)
 {
     double *x = N_VGetArrayPointer(s->state), t;
-    int failed;
     s->moves = 0;
     memcpy(s->u, u, sizeof s->u);
     memcpy(x, state, N * sizeof(double));
     CVodeReInit(s->cvode, 0.0, s->state);
     CVodeSetStopTime(s->cvode, dt);
-    failed = CVode(s->cvode, dt, s->state, &t, 1) < 0;
+    CVode(s->cvode, dt, s->state, &t, 1);
     memcpy(state, x, N * sizeof(double));
-    return failed;
-}
-
-long calls(const Solver *s)
-{
-    return s->calls;
 }

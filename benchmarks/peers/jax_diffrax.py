@@ -10,7 +10,7 @@ import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
-from clock import Case, Curve, LeftOutError, pulse
+from clock import Case, Curve, pulse
 
 import vehiclemor as vm
 from vehiclemor.inputs import steering
@@ -18,25 +18,19 @@ from vehiclemor.inputs import steering
 jax.config.update("jax_platforms", "cpu")
 jax.config.update("jax_enable_x64", True)
 
-# States of a car that can be compiled within a minute.
-LARGEST = 40
-
 
 def batch(case: Case) -> dict[str, Curve]:
     """Tsit5, compiled once: the tolerance is an argument."""
-    if len(case.start) > LARGEST:
-        raise LeftOutError("XLA had not compiled this car after two minutes, at 4 GB")
-    function, racked = vm.export(case.model, "jax"), len(case.model.inputs) > 1
+    function, scale = vm.export(case.model, "jax"), jnp.array(case.model.error_scale)
     times, start = jnp.array(case.maneuver.times), jnp.array(case.start)
-    signals, scale = case.more["signals"], jnp.array(case.model.error_scale)
-    factors = jnp.array([(s.frequency_factor, s.amplitude_factor) for s in signals])
+    factors = jnp.array([(s.frequency_factor, s.amplitude_factor) for s in case.more])
     save = diffrax.SaveAt(ts=times, fn=lambda t, x, args: x[case.lateral])  # noqa: ARG005
 
     def rates(t: Any, x: Any, args: Any) -> Any:
         end = steering.BEGIN + steering.LANE_CHANGE_LENGTH / args[0]
         # The pulse is continuous where it is clipped, so that no step need end there.
         clipped = jnp.clip(t, steering.BEGIN, end)
-        return function(x, jnp.array(pulse(clipped, jnp, racked, args[1], args[0])))[0]
+        return function(x, jnp.array(pulse(clipped, jnp, case.racked, args[1], args[0])))[0]
 
     def single(args: Any, tolerance: Any) -> Any:
         return diffrax.diffeqsolve(
@@ -48,4 +42,4 @@ def batch(case: Case) -> dict[str, Curve]:
 
     compiled = jax.jit(jax.vmap(single, (0, None)))
     make = lambda tolerance: lambda: np.asarray(compiled(factors, tolerance))  # noqa: E731
-    return {"JAX diffrax Tsit5": Curve(make, (1e-4, 1e-6), np.asarray, "lateral position")}
+    return {"JAX diffrax Tsit5": Curve(make, (1e-4, 1e-6), delivers="lateral position")}

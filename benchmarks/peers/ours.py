@@ -13,32 +13,27 @@ SOLVERS = ("ros34pw2", "etdrk4", "exponential_adams")
 
 def run(case: Case) -> dict[str, Curve]:
     """Runs that deliver the states as peers do, and runs that deliver all outputs."""
-    found, states = {}, case.model.definition.states
-    column = case.model.outputs.index("lateral_position")
+    lateral = case.model.outputs.index("lateral_position")
+
+    def make(tolerance: float, solver: str, names: tuple[str, ...] | None) -> Any:
+        how: dict[str, Any] = {"solver": solver, "tolerance": tolerance, "outputs": names}
+
+        def whole() -> Any:
+            trajectory = case.model.simulate(case.maneuver, "equilibrium", **how)
+            _ = trajectory.outputs  # histories are made when they are first read
+            return trajectory
+
+        return whole
+
+    def curve(solver: str, names: tuple[str, ...] | None, column: int, delivers: str) -> Curve:
+        made, read = partial(make, solver=solver, names=names), lambda r: r.outputs[:, column]
+        return Curve(made, decades(1e-1, 1e-8), read, delivers, lambda r: r.counts["rhs_calls"])
+
+    found = {}
     for solver in SOLVERS:
-        how: dict[str, Any] = {"start": "equilibrium", "solver": solver}
-
-        def call(tolerance: float, names: tuple[str, ...] | None, how: dict = how) -> Any:
-            simulate, maneuver = case.model.simulate, case.maneuver
-
-            def whole() -> Any:
-                trajectory = simulate(maneuver, tolerance=tolerance, outputs=names, **how)
-                _ = trajectory.outputs  # histories are made when they are first read
-                return trajectory
-
-            return whole
-
-        scan = decades(1e-1, 1e-8)
-        found[f"ours {solver}"] = Curve(
-            partial(call, names=states),
-            scan,
-            lambda r: r.outputs[:, case.lateral],
-            counts=lambda r: r.counts["rhs_calls"],
-        )
-        read = lambda r: r.outputs[:, column]  # noqa: E731
-        found[f"ours {solver}, outputs"] = Curve(
-            partial(call, names=None), scan, read, "outputs", lambda r: r.counts["rhs_calls"]
-        )
+        names = case.model.definition.states
+        found[f"ours {solver}"] = curve(solver, names, case.lateral, "states")
+        found[f"ours {solver}, outputs"] = curve(solver, None, lateral, "outputs")
     return found
 
 
@@ -46,21 +41,11 @@ def steps(case: Case) -> dict[str, Curve]:
     """A loop in Python: a step of 10 ms with held inputs."""
 
     def make(tolerance: float, solver: str) -> Any:
-        car = vm.reduce(case.model, "full_order", solver=solver, tolerance=tolerance)
+        step = vm.reduce(case.model, "full_order", solver=solver, tolerance=tolerance).step
+        return lambda: case.loop(lambda x, u: step(x, u, 0.01), case.start, case.more)
 
-        def loop() -> np.ndarray:
-            state, found = case.start, np.empty(len(case.reference))
-            for k, u in enumerate(case.more["held"]):
-                state = car.step(state, u, 0.01)
-                found[k] = state[case.lateral]
-            return found
-
-        return loop
-
-    return {
-        f"ours {solver}": Curve(partial(make, solver=solver), decades(1e-1, 1e-6, 2), np.asarray)
-        for solver in SOLVERS[:2]
-    }
+    scan = decades(1e-1, 1e-6, 2)
+    return {f"ours {solver}": Curve(partial(make, solver=solver), scan) for solver in SOLVERS[:2]}
 
 
 def batch(case: Case) -> dict[str, Curve]:
@@ -68,16 +53,11 @@ def batch(case: Case) -> dict[str, Curve]:
 
     def make(tolerance: float, solver: str) -> Any:
         car = vm.reduce(case.model, "full_order", solver=solver, tolerance=tolerance)
-        names, signals = ["lateral_position"], case.more["signals"]
-        return lambda: vm.simulate_many(car, signals, "equilibrium", outputs=names, jobs=1)
+        how: dict[str, Any] = {"outputs": ["lateral_position"], "jobs": 1}
+        return lambda: vm.simulate_many(car, case.more, "equilibrium", **how)
 
-    read = lambda found: found["values"].values[:, :, 0]  # noqa: E731
-    return {
-        f"ours {solver}": Curve(
-            partial(make, solver=solver), decades(1e-1, 1e-7, 2), read, "lateral position"
-        )
-        for solver in SOLVERS
-    }
+    how = decades(1e-1, 1e-7, 2), lambda found: found["values"].values[:, :, 0], "lateral position"
+    return {f"ours {solver}": Curve(partial(make, solver=solver), *how) for solver in SOLVERS}
 
 
 def mechanism(case: Case) -> dict[str, Curve]:
@@ -87,12 +67,8 @@ def mechanism(case: Case) -> dict[str, Curve]:
         how: dict[str, Any] = {"solver": solver, "tolerance": tolerance}
         return lambda: case.model.simulate(case.maneuver, **how).outputs
 
-    return {
-        f"ours {solver}": Curve(
-            partial(make, solver=solver), decades(1e-1, 1e-9, 1), np.asarray, "outputs"
-        )
-        for solver in ("newton", "newton_lanes")
-    }
+    how, solvers = (decades(1e-1, 1e-9, 1), np.asarray, "outputs"), ("newton", "newton_lanes")
+    return {f"ours {solver}": Curve(partial(make, solver=solver), *how) for solver in solvers}
 
 
 def structure(case: Case) -> dict[str, Curve]:
@@ -101,5 +77,4 @@ def structure(case: Case) -> dict[str, Curve]:
     def make(step: float) -> Any:
         return lambda: case.model.run(case.maneuver, step=step).outputs
 
-    read = lambda y: y / case.more["ranges"]  # noqa: E731
-    return {"ours": Curve(make, case.more["steps"], read, "outputs")}
+    return {"ours": Curve(make, case.more, delivers="outputs")}

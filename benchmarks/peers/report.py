@@ -1,6 +1,7 @@
 """Tables and figures of what was measured: whoever is faster stands first."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -10,29 +11,31 @@ from vehiclemor.report.figures import theme
 
 OURS = "ours"
 HEADER = ("who", "CPU time", "spread", "over ours", "at tolerance", "error", "rhs calls")
-# Beginning of a label -> its line; those of one package that begin alike are drawn as the best.
-LINES: dict[str, dict[str, Any]] = {
-    "ours ros34pw2": {"color": "black", "linestyle": (0, (1, 1))},
-    "ours etdrk4": {"color": "black", "linestyle": "-", "linewidth": 2.2},
-    "ours exponential_adams": {"color": "black", "linestyle": "--"},
-    "ours newton_lanes": {"color": "black", "linestyle": "-", "linewidth": 2.2},
-    "ours newton": {"color": "black", "linestyle": "--"},
-    "ours": {"color": "black", "linestyle": "-", "linewidth": 2.2},
-    "CVODE in C": {"color": theme.COLORS[1], "linestyle": "--"},
-    "CVODE in C, bare rhs": {"color": theme.COLORS[1], "linewidth": 2.2},
-    "CasADi CVODES, C code": {"color": theme.COLORS[0], "linestyle": "-"},
-    "CasADi Runge-Kutta": {"color": theme.COLORS[0], "linestyle": (0, (1, 1))},
-    "CasADi": {"color": theme.COLORS[0], "linestyle": "--"},
-    "scikit-sundae CVODE": {"color": theme.COLORS[2], "linestyle": "-"},
-    "scikit-sundae IDA": {"color": theme.COLORS[2], "linestyle": "--"},
-    "SciPy": {"color": theme.COLORS[3], "linestyle": "-"},
-    "JAX": {"color": theme.COLORS[4], "linestyle": "-"},
-    "Exudyn": {"color": theme.COLORS[5], "linestyle": "-"},
-    "pyMOR": {"color": theme.COLORS[4], "linestyle": "--"},
+BLUE, RED, GREEN, PINK, ORANGE, CYAN = theme.COLORS
+DOTTED = (0, (1, 1))
+# Beginning of a label -> color, line and its width.
+LINES: dict[str, tuple[str, Any, float]] = {
+    "ours": ("black", "-", 2.2),
+    "ours ros34pw2": ("black", DOTTED, 1.4),
+    "ours exponential_adams": ("black", "--", 1.4),
+    "ours newton": ("black", "--", 1.4),
+    "ours newton_lanes": ("black", "-", 2.2),
+    "CVODE in C": (RED, "--", 1.4),
+    "CVODE in C, bare rhs": (RED, "-", 2.2),
+    "CasADi": (BLUE, "--", 1.4),
+    "CasADi CVODES, C code": (BLUE, "-", 1.4),
+    "CasADi Runge-Kutta": (BLUE, DOTTED, 1.4),
+    "scikit-sundae CVODE": (GREEN, "-", 1.4),
+    "scikit-sundae IDA": (GREEN, "--", 1.4),
+    "SciPy": (PINK, "-", 1.4),
+    "JAX": (ORANGE, "-", 1.4),
+    "Exudyn": (CYAN, "-", 1.4),
 }
-
 # Errors are drawn down to this part of the tightest target; smaller ones stand there.
 SEEN = 0.02
+
+# What times are divided by, where it is nothing.
+ONCE = (1, "")
 
 Points = Sequence[Mapping[str, Any]]
 
@@ -42,13 +45,6 @@ def choose(points: Points, target: float) -> Mapping[str, Any] | None:
 
     Only a tolerance counts for which it and all tighter ones of the scan stay at or below the
     target: no lucky runs.
-
-    Parameters
-    ----------
-    points
-        With `tolerance`, `error` and `seconds`, in any order.
-    target
-        Largest error.
     """
     good: list[Mapping[str, Any]] = []
     for point in sorted(points, key=lambda p: p["tolerance"]):
@@ -58,57 +54,67 @@ def choose(points: Points, target: float) -> Mapping[str, Any] | None:
     return min(good, key=lambda p: p["seconds"], default=None)
 
 
-def front(points: Points) -> list[tuple[float, float]]:
-    """Errors that are kept from a tolerance on, and the least seconds for them, by error."""
-    errors = sorted({p["error"] for p in points})
-    best = [(error, choose(points, error)) for error in errors]
-    found: list[tuple[float, float]] = []
-    for error, point in best:
-        if point is not None and (not found or point["seconds"] < found[-1][1]):
-            found.append((error, point["seconds"]))
+def front(scans: Iterable[Points], least: float = 0.0) -> list[tuple[float, float]]:
+    """Errors, the smallest `least`, and the least seconds in which a scan keeps them."""
+    scans, found = list(scans), []
+    for error in sorted({max(p["error"], least) for points in scans for p in points}):
+        chosen = [point for points in scans if (point := choose(points, error))]
+        seconds = min((point["seconds"] for point in chosen), default=np.inf)
+        if seconds < (found[-1][1] if found else np.inf):
+            found.append((error, seconds))
     return found
 
 
 def rows(case: Mapping[str, Any], target: float, delivers: str) -> list[tuple[str, ...]]:
-    """Rows of all who deliver this at a target error, the fastest first; then who can't.
-
-    The ratio is that to the fastest of ours.  A peer that is faster is said to be so in words.
-    """
+    """Rows of all who deliver this at a target error, the fastest first; then who can't."""
     curves = {k: c for k, c in case["curves"].items() if c["delivers"] == delivers}
     chosen = {label: choose(curve["points"], target) for label, curve in curves.items()}
-    reached = {label: point for label, point in chosen.items() if point is not None}
-    own = min((p["seconds"] for k, p in reached.items() if k.startswith(OURS)), default=np.nan)
-    found = []
-    for label, point in sorted(reached.items(), key=lambda pair: pair[1]["seconds"]):
-        ratio = point["seconds"] / own
-        verdict = f"{ratio:.2g}" if ratio < 10.0 else f"{ratio:.0f}"
-        if not label.startswith(OURS) and not ratio >= 1.0:
-            verdict = f"{verdict}: FASTER THAN OURS" if own > 0.0 else "OURS DO NOT REACH IT"
-        low, _, high = (time_text(s / case.get("per", [1])[0]) for s in point["spread"])
-        seconds = time_text(point["seconds"] / case.get("per", [1])[0])
+    reached = [(label, point) for label, point in chosen.items() if point is not None]
+    own = min((p["seconds"] for label, p in reached if label.startswith(OURS)), default=np.nan)
+    count, found = case.get("per", ONCE)[0], []
+    for label, point in sorted(reached, key=lambda pair: pair[1]["seconds"]):
+        times = (point["seconds"], point["spread"][0], point["spread"][2])
+        seconds, low, high = (time_text(s / count) for s in times)
+        ratio, calls = ratio_text(label, point["seconds"] / own), point.get("evaluations", "")
         tolerance, error = f"{point['tolerance']:.1e}", f"{point['error']:.1e}"
-        calls = str(point.get("evaluations", ""))
-        found.append((label, seconds, f"{low} to {high}", verdict, tolerance, error, calls))
+        found.append((label, seconds, f"{low} to {high}", ratio, tolerance, error, str(calls)))
     for label, curve in curves.items():
         if chosen[label] is None:
-            least = min((p["error"] for p in curve["points"]), default=np.nan)
-            found.append((label, "not reached", "", "", "", f"at best {least:.1e}", ""))
+            error = f"at best {least_error(curve)}"
+            found.append((label, "not reached", "", "", "", error, ""))
     return found
+
+
+def ratio_text(label: str, ratio: float) -> str:
+    """Time over that of the fastest of ours; a peer that is faster is said to be so in words."""
+    if np.isnan(ratio):
+        return "OURS DO NOT REACH IT"
+    text = f"{ratio:.2g}" if ratio < 10.0 else f"{ratio:.0f}"
+    return f"{text}: FASTER THAN OURS" if ratio < 1.0 and not label.startswith(OURS) else text
+
+
+def least_error(curve: Mapping[str, Any]) -> str:
+    """Least distance of a curve from the reference."""
+    return f"{min((p['error'] for p in curve['points']), default=np.nan):.1e}"
+
+
+def kinds(case: Mapping[str, Any]) -> list[str]:
+    """What the curves of a comparison deliver: states, outputs."""
+    return list(dict.fromkeys(curve["delivers"] for curve in case["curves"].values()))
 
 
 def summary(cases: Mapping[str, Mapping[str, Any]]) -> str:
     """Of each comparison and target error who is first, and the fastest of all others."""
     body = []
     for name, case in cases.items():
-        for delivers in dict.fromkeys(c["delivers"] for c in case["curves"].values()):
-            for target in case["targets"]:
-                reached = [row for row in rows(case, target, delivers) if row[3]]
-                own = next((row for row in reached if row[0].startswith(OURS)), None)
-                other = next((row for row in reached if not row[0].startswith(OURS)), None)
-                pair = sorted([row for row in (own, other) if row], key=reached.index)
-                first, then = ([f"{row[0]} {row[1]}" for row in pair] + ["", ""])[:2]
-                ratio = other[3] if other else ""
-                body.append((name, delivers, f"{target:g} {case['unit']}", first, then, ratio))
+        for delivers, target in product(kinds(case), case["targets"]):
+            reached = [row for row in rows(case, target, delivers) if row[3]]
+            own = [row for row in reached if row[0].startswith(OURS)][:1]
+            other = [row for row in reached if not row[0].startswith(OURS)][:1]
+            pair = sorted(own + other, key=reached.index)
+            first, then = ([f"{row[0]} {row[1]}" for row in pair] + ["", ""])[:2]
+            ratio = other[0][3] if other else ""
+            body.append((name, delivers, f"{target:g} {case['unit']}", first, then, ratio))
     header = ("case", "delivers", "error", "first", "then", "other over ours")
     return "\n".join(["## In short: ours, and the fastest other", "", *table(header, body)])
 
@@ -134,17 +140,13 @@ def table(header: Iterable[str], body: Iterable[Iterable[str]]) -> list[str]:
 
 def case_text(case: Mapping[str, Any]) -> str:
     """Tables of one comparison, and who is missing and why."""
-    per = f", for each {case['per'][1]}" if "per" in case else ""
+    each = case.get("per", ONCE)[1]
+    per = f", for each {each}" if each else ""
     lines = [f"## {case['title']}", "", f"{case['clock']}{per}; {case['about']}", ""]
-    kinds = list(dict.fromkeys(c["delivers"] for c in case["curves"].values()))
-    for delivers in kinds:
-        for target in case["targets"]:
-            lines += [f"Error of at most {target:g} {case['unit']}, {delivers}:", ""]
-            lines += [*table(HEADER, rows(case, target, delivers)), ""]
-    accuracy = [
-        (label, f"{min((p['error'] for p in curve['points']), default=np.nan):.1e}")
-        for label, curve in case["curves"].items()
-    ]
+    for delivers, target in product(kinds(case), case["targets"]):
+        lines += [f"Error of at most {target:g} {case['unit']}, {delivers}:", ""]
+        lines += [*table(HEADER, rows(case, target, delivers)), ""]
+    accuracy = [(label, least_error(curve)) for label, curve in case["curves"].items()]
     lines += ["Least distance from the reference (do they solve the same equations?):", ""]
     lines += [*table(("who", case["unit"]), accuracy), ""]
     return "\n".join(lines + missing_lines(case))
@@ -152,8 +154,8 @@ def case_text(case: Mapping[str, Any]) -> str:
 
 def missing_lines(case: Mapping[str, Any]) -> list[str]:
     """A row for each peer that is not there, or that can't do it."""
-    absent = case.get("missing", {})
-    return [*table(("not measured", "why"), absent.items()), ""] if absent else []
+    absent = case["missing"].items()
+    return [*table(("not measured", "why"), absent), ""] if absent else []
 
 
 def context_text(case: Mapping[str, Any]) -> str:
@@ -165,46 +167,39 @@ def context_text(case: Mapping[str, Any]) -> str:
     return "\n".join([*lines, "", *missing_lines(case)])
 
 
-def style_of(label: str) -> dict[str, Any]:
-    """Line of a label: that of the longest beginning."""
-    known = max((k for k in LINES if label.startswith(k)), key=len, default="")
-    return LINES.get(known, {"color": "gray"})
-
-
 def drawn(case: Mapping[str, Any]) -> dict[str, list[tuple[float, float]]]:
-    """Work-precision lines of a comparison; those of SciPy as the best of them."""
-    kinds = [curve["delivers"] for curve in case["curves"].values()]
-    lines: dict[str, list[tuple[float, float]]] = {}
+    """Work-precision lines of what is delivered first; those of SciPy as the best of them."""
+    scans: dict[str, list[Points]] = {}
     for label, curve in case["curves"].items():
-        if curve["delivers"] == kinds[0]:
+        if curve["delivers"] == kinds(case)[0]:
             name = "SciPy, the best" if label.startswith("SciPy") else label
-            lines[name] = lines.get(name, []) + front(curve["points"])
-    least, per = SEEN * min(case["targets"]), case.get("per", [1])[0]
-    found = {}
-    for label, points in lines.items():
-        kept: list[tuple[float, float]] = []
-        for error, seconds in sorted((max(e, least), s / per) for e, s in points):
-            if not kept or seconds < kept[-1][1]:
-                kept.append((error, seconds))
-        found[label] = kept
-    return found
+            scans.setdefault(name, []).append(curve["points"])
+    least = SEEN * min(case["targets"])
+    return {label: front(points, least) for label, points in scans.items()}
 
 
-def figure(cases: Mapping[str, Mapping[str, Any]], path: Path) -> list[Path]:
+def draw(panel: Any, case: Mapping[str, Any]) -> None:
+    """Lines of one comparison."""
+    for label, points in drawn(case).items():
+        x, y = np.array(points).reshape(-1, 2).T
+        known = max((k for k in LINES if label.startswith(k)), key=len)
+        color, dashes, width = LINES[known]
+        style = {"color": color, "linestyle": dashes, "linewidth": width}
+        milliseconds = 1e3 * y / case.get("per", ONCE)[0]
+        panel.loglog(x, milliseconds, label=label, marker=".", markersize=4, **style)
+    panel.invert_xaxis()
+    theme.tick_decades(panel.yaxis, *panel.get_ylim())
+    panel.set_xlabel(f"error ({case['unit']})")
+
+
+def figure(cases: Mapping[str, Mapping[str, Any]], path: Path) -> None:
     """Work-precision of the comparisons of one model, a panel each, as PNG and PDF."""
     with theme.styled():
         made, panels = theme.panels(1, len(cases), (3.3 * max(len(cases), 1.4), 3.7))
         for number, (case, panel) in enumerate(zip(cases.values(), panels[0], strict=True)):
-            for label, points in drawn(case).items():
-                x, y = np.array(points).reshape(-1, 2).T
-                panel.loglog(x, 1e3 * y, label=label, marker=".", markersize=4, **style_of(label))
-            panel.invert_xaxis()
-            theme.tick_decades(panel.yaxis, *panel.get_ylim())
-            panel.set_xlabel(f"error ({case['unit']})")
+            draw(panel, case)
             panel.set_title(theme.letter(number, case["panel"]) if len(cases) > 1 else "")
         panels[0, 0].set_ylabel("CPU time (ms)")
         theme.legend_below(made, made.axes)
-        return [
+        for kind in ("png", "pdf"):
             theme.save_figure(made, path.with_name(f"{path.name}.{kind}"))
-            for kind in ("png", "pdf")
-        ]

@@ -8,6 +8,7 @@ What is stored in DIR/peers.json is not measured again unless asked for.
 import argparse
 import datetime
 import time
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -17,22 +18,19 @@ import report
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.provenance import machine
 
-VEHICLE, PARTS = ("run", "steps", "batch"), ("mechanism", "structure")
-# File of a peer -> distributions that it needs, and the kinds of cases that it can do.
+PACKAGES = ("vehiclemor", "numpy", "numba", "scipy", "casadi", "scikit-sundae", "exudyn", "mujoco")
+PACKAGES += ("jax", "diffrax", "commonroad-vehicle-models")
+# Kind of a case -> files of the peers that can do it.
 PEERS = {
-    "ours": (("vehiclemor", "numpy", "numba"), (*VEHICLE, *PARTS)),
-    "c_cvode": (("scikit-sundae",), VEHICLE),
-    "sundae": (("scikit-sundae",), ("run", "steps")),
-    "casadi_ode": (("casadi",), ("run", "steps", "mechanism")),
-    "scipy_ode": (("scipy",), ("run", "mechanism")),
-    "jax_diffrax": (("jax", "diffrax"), ("batch",)),
-    "structures": (("scipy",), ("structure",)),
-    "exudyn_models": (("exudyn",), PARTS),
-    "mujoco_scene": (("mujoco",), ("context",)),
-    "commonroad": (("commonroad-vehicle-models",), ("context",)),
+    "run": ("ours", "c_cvode", "sundae", "casadi_ode", "scipy_ode"),
+    "steps": ("ours", "c_cvode", "sundae", "casadi_ode"),
+    "batch": ("ours", "c_cvode", "jax_diffrax"),
+    "mechanism": ("ours", "casadi_ode", "scipy_ode", "exudyn_models"),
+    "structure": ("ours", "structures", "exudyn_models"),
+    "context": ("mujoco_scene", "commonroad"),
 }
 NO_TIRES = "no Magic Formula and no Fiala tire: its car would be another one"
-# Kind -> tools that a user would think of, and why they are no row.
+# Kind or case -> peers, and tools that a user would think of, and why they are no row.
 CANNOT = {
     "run": {
         "Exudyn": NO_TIRES,
@@ -41,6 +39,9 @@ CANNOT = {
     },
     "mechanism": {"MuJoCo": "constraints are soft: errors do not fall with a tolerance"},
     "structure": {"pyMOR": "linear; springs, stops and tires of the truck are not"},
+    "high_fidelity_vehicle-batch": {
+        "jax_diffrax": "XLA had not compiled this car after two minutes, at 4 GB"
+    },
 }
 CONTEXT = "other-vehicles"
 PANELS = {"run": "a run", "steps": "a step of 10 ms", "batch": "a run of a batch"}
@@ -49,27 +50,67 @@ PANELS = {"run": "a run", "steps": "a step of 10 ms", "batch": "a run of a batch
 def compared(name: str) -> dict[str, Any]:
     """Measure one comparison."""
     case = clock.cases()[name]()
-    names = [peer for peer, (_, kinds) in PEERS.items() if case.kind in kinds]
-    curves, missing = clock.collected(names, case)
-    content: dict[str, Any] = {
+    cannot = CANNOT.get(case.kind, {}) | CANNOT.get(name, {})
+    peers = [peer for peer in PEERS[case.kind] if peer not in cannot]
+    curves, missing = clock.collected(peers, case.kind, case)
+    return {
         "title": case.title,
         "panel": PANELS.get(case.kind, case.title),
         "unit": case.unit,
         "targets": case.targets,
+        "per": case.per,
         "clock": "whole calls, CPU time of the " + case.clock.removesuffix("_time"),
+        "curves": clock.measured(curves, case),
+        "missing": missing | cannot,
     }
-    if "per" in case.more:
-        content["per"] = case.more["per"]
-    missing |= CANNOT.get(case.kind, {})
-    return content | {"curves": clock.measured(curves, case), "missing": missing}
 
 
 def others() -> dict[str, Any]:
-    """Time other vehicles and scenes of other tools: no comparison, since nothing is equal."""
-    scenes = [peer for peer, (_, kinds) in PEERS.items() if "context" in kinds]
-    found, missing = clock.others(scenes)
+    """Time a simulated second of scenes of other tools: no comparison, since nothing is equal."""
+    scenes, missing = clock.collected(PEERS["context"], "context")
+    found = {}
+    for label, (call, simulated, what) in scenes.items():
+        call()
+        seconds = [clock.seconds_of(call, clock.SHORT, time.process_time) for _ in range(3)]
+        found[label] = {"seconds": min(seconds) / simulated, "what": what}
     title = "Other vehicles, for scale alone: none of them is one of ours"
     return {"title": title, "clock": "CPU time of the process", "rows": found, "missing": missing}
+
+
+def version_of(package: str) -> str:
+    """Version of a distribution, or that it isn't installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def measure(names: list[str], path: Path, again: bool) -> None:
+    """Measure what is not stored, and store each case when it is done."""
+    began = time.monotonic()
+    for name in names:
+        content = clock.stored(path)
+        if name in content and not again:
+            continue
+        print(f"{name} ({time.monotonic() - began:.0f} s)", flush=True)
+        found = others() if name == CONTEXT else compared(name)
+        date = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
+        found["about"] = f"{machine()}; {date}"
+        found["versions"] = {package: version_of(package) for package in sorted(PACKAGES)}
+        clock.store(path, content | {name: found})
+
+
+def tell(cases: dict[str, Any], results: Path) -> None:
+    """Write and print the tables of what is stored, and draw a figure for each model."""
+    compared = {name: case for name, case in cases.items() if name != CONTEXT}
+    texts = [report.summary(compared), *map(report.case_text, compared.values())]
+    texts += [report.context_text(cases[CONTEXT])] if CONTEXT in cases else []
+    write_text(results / "peers.md", "\n\n".join(texts) + "\n")
+    print("\n\n".join(texts))
+    make_folder(results / "figures")
+    for model in dict.fromkeys(name.split("-")[0] for name in compared):
+        of_model = {k: c for k, c in compared.items() if k.split("-")[0] == model}
+        report.figure(of_model, results / "figures" / f"peers-{model}")
 
 
 def main() -> None:
@@ -80,28 +121,10 @@ def main() -> None:
     parser.add_argument("--again", action="store_true", help="measure what is stored once more")
     parser.add_argument("--only", nargs="*", choices=names, default=names, metavar="CASE")
     given = parser.parse_args()
-    path, began = given.results / "peers.json", time.monotonic()
-    for name in given.only:
-        content = clock.stored(path)
-        if name in content and not given.again:
-            continue
-        print(f"{name} ({time.monotonic() - began:.0f} s)", flush=True)
-        found = others() if name == CONTEXT else compared(name)
-        date = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
-        packages = sorted({package for needed, _ in PEERS.values() for package in needed})
-        found |= {"about": f"{machine()}; {date}", "versions": clock.versions(packages)}
-        clock.store(path, content | {name: found})
+    path = given.results / "peers.json"
+    measure(given.only, path, given.again)
     content = clock.stored(path)
-    make_folder(given.results / "figures")
-    measured = {name: content[name] for name in names if name in content}
-    texts = [report.summary({k: c for k, c in measured.items() if k != CONTEXT})]
-    for name, case in measured.items():
-        texts.append((report.context_text if name == CONTEXT else report.case_text)(case))
-    for model in dict.fromkeys(name.split("-")[0] for name in measured if name != CONTEXT):
-        of_model = {k: c for k, c in measured.items() if k.split("-")[0] == model}
-        report.figure(of_model, given.results / "figures" / f"peers-{model}")
-    write_text(given.results / "peers.md", "\n\n".join(texts) + "\n")
-    print("\n\n".join(texts))
+    tell({name: content[name] for name in names if name in content}, given.results)
 
 
 if __name__ == "__main__":

@@ -66,5 +66,4 @@ def structure(case: Case) -> dict[str, Curve]:
 
         return march
 
-    read = lambda y: y / case.more["ranges"]  # noqa: E731
-    return {"SciPy splu, loop in Python": Curve(make, case.more["steps"], read, "outputs")}
+    return {"SciPy splu, loop in Python": Curve(make, case.more, delivers="outputs")}

@@ -1,5 +1,7 @@
 """scikit-sundae: CVODE and IDA of SUNDIALS, with functions in Python."""
 
+import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,26 +12,26 @@ from sksundae.ida import IDA
 
 def run(case: Case) -> dict[str, Curve]:
     """CVODE on the right-hand side, and IDA on the equations before elimination."""
-    read, scan = (lambda states: states[:, case.lateral]), decades(1e-3, 1e-9, 2)
-    found = {"scikit-sundae CVODE": Curve(lambda tolerance: cvode(case, tolerance), scan, read)}
+    how = decades(1e-3, 1e-9, 2), case.lateral_of
+    found = {"scikit-sundae CVODE": Curve(partial(cvode, case), *how)}
     if "descriptor" in case.model.equations.shapes:
-        label = "scikit-sundae IDA, descriptor form"
-        found[label] = Curve(lambda tolerance: ida(case, tolerance), decades(1e-3, 1e-8, 2), read)
+        how = decades(1e-3, 1e-8, 2), case.lateral_of
+        found["scikit-sundae IDA, descriptor form"] = Curve(partial(ida, case), *how)
     return found
 
 
 def cvode(case: Case, tolerance: float) -> Any:
     """BDF, dense Jacobian by differences."""
-    rhs, how = callback(case), {"rtol": tolerance, "atol": tolerance * case.model.error_scale}
+    functions = callback(case, moves=False), callback(case, moves=True)
+    how = {"rtol": tolerance, "atol": tolerance * case.model.error_scale}
 
     def part(state: np.ndarray, times: np.ndarray, moves: bool) -> np.ndarray:
-        function = rhs(moves)
+        function = functions[moves]
 
         def rates(t: float, x: np.ndarray, dx: np.ndarray) -> None:
             dx[:] = function(t, x)
 
-        solver = CVODE(rates, method="BDF", max_num_steps=100_000, **how)
-        return solver.solve(times, state).y
+        return CVODE(rates, method="BDF", max_num_steps=100_000, **how).solve(times, state).y
 
     return lambda: case.by_parts(part)
 
@@ -39,11 +41,8 @@ def ida(case: Case, tolerance: float) -> Any:
 
     The unknowns are q, v and lambda.
     """
-    import math
-
-    rows = case.model.bare("descriptor")
-    n, c = len(case.model.coordinates), case.model.equations.shapes["descriptor"][0]
-    c -= n
+    rows, n = case.model.bare("descriptor"), len(case.model.coordinates)
+    c = case.model.equations.shapes["descriptor"][0] - n
     table, state, u = np.empty((n + c, n + 1)), case.start, np.zeros(len(case.model.inputs))
     scale = np.append(case.model.error_scale, np.full(c, 1e3))  # forces are of kN
     how = {"rtol": tolerance, "atol": tolerance * scale, "max_num_steps": 100_000}
@@ -74,25 +73,20 @@ def ida(case: Case, tolerance: float) -> Any:
 def steps(case: Case) -> dict[str, Curve]:
     """A solver that starts afresh at each step."""
     rhs, state, rates = case.model.bare("rhs"), case.start, np.empty(len(case.start))
+    held, span = np.zeros(len(case.model.inputs)), np.array([0.0, 0.01])
+
+    def function(_: float, x: np.ndarray, dx: np.ndarray) -> None:
+        state[:] = x
+        rhs(state, held, rates)
+        dx[:] = rates
 
     def make(tolerance: float) -> Any:
-        held, span = np.zeros(len(case.model.inputs)), np.array([0.0, 0.01])
-
-        def function(_: float, x: np.ndarray, dx: np.ndarray) -> None:
-            state[:] = x
-            rhs(state, held, rates)
-            dx[:] = rates
-
         solver = CVODE(function, rtol=tolerance, atol=tolerance * case.model.error_scale)
 
-        def loop() -> np.ndarray:
-            x, found = case.start, np.empty(len(case.reference))
-            for k, u in enumerate(case.more["held"]):
-                held[:] = u
-                x = solver.solve(span, x).y[-1]
-                found[k] = x[case.lateral]
-            return found
+        def step(x: np.ndarray, u: np.ndarray) -> np.ndarray:
+            held[:] = u
+            return solver.solve(span, x).y[-1]
 
-        return loop
+        return lambda: case.loop(step, case.start, case.more)
 
-    return {"scikit-sundae CVODE": Curve(make, decades(1e-2, 1e-6, 2), np.asarray)}
+    return {"scikit-sundae CVODE": Curve(make, decades(1e-2, 1e-8, 2))}

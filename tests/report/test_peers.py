@@ -31,7 +31,7 @@ def test_a_target_that_is_not_reached_has_no_choice():
 
 
 def test_the_front_holds_what_would_be_chosen():
-    front = report.front(SCAN)
+    front = report.front([SCAN])
     assert front == [(2e-5, 4.0), (8e-4, 3.0), (5e-2, 1.0)]
 
 
@@ -77,7 +77,7 @@ def test_a_missing_peer_is_a_row_and_one_that_fails_too(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "failing_peer.py").write_text("def run(case):\n    raise ValueError('no')\n")
     any_case = clock.Case("run", "", "m", (1.0,), None, None, np.zeros(1))
-    curves, missing = clock.collected(["no_such_peer", "failing_peer"], any_case)
+    curves, missing = clock.collected(["no_such_peer", "failing_peer"], "run", any_case)
     assert not curves
     assert missing["no_such_peer"].startswith("not installed")
     assert missing["failing_peer"] == "failed: ValueError: no"
@@ -91,7 +91,7 @@ def test_points_are_measured_and_stored_whole(tmp_path):
 
     curve = clock.Curve(make, clock.decades(1.0, 1e-2, 1), np.asarray)
     any_case = clock.Case("run", "", "m", (1.0,), None, None, np.ones(2))
-    found = clock.measured({"peer": curve}, any_case, tell=lambda _: None)
+    found = clock.measured({"peer": curve}, any_case)
     np.testing.assert_allclose([p["error"] for p in found["peer"]["points"]], [0.1, 0.01])
     assert all(p["spread"][0] == p["seconds"] > 0.0 for p in found["peer"]["points"])
     assert found["peer"]["failures"] == ["1.0e+00: ValueError: too loose"]
