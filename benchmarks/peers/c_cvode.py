@@ -6,6 +6,7 @@ side is the exported one, or that of `model.bare`, whose address a user may pass
 
 import ctypes
 import tempfile
+from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -31,13 +32,13 @@ def compiled(name: str) -> ctypes.CDLL:
         parts = Path(__file__).with_name("cvode.c"), source / "vehiclemor_model.c"
         link = *libraries, f"-Wl,-rpath,{wheel}", "-lm"
         found = ctypes.CDLL(library(folder, "-O3", f"-I{source}", *parts, *link))
-    found.make.restype, found.run.restype = ctypes.c_void_p, ctypes.c_long
+    found.make.restype, found.part.restype = ctypes.c_void_p, ctypes.c_long
     return found
 
 
-def address(array: np.ndarray | None) -> ctypes.c_void_p:
-    """Address of an array, which must live on; none of no array."""
-    return ctypes.c_void_p(None if array is None else array.ctypes.data)
+def address(array: np.ndarray) -> ctypes.c_void_p:
+    """Address of an array, which it keeps alive."""
+    return array.ctypes.data_as(ctypes.c_void_p)
 
 
 def solver(case: Case, tolerance: float, bare: bool = True) -> ctypes.c_void_p:
@@ -49,32 +50,41 @@ def solver(case: Case, tolerance: float, bare: bool = True) -> ctypes.c_void_p:
     return ctypes.c_void_p(made)
 
 
-def lane_change(case: Case, *factors: float) -> np.ndarray:
-    """Size, rate and begin of a lane change."""
-    return np.array([*pulse_shape(case.racked, *factors), steering.BEGIN])
+def lane_change(case: Case, signal: Any, *factors: float) -> tuple[np.ndarray, Callable]:
+    """Times with all break points, and a run: (solver, outputs) -> states, calls of the rhs."""
+    part, start, n = compiled(case.model.name).part, case.start, len(case.start)
+    times = np.unique(np.round([*signal.times, *signal.break_points], 9))
+    edges = [0, *np.searchsorted(times, np.round(signal.break_points, 9)), len(times) - 1]
+    pulse = np.array([*pulse_shape(case.racked, *factors), steering.BEGIN])
+    spans = []
+    for first, last, moves in zip(edges, edges[1:], (False, True, False), strict=False):
+        given = address(pulse if moves else np.zeros(3))
+        spans.append((first, (moves, given, address(times[first:]), int(last - first) + 1, n)))
+
+    def run(own: ctypes.c_void_p, outputs: np.ndarray | None = None) -> tuple[np.ndarray, int]:
+        states, calls = np.empty((len(times), n)), 0
+        states[0] = start
+        for first, given in spans:
+            beside = None if outputs is None else address(outputs[first:])
+            found = part(own, *given, address(states[first:]), beside)
+            if found < 0:
+                raise ArithmeticError("CVODE failed")
+            calls += found
+        return states, calls
+
+    return times, run
 
 
 def run(case: Case) -> dict[str, Curve]:
     """Whole runs: states alone, and all outputs beside them."""
-    library, times, pulse = compiled(case.model.name), case.maneuver.times, lane_change(case)
-    edges = np.array([0, *(last for _, last, _ in case.spans())], dtype=np.int32)
+    shape, (_, whole) = case.reference.shape, lane_change(case, case.maneuver)
 
     def make(tolerance: float, bare: bool = True, outputs: bool = False) -> Any:
-        own = solver(case, tolerance, bare)
-
-        def whole() -> tuple[np.ndarray, int]:
-            states = np.empty((len(times), len(case.start)))
-            found = np.empty((len(times), len(case.model.outputs))) if outputs else None
-            arrays = map(address, (pulse, times, edges))
-            calls = library.run(own, *arrays, -1, address(states), address(found))
-            if calls < 0:
-                raise ArithmeticError("CVODE failed")
-            return states, calls
-
-        return whole
+        own, sizes = solver(case, tolerance, bare), (*shape, len(case.model.outputs))
+        return lambda: whole(own, np.empty(sizes) if outputs else None)
 
     def curve(delivers: str = "states", **how: bool) -> Curve:
-        made, read = partial(make, **how), lambda r: case.lateral_of(r[0])
+        made, read = partial(make, **how), lambda r: r[0][:, case.lateral]
         return Curve(made, decades(1e-2, 1e-9), read, delivers, lambda r: r[1])
 
     found = {"CVODE in C": curve(bare=False), BARE: curve()}
@@ -83,14 +93,15 @@ def run(case: Case) -> dict[str, Curve]:
 
 def steps(case: Case) -> dict[str, Curve]:
     """A loop in Python over steps in C, each of which starts afresh."""
-    library, inputs = compiled(case.model.name), [address(u) for u in case.more]
+    part, inputs = compiled(case.model.name).part, [address(u) for u in case.more]
+    span, state = address(np.array([0.0, 0.01])), case.start
+    place = address(state)
 
     def make(tolerance: float) -> Any:
-        own, length, state = solver(case, tolerance), ctypes.c_double(0.01), case.start
-        place = address(state)
+        own = solver(case, tolerance)
 
-        def step(_: np.ndarray, u: ctypes.c_void_p) -> np.ndarray:
-            library.step(own, place, u, length)
+        def step(_: np.ndarray, u: ctypes.c_void_p, __: float) -> np.ndarray:
+            part(own, False, u, span, 2, 0, place, None)
             return state
 
         def loop() -> np.ndarray:
@@ -104,26 +115,13 @@ def steps(case: Case) -> dict[str, Curve]:
 
 def batch(case: Case) -> dict[str, Curve]:
     """Run after run."""
-    library, runs = compiled(case.model.name), []
-    for signal in case.more:
-        times = np.union1d(signal.times, signal.break_points)
-        ends = [0.0, *signal.break_points, signal.duration]
-        edges = np.searchsorted(times, ends).astype(np.int32)
-        pulse = lane_change(case, signal.amplitude_factor, signal.frequency_factor)
-        runs.append((np.isin(times, signal.times), (pulse, times, edges)))
+    runs = []
+    for s in case.more:
+        times, run = lane_change(case, s, s.amplitude_factor, s.frequency_factor)
+        runs.append((np.isin(times, np.round(s.times, 9)), run))
 
     def make(tolerance: float) -> Any:
         own = solver(case, tolerance)
-
-        def all_runs() -> np.ndarray:
-            found = np.empty(case.reference.shape)
-            for row, (kept, arrays) in zip(found, runs, strict=True):
-                lateral = np.empty(len(kept))
-                given = [*map(address, arrays), case.lateral, address(lateral), address(None)]
-                library.run(own, *given)
-                row[:] = lateral[kept]
-            return found
-
-        return all_runs
+        return lambda: np.array([run(own)[0][kept, case.lateral] for kept, run in runs])
 
     return {BARE: Curve(make, decades(1e-3, 1e-9, 2), delivers="lateral position")}

@@ -55,10 +55,11 @@ def run(case: Case) -> dict[str, Curve]:
 
         return lambda: case.by_parts(part)
 
-    def curve(compiled: bool, each: int) -> Curve:
-        return Curve(partial(make, compiled=compiled), decades(1e-2, 1e-9, each), case.lateral_of)
-
-    return {"CasADi CVODES": curve(False, 2), "CasADi CVODES, C code": curve(True, 4)}
+    read, tight = (lambda states: states[:, case.lateral]), (1e-2, 1e-9)
+    return {
+        "CasADi CVODES": Curve(partial(make, compiled=False), decades(*tight, 2), read),
+        "CasADi CVODES, C code": Curve(partial(make, compiled=True), decades(*tight, 4), read),
+    }
 
 
 def steps(case: Case) -> dict[str, Curve]:
@@ -69,7 +70,7 @@ def steps(case: Case) -> dict[str, Curve]:
 
     def make(method: str, **how: Any) -> Any:
         advance = ca.integrator("step", method, ode, 0.0, 0.01, how)
-        return lambda: case.loop(lambda x, u: advance(x0=x, p=u)["xf"], start, case.more)
+        return lambda: case.loop(lambda x, u, _: advance(x0=x, p=u)["xf"], start, case.more)
 
     def cvodes(tolerance: float) -> Any:
         return make("cvodes", reltol=tolerance, abstol=tolerance)

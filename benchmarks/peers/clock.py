@@ -1,4 +1,4 @@
-"""What all peers share: cases, the clock, errors, and the file of what was found.
+"""What all peers share: cases, the clock, and errors.
 
 A comparison is a set of curves over one tolerance, or step size: error and seconds of each point.
 Seconds are those of whole calls, states or outputs delivered, in interleaved rounds.
@@ -6,7 +6,6 @@ Seconds are those of whole calls, states or outputs delivered, in interleaved ro
 
 import gc
 import importlib
-import json
 import math
 import os
 import statistics
@@ -15,13 +14,11 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import vehiclemor as vm
-from vehiclemor.files import write_text
 from vehiclemor.inputs import steering
 
 # Calls of a round, the first a warm-up, of what takes less than so many seconds.
@@ -73,10 +70,6 @@ class Case:
         """Place of the lateral position among the states."""
         return int(self.model.planar[1])
 
-    def lateral_of(self, states: np.ndarray) -> np.ndarray:
-        """Lateral position of a run of states."""
-        return states[:, self.lateral]
-
     def spans(self) -> list[tuple[int, int, bool]]:
         """First and last output time of each smooth part, and whether the steering moves in it."""
         breaks, times = self.maneuver.break_points, self.maneuver.times
@@ -84,21 +77,18 @@ class Case:
         return list(zip(edges, edges[1:], (False, True, False), strict=False))
 
     def by_parts(self, part: Callable[[np.ndarray, np.ndarray, bool], np.ndarray]) -> np.ndarray:
-        """States (samples, n) of a run that is integrated anew in each smooth part.
-
-        `part` takes a state, output times with both ends and whether the steering moves.
-        """
+        """States of a run, integrated anew in each part: of a state, times, whether it steers."""
         states, times = np.empty((len(self.maneuver.times), len(self.start))), self.maneuver.times
         states[0] = self.start
         for first, last, moves in self.spans():
             states[first : last + 1] = part(states[first], times[first : last + 1], moves)
         return states
 
-    def loop(self, step: Callable[[Any, Any], Any], state: Any, inputs: Iterable) -> np.ndarray:
-        """Lateral position after each step, a call of Python: (state, input) -> state."""
+    def loop(self, step: Callable, state: Any, inputs: Iterable[Any]) -> np.ndarray:
+        """Lateral position after each step, a call of Python: (state, input, dt) -> state."""
         found = np.empty(len(self.reference))
         for k, u in enumerate(inputs):
-            state = step(state, u)
+            state = step(state, u, 0.01)
             found[k] = state[self.lateral]
         return found
 
@@ -130,23 +120,18 @@ def pulse_shape(racked: bool, amplitude: Any = 1.0, speed: Any = 1.0) -> tuple[A
     return amplitude * size, 2.0 * math.pi * speed / steering.LANE_CHANGE_LENGTH
 
 
-def callback(case: Case, moves: bool) -> Callable[[float, np.ndarray], np.ndarray]:
-    """The fastest documented right-hand side for Python: f(t, x), of a part that steers or not."""
+def callback(case: Case) -> Callable[[float, np.ndarray, bool], np.ndarray]:
+    """The fastest documented right-hand side for Python: f(t, x, whether the steering moves)."""
     rhs, racked = case.model.bare("rhs"), case.racked
     rates, state, u = np.empty(len(case.start)), case.start, np.zeros(len(case.model.inputs))
 
-    def steered(t: float, x: np.ndarray) -> np.ndarray:
+    def function(t: float, x: np.ndarray, moves: bool) -> np.ndarray:
         state[:] = x  # what solvers pass may be read-only
-        u[:] = pulse(t, math, racked)
+        u[:] = pulse(t, math, racked) if moves else 0.0
         rhs(state, u, rates)
         return rates
 
-    def straight(_: float, x: np.ndarray) -> np.ndarray:
-        state[:] = x
-        rhs(state, u, rates)
-        return rates
-
-    return steered if moves else straight
+    return function
 
 
 def library(folder: str, *arguments: object) -> str:
@@ -174,27 +159,27 @@ def measured(curves: Mapping[str, Curve], case: Case) -> dict[str, Any]:
     """Error and seconds of all points of all curves, timed in rounds over all of them."""
     clock, found, calls = getattr(time, case.clock), {}, []
     for label, curve in curves.items():
-        found[label], ready = scanned(curve, case, clock)
-        calls += zip(found[label]["points"], ready, strict=True)
+        points, ready = scanned(curve, case, clock)
+        found[label] = {"delivers": curve.delivers, "points": points}
+        calls += [(point, call, []) for point, call in zip(points, ready, strict=True)]
         print(f"  {label}: {len(ready)} points", flush=True)
-    seconds: list[list[float]] = [[] for _ in calls]
     gc.collect()
     gc.disable()
     for turn in range(max(ROUNDS.values())):
-        for (point, call), listed in zip(calls, seconds, strict=True):
+        for point, call, seconds in calls:
             expected = point["seconds"]
             if turn < next(rounds for length, rounds in ROUNDS.items() if expected < length):
-                listed.append(seconds_of(call, expected, clock))
+                seconds.append(seconds_of(call, expected, clock))
     gc.enable()
-    for (point, _), listed in zip(calls, seconds, strict=True):
-        point["spread"] = [min(listed), statistics.median(listed), max(listed)]
-        point["seconds"] = min(listed)
+    for point, _, seconds in calls:
+        point["seconds"] = min(seconds)
+        point["spread"] = [min(seconds), statistics.median(seconds), max(seconds)]
     return found
 
 
-def scanned(curve: Curve, case: Case, clock: Callable[[], float]) -> tuple[dict, list[Callable]]:
+def scanned(curve: Curve, case: Case, clock: Callable) -> tuple[list[dict], list[Callable]]:
     """Points of a curve with the seconds of a first call, and their calls; one that fails isn't."""
-    points, ready, failures = [], [], []
+    points, ready = [], []
     for tolerance in curve.tolerances:
         try:
             call = curve.make(tolerance)
@@ -205,7 +190,7 @@ def scanned(curve: Curve, case: Case, clock: Callable[[], float]) -> tuple[dict,
             off = (curve.read(result) - case.reference) / case.scale
             error = float(np.abs(off).max())
         except Exception as raised:  # noqa: BLE001  (as above)
-            failures.append(f"{tolerance:.1e}: {type(raised).__name__}: {raised}"[:160])
+            print(f"  {tolerance:.1e}: {type(raised).__name__}: {raised}"[:160])
             continue
         if not error < FAR_OFF * max(case.targets):
             continue
@@ -215,8 +200,7 @@ def scanned(curve: Curve, case: Case, clock: Callable[[], float]) -> tuple[dict,
         ready.append(call)
         if first > TOO_LONG:
             break
-    found = {"delivers": curve.delivers, "points": points}
-    return found | ({"failures": failures} if failures else {}), ready
+    return points, ready
 
 
 def seconds_of(call: Callable[[], Any], expected: float, clock: Callable[[], float]) -> float:
@@ -233,20 +217,15 @@ def seconds_of(call: Callable[[], Any], expected: float, clock: Callable[[], flo
     return statistics.median(seconds[1:])
 
 
-def stored(path: Path) -> dict[str, Any]:
-    """What was measured before; empty if there is nothing."""
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-
-
-def store(path: Path, content: Mapping[str, Any]) -> None:
-    """Write the file whole: under a temporary name first, then moved into place."""
-    write_text(path, json.dumps(content, indent=1) + "\n")
+def lane_change(name: str) -> tuple[Any, Any]:
+    """A vehicle and its maneuver."""
+    model = vm.model(name)
+    return model, vm.maneuver(model.definition.maneuver)
 
 
 def vehicle(name: str) -> Case:
     """The lane change of a vehicle, lateral position at all output times."""
-    model = vm.model(name)
-    maneuver = vm.maneuver(model.definition.maneuver)
+    model, maneuver = lane_change(name)
     exact = model.simulate(maneuver, "equilibrium", solver="dopri5", tolerance=1e-11)
     title = f"{name}, {maneuver.name}, {maneuver.duration:g} s"
     targets = 2e-2, 1e-3, 3e-5, 5e-6
@@ -255,37 +234,31 @@ def vehicle(name: str) -> Case:
 
 def held_steps(name: str) -> Case:
     """The same lane change in 500 steps of 10 ms, as a controller sends it: held inputs."""
-    model = vm.model(name)
-    maneuver = vm.maneuver(model.definition.maneuver)
+    model, maneuver = lane_change(name)
     held = [np.array(u) for u in maneuver.at(np.arange(500) * 0.01)]
-    exact, lateral = vm.reduce(model, "full_order", solver="dopri5", tolerance=1e-11), []
-    state = model.start("equilibrium")
-    for u in held:
-        state = exact.step(state, u, 0.01)
-        lateral.append(state[model.planar[1]])
     title = f"{name}, 500 steps of 10 ms with held inputs, from Python"
-    targets, per = (2e-2, 1e-3, 3e-5), (len(held), "step")
-    return Case("steps", title, "m", targets, model, maneuver, np.array(lateral), held, per)
+    how = {"more": held, "per": (500, "step")}
+    case = Case("steps", title, "m", (2e-2, 1e-3, 3e-5), model, maneuver, np.empty(500), **how)
+    exact = vm.reduce(model, "full_order", solver="dopri5", tolerance=1e-11)
+    return replace(case, reference=case.loop(exact.step, case.start, held))
 
 
 def batch(name: str, runs: int = 200) -> Case:
     """Lane changes of other length and size, at all output times of the first 10 s."""
-    model = vm.model(name)
-    maneuver = replace(vm.maneuver(model.definition.maneuver), duration=10.0, samples=501)
+    model, maneuver = lane_change(name)
+    maneuver = replace(maneuver, duration=10.0, samples=501)
     factors = np.random.default_rng(1).uniform([0.8, 0.5], [1.2, 1.2], (runs, 2))
     signals = [maneuver.perturbed(*pair) for pair in factors.tolist()]
     exact = vm.reduce(model, "full_order", solver="exponential_adams", tolerance=1e-10)
     found = vm.simulate_many(exact, signals, "equilibrium", outputs=["lateral_position"])
-    title = f"{name}, {runs} lane changes of 10 s"
-    reference, targets, per = found["values"].values[:, :, 0], (2e-2, 1e-3, 3e-5), (runs, "run")
-    more = {"more": signals, "per": per, "clock": "process_time"}
-    return Case("batch", title, "m", targets, model, maneuver, reference, **more)
+    title, reference = f"{name}, {runs} lane changes of 10 s", found["values"].values[:, :, 0]
+    how = {"more": signals, "per": (runs, "run"), "clock": "process_time"}
+    return Case("batch", title, "m", (2e-2, 1e-3, 3e-5), model, maneuver, reference, **how)
 
 
 def mechanism() -> Case:
     """Kinematics of the double wishbone over 1001 samples."""
-    model = vm.model("double_wishbone")
-    maneuver = vm.maneuver("sine_travel")
+    model, maneuver = vm.model("double_wishbone"), vm.maneuver("sine_travel")
     exact = model.simulate(maneuver, tolerance=1e-14).outputs
     title = "double_wishbone, sine_travel, 1001 samples"
     return Case("mechanism", title, "m or rad", (1e-6, 1e-9, 1e-12), model, maneuver, exact)
@@ -293,19 +266,19 @@ def mechanism() -> Case:
 
 def structure() -> Case:
     """Ride of the truck over a rough road, outputs as part of their ranges, by step size."""
-    model, maneuver = vm.model("flexible_truck"), vm.maneuver("road")
-    maneuver = replace(maneuver, duration=2.5, samples=251)
+    model = vm.model("flexible_truck")
+    maneuver = replace(vm.maneuver("road"), duration=2.5, samples=251)
     exact = model.run(maneuver, step=10e-3 / 256).outputs
-    steps = [10e-3 / count for count in (2, 4, 8, 16, 32)]
     title = f"flexible_truck, {model.size} coordinates, road, 2.5 s, by step size"
-    unit, targets, ranges = "of an output's range", (2e-2, 5e-3, 2e-3), np.ptp(exact, axis=0)
-    return Case("structure", title, unit, targets, model, maneuver, exact, steps, scale=ranges)
+    given = "of an output's range", (2e-2, 5e-3, 2e-3), model, maneuver, exact
+    steps = [10e-3 / count for count in (2, 4, 8, 16, 32)]
+    return Case("structure", title, *given, steps, scale=np.ptp(exact, axis=0))
 
 
 def cases() -> dict[str, Callable[[], Case]]:
     """Name of a comparison -> what makes its case."""
     found: dict[str, Callable[[], Case]] = {}
     for name in ("independent_suspension_vehicle", "high_fidelity_vehicle"):
-        found |= {name: partial(vehicle, name)}
-        found |= {f"{name}-steps": partial(held_steps, name), f"{name}-batch": partial(batch, name)}
+        for ending, make in (("", vehicle), ("-steps", held_steps), ("-batch", batch)):
+            found[f"{name}{ending}"] = partial(make, name)
     return found | {"double_wishbone": mechanism, "flexible_truck": structure}

@@ -1,4 +1,4 @@
-/* CVODE of SUNDIALS (BDF, dense) on an exported model: a run, a step, a batch, all in C.
+/* CVODE of SUNDIALS (BDF, dense) on an exported model: a smooth part of a run, or a step.
    The wheel that brings the libraries has no headers: the few prototypes are declared here. */
 #include <math.h>
 #include <stdlib.h>
@@ -27,19 +27,19 @@ typedef struct {
     Any cvode, state;
     Rates rates;
     const double *constants;
-    double size, rate, begin, u[U], c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
-    int moves;
+    const double *pulse; /* size, rate and begin of a lane change, or none */
+    double u[U], c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
 } Solver;
 
 static int rhs(double t, Any x, Any dx, Any data)
 {
     Solver *s = data;
-    if (s->moves) {
-        const double a = s->rate * (t - s->begin);
-        s->u[0] = s->size * (sin(a) - 0.5 * sin(2.0 * a));
+    if (s->pulse) {
+        const double size = s->pulse[0], rate = s->pulse[1], a = rate * (t - s->pulse[2]);
+        s->u[0] = size * (sin(a) - 0.5 * sin(2.0 * a));
         if (U > 1) {
-            s->u[U > 1] = s->size * s->rate * (cos(a) - cos(2.0 * a));
-            s->u[U - 1] = s->size * s->rate * s->rate * (2.0 * sin(2.0 * a) - sin(a));
+            s->u[U > 1] = size * rate * (cos(a) - cos(2.0 * a));
+            s->u[U - 1] = size * rate * rate * (2.0 * sin(2.0 * a) - sin(a));
         }
     }
     s->rates(N_VGetArrayPointer(x), s->u, s->constants, N_VGetArrayPointer(dx));
@@ -70,47 +70,28 @@ Any make(Rates rates, const double *constants, double tolerance, const double *s
     return s;
 }
 
-/* States, or one of them if `column` isn't negative, at the times [0, edges[3]]; outputs as well
-   unless there is no room for them.  Calls of the right-hand side, those for Jacobians too, or -1
-   where it fails. */
-long run(Solver *s, const double *pulse, const double *times, const int *edges, int column,
-        double *states, double *outputs)
+/* From states[0] at times[0] to the other times; a stride of 0 overwrites the state, else outputs
+   go along with states.  `given` are the inputs, or what the pulse is that moves them.  Calls of
+   the right-hand side, those for Jacobians too, or -1 where CVODE fails. */
+long part(Solver *s, int moves, const double *given, const double *times, int count, int stride,
+          double *states, double *outputs)
 {
     double *x = N_VGetArrayPointer(s->state), t;
-    long calls = 0, further[2];
-    s->size = pulse[0], s->rate = pulse[1], s->begin = pulse[2];
-    memcpy(x, vehiclemor_start_equilibrium, N * sizeof(double));
-    for (int part = 0; part < 3; part++) {
-        s->moves = part == 1;
-        memset(s->u, 0, sizeof s->u);
-        CVodeReInit(s->cvode, times[edges[part]], s->state);
-        CVodeSetStopTime(s->cvode, times[edges[part + 1]]);
-        for (int k = edges[part]; k <= edges[part + 1]; k++) {
-            if (k > edges[part] && CVode(s->cvode, times[k], s->state, &t, 1) < 0)
-                return -1;
-            if (column < 0)
-                memcpy(states + (size_t)k * N, x, N * sizeof(double));
-            else
-                states[k] = x[column];
-            if (outputs)
-                vehiclemor_outputs(x, s->u, s->c, outputs + (size_t)k * VEHICLEMOR_OUTPUTS);
-        }
-        CVodeGetNumRhsEvals(s->cvode, further);
-        CVodeGetNumLinRhsEvals(s->cvode, further + 1);
-        calls += further[0] + further[1];
+    long calls, further;
+    s->pulse = moves ? given : NULL;
+    if (!moves)
+        memcpy(s->u, given, sizeof s->u);
+    memcpy(x, states, N * sizeof(double));
+    CVodeReInit(s->cvode, times[0], s->state);
+    CVodeSetStopTime(s->cvode, times[count - 1]);
+    for (int k = 0; k < count; k++) {
+        if (k > 0 && CVode(s->cvode, times[k], s->state, &t, 1) < 0)
+            return -1;
+        memcpy(states + (size_t)k * stride, x, N * sizeof(double));
+        if (outputs)
+            vehiclemor_outputs(x, s->u, s->c, outputs + (size_t)k * VEHICLEMOR_OUTPUTS);
     }
-    return calls;
-}
-
-/* One step with held inputs. */
-void step(Solver *s, double *state, const double *u, double dt)
-{
-    double *x = N_VGetArrayPointer(s->state), t;
-    s->moves = 0;
-    memcpy(s->u, u, sizeof s->u);
-    memcpy(x, state, N * sizeof(double));
-    CVodeReInit(s->cvode, 0.0, s->state);
-    CVodeSetStopTime(s->cvode, dt);
-    CVode(s->cvode, dt, s->state, &t, 1);
-    memcpy(state, x, N * sizeof(double));
+    CVodeGetNumRhsEvals(s->cvode, &calls);
+    CVodeGetNumLinRhsEvals(s->cvode, &further);
+    return calls + further;
 }

@@ -42,7 +42,7 @@ def steps(case: Case) -> dict[str, Curve]:
 
     def make(tolerance: float, solver: str) -> Any:
         step = vm.reduce(case.model, "full_order", solver=solver, tolerance=tolerance).step
-        return lambda: case.loop(lambda x, u: step(x, u, 0.01), case.start, case.more)
+        return lambda: case.loop(step, case.start, case.more)
 
     scan = decades(1e-1, 1e-6, 2)
     return {f"ours {solver}": Curve(partial(make, solver=solver), scan) for solver in SOLVERS[:2]}

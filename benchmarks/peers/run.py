@@ -7,8 +7,9 @@ What is stored in DIR/peers.json is not measured again unless asked for.
 
 import argparse
 import datetime
+import json
 import time
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,10 @@ import report
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.provenance import machine
 
-PACKAGES = ("vehiclemor", "numpy", "numba", "scipy", "casadi", "scikit-sundae", "exudyn", "mujoco")
-PACKAGES += ("jax", "diffrax", "commonroad-vehicle-models")
+PACKAGES = (
+    "vehiclemor numpy numba scipy casadi scikit-sundae exudyn mujoco jax diffrax "
+    "commonroad-vehicle-models"
+)
 # Kind of a case -> files of the peers that can do it.
 PEERS = {
     "run": ("ours", "c_cvode", "sundae", "casadi_ode", "scipy_ode"),
@@ -77,27 +80,18 @@ def others() -> dict[str, Any]:
     return {"title": title, "clock": "CPU time of the process", "rows": found, "missing": missing}
 
 
-def version_of(package: str) -> str:
-    """Version of a distribution, or that it isn't installed."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"
+def stored(path: Path) -> dict[str, Any]:
+    """What was measured before; empty if there is nothing."""
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
-def measure(names: list[str], path: Path, again: bool) -> None:
-    """Measure what is not stored, and store each case when it is done."""
-    began = time.monotonic()
-    for name in names:
-        content = clock.stored(path)
-        if name in content and not again:
-            continue
-        print(f"{name} ({time.monotonic() - began:.0f} s)", flush=True)
-        found = others() if name == CONTEXT else compared(name)
-        date = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
-        found["about"] = f"{machine()}; {date}"
-        found["versions"] = {package: version_of(package) for package in sorted(PACKAGES)}
-        clock.store(path, content | {name: found})
+def measure(name: str) -> dict[str, Any]:
+    """Measure a case, where and by what is noted."""
+    found = others() if name == CONTEXT else compared(name)
+    date = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
+    known = {package.name: package.version for package in distributions()}
+    versions = {name: known[name] for name in PACKAGES.split() if name in known}
+    return found | {"about": f"{machine()}; {date}", "versions": versions}
 
 
 def tell(cases: dict[str, Any], results: Path) -> None:
@@ -122,8 +116,12 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", choices=names, default=names, metavar="CASE")
     given = parser.parse_args()
     path = given.results / "peers.json"
-    measure(given.only, path, given.again)
-    content = clock.stored(path)
+    for name in given.only:
+        if given.again or name not in stored(path):
+            print(name, flush=True)
+            content = stored(path) | {name: measure(name)}
+            write_text(path, json.dumps(content, indent=1) + "\n")
+    content = stored(path)
     tell({name: content[name] for name in names if name in content}, given.results)
 
 

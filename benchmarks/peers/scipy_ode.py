@@ -13,22 +13,21 @@ METHODS = ("odeint", "LSODA", "Radau", "BDF", "DOP853")
 
 def run(case: Case) -> dict[str, Curve]:
     """Runs that deliver the states; the right-hand side is called from Python."""
-    functions = callback(case, moves=False), callback(case, moves=True)
+    rhs = callback(case)
 
     def make(tolerance: float, method: str) -> Any:
         how: dict[str, Any] = {"rtol": tolerance, "atol": tolerance * case.model.error_scale}
 
         def part(state: np.ndarray, times: np.ndarray, moves: bool) -> np.ndarray:
-            rhs = functions[moves]
             if method == "odeint":
-                more = {"tfirst": True, "mxstep": 100_000, "tcrit": times[-1:]}
+                more = {"tfirst": True, "args": (moves,), "mxstep": 100_000, "tcrit": times[-1:]}
                 return odeint(rhs, state, times, **how, **more)
-            copied = lambda t, x: rhs(t, x).copy()  # noqa: E731  (SciPy keeps what it gets)
+            copied = lambda t, x: rhs(t, x, moves).copy()  # noqa: E731  (SciPy keeps what it gets)
             return solve_ivp(copied, (times[0], times[-1]), state, method, times, **how).y.T
 
         return lambda: case.by_parts(part)
 
-    how = decades(1e-3, 1e-8, 2), case.lateral_of
+    how = decades(1e-3, 1e-8, 2), lambda states: states[:, case.lateral]
     return {f"SciPy {method}": Curve(partial(make, method=method), *how) for method in METHODS}
 
 

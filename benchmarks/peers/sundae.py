@@ -12,24 +12,22 @@ from sksundae.ida import IDA
 
 def run(case: Case) -> dict[str, Curve]:
     """CVODE on the right-hand side, and IDA on the equations before elimination."""
-    how = decades(1e-3, 1e-9, 2), case.lateral_of
-    found = {"scikit-sundae CVODE": Curve(partial(cvode, case), *how)}
+    read = lambda states: states[:, case.lateral]  # noqa: E731
+    found = {"scikit-sundae CVODE": Curve(partial(cvode, case), decades(1e-3, 1e-9, 2), read)}
     if "descriptor" in case.model.equations.shapes:
-        how = decades(1e-3, 1e-8, 2), case.lateral_of
-        found["scikit-sundae IDA, descriptor form"] = Curve(partial(ida, case), *how)
+        label = "scikit-sundae IDA, descriptor form"
+        found[label] = Curve(partial(ida, case), decades(1e-3, 1e-8, 2), read)
     return found
 
 
 def cvode(case: Case, tolerance: float) -> Any:
     """BDF, dense Jacobian by differences."""
-    functions = callback(case, moves=False), callback(case, moves=True)
+    rhs = callback(case)
     how = {"rtol": tolerance, "atol": tolerance * case.model.error_scale}
 
     def part(state: np.ndarray, times: np.ndarray, moves: bool) -> np.ndarray:
-        function = functions[moves]
-
         def rates(t: float, x: np.ndarray, dx: np.ndarray) -> None:
-            dx[:] = function(t, x)
+            dx[:] = rhs(t, x, moves)
 
         return CVODE(rates, method="BDF", max_num_steps=100_000, **how).solve(times, state).y
 
@@ -83,7 +81,7 @@ def steps(case: Case) -> dict[str, Curve]:
     def make(tolerance: float) -> Any:
         solver = CVODE(function, rtol=tolerance, atol=tolerance * case.model.error_scale)
 
-        def step(x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        def step(x: np.ndarray, u: np.ndarray, _: float) -> np.ndarray:
             held[:] = u
             return solver.solve(span, x).y[-1]
 
