@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import sksundae
-from clock import Case, Curve, decades, library, pulse_shape
+from clock import Case, Curve, decades, library, pulse_shape, smooth_parts
 
 import vehiclemor as vm
 from vehiclemor.inputs import steering
@@ -53,13 +53,11 @@ def solver(case: Case, tolerance: float, bare: bool = True) -> ctypes.c_void_p:
 def lane_change(case: Case, signal: Any, *factors: float) -> tuple[np.ndarray, Callable]:
     """Times with all break points, and a run: (solver, outputs) -> states, calls of the rhs."""
     part, start, n = compiled(case.model.name).part, case.start, len(case.start)
-    times = np.unique(np.round([*signal.times, *signal.break_points], 9))
-    edges = [0, *np.searchsorted(times, np.round(signal.break_points, 9)), len(times) - 1]
     pulse = np.array([*pulse_shape(case.racked, *factors), steering.BEGIN])
-    spans = []
-    for first, last, moves in zip(edges, edges[1:], (False, True, False), strict=False):
+    (times, parts), spans = smooth_parts(signal), []
+    for first, last, moves in parts:
         given = address(pulse if moves else np.zeros(3))
-        spans.append((first, (moves, given, address(times[first:]), int(last - first) + 1, n)))
+        spans.append((first, (moves, given, address(times[first:]), last - first + 1, n)))
 
     def run(own: ctypes.c_void_p, outputs: np.ndarray | None = None) -> tuple[np.ndarray, int]:
         states, calls = np.empty((len(times), n)), 0

@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from clock import Case, Curve, decades, library, pulse
+from clock import Case, Curve, decades, library, pulse, smooth_parts
 
 import vehiclemor as vm
 
@@ -43,10 +43,10 @@ def run(case: Case) -> dict[str, Curve]:
         t, z, size = kind.sym("t"), kind.sym("z", len(scale)), kind.sym("size")
         steered = ca.vertcat(*pulse(t, ca, case.racked, size))
         how = {"reltol": tolerance, "abstol": tolerance, "max_num_steps": 100_000}
-        parts = {}
-        for first, last, moves in case.spans():
+        (times, spans), parts = smooth_parts(case.maneuver), {}
+        for first, last, moves in spans:
             ode = {"t": t, "x": z, "p": size, "ode": function(z, steered if moves else rest)}
-            grid = case.maneuver.times[first : last + 1]
+            grid = times[first : last + 1]
             parts[grid[0]] = ca.integrator("part", "cvodes", ode, grid[0], grid[1:], how)
 
         def part(state: np.ndarray, times: np.ndarray, _: bool) -> np.ndarray:
@@ -68,16 +68,14 @@ def steps(case: Case) -> dict[str, Curve]:
     z, u = ca.MX.sym("z", len(scale)), ca.MX.sym("u", len(case.model.inputs))
     ode, start = {"x": z, "p": u, "ode": function(z, u)}, case.start / scale
 
-    def make(method: str, **how: Any) -> Any:
+    def make(tolerance: float, method: str) -> Any:
+        how: dict[str, Any] = {"reltol": tolerance, "abstol": tolerance}
+        if method == "rk":
+            how = {"number_of_finite_elements": round(0.01 / tolerance)}
         advance = ca.integrator("step", method, ode, 0.0, 0.01, how)
         return lambda: case.loop(lambda x, u, _: advance(x0=x, p=u)["xf"], start, case.more)
 
-    def cvodes(tolerance: float) -> Any:
-        return make("cvodes", reltol=tolerance, abstol=tolerance)
-
-    def runge_kutta(length: float) -> Any:
-        return make("rk", number_of_finite_elements=round(0.01 / length))
-
+    cvodes, runge_kutta = partial(make, method="cvodes"), partial(make, method="rk")
     read = lambda found: found * scale[case.lateral]  # noqa: E731
     lengths = [0.01 / count for count in (4, 6, 8, 10, 14, 20, 40)]
     return {

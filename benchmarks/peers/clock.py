@@ -70,17 +70,12 @@ class Case:
         """Place of the lateral position among the states."""
         return int(self.model.planar[1])
 
-    def spans(self) -> list[tuple[int, int, bool]]:
-        """First and last output time of each smooth part, and whether the steering moves in it."""
-        breaks, times = self.maneuver.break_points, self.maneuver.times
-        edges = [0, *np.searchsorted(times, np.array(breaks) - 1e-9).tolist(), len(times) - 1]
-        return list(zip(edges, edges[1:], (False, True, False), strict=False))
-
     def by_parts(self, part: Callable[[np.ndarray, np.ndarray, bool], np.ndarray]) -> np.ndarray:
         """States of a run, integrated anew in each part: of a state, times, whether it steers."""
-        states, times = np.empty((len(self.maneuver.times), len(self.start))), self.maneuver.times
+        times, parts = smooth_parts(self.maneuver)
+        states = np.empty((len(times), len(self.start)))
         states[0] = self.start
-        for first, last, moves in self.spans():
+        for first, last, moves in parts:
             states[first : last + 1] = part(states[first], times[first : last + 1], moves)
         return states
 
@@ -91,6 +86,14 @@ class Case:
             state = step(state, u, 0.01)
             found[k] = state[self.lateral]
         return found
+
+
+def smooth_parts(signal: Any) -> tuple[np.ndarray, list[tuple[int, int, bool]]]:
+    """Times with the break points; first and last of each smooth part, whether it steers."""
+    breaks = np.round(signal.break_points, 9)
+    times = np.union1d(np.round(signal.times, 9), breaks)
+    edges = [0, *np.searchsorted(times, breaks).tolist(), len(times) - 1]
+    return times, list(zip(edges, edges[1:], (False, True, False), strict=False))
 
 
 def decades(first: float, last: float, each: int = 4) -> list[float]:
@@ -205,16 +208,12 @@ def scanned(curve: Curve, case: Case, clock: Callable) -> tuple[list[dict], list
 
 def seconds_of(call: Callable[[], Any], expected: float, clock: Callable[[], float]) -> float:
     """Seconds of a call; of a short one the median of some in a row, the first a warm-up."""
-    if expected > SHORT:
-        began = clock()
-        call()
-        return clock() - began
     seconds = []
-    for _ in range(REPEATS):
+    for _ in range(1 if expected > SHORT else REPEATS):
         began = clock()
         call()
         seconds.append(clock() - began)
-    return statistics.median(seconds[1:])
+    return statistics.median(seconds[1:] or seconds)
 
 
 def lane_change(name: str) -> tuple[Any, Any]:

@@ -121,21 +121,18 @@ def summary(cases: Mapping[str, Mapping[str, Any]]) -> str:
 
 def time_text(seconds: float) -> str:
     """Seconds with three digits and a unit."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3)):
-        if seconds >= size:
-            return f"{seconds / size:#.3g} {unit}".replace(". ", " ")
-    return f"{seconds / 1e-6:#.3g} us".replace(". ", " ")
+    units = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+    unit = next((unit for unit, size in units.items() if seconds >= size), "us")
+    return f"{seconds / units[unit]:#.3g} {unit}".replace(". ", " ")
 
 
 def table(header: Iterable[str], body: Iterable[Iterable[str]]) -> list[str]:
     """Lines of a table in Markdown."""
     cells = [[*map(str, row)] for row in (header, *body)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    lines = [
-        "| " + " | ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) + " |"
-        for row in cells
-    ]
-    return [lines[0], "|" + "|".join("-" * (w + 2) for w in widths) + "|", *lines[1:]]
+    padded = [map(str.ljust, row, widths) for row in cells]
+    head, *lines = (f"| {' | '.join(row)} |" for row in padded)
+    return [head, f"|{'|'.join('-' * (w + 2) for w in widths)}|", *lines]
 
 
 def case_text(case: Mapping[str, Any]) -> str:
@@ -149,13 +146,13 @@ def case_text(case: Mapping[str, Any]) -> str:
     accuracy = [(label, least_error(curve)) for label, curve in case["curves"].items()]
     lines += ["Least distance from the reference (do they solve the same equations?):", ""]
     lines += [*table(("who", case["unit"]), accuracy), ""]
-    return "\n".join(lines + missing_lines(case))
+    return "\n".join(lines + absent(case))
 
 
-def missing_lines(case: Mapping[str, Any]) -> list[str]:
+def absent(case: Mapping[str, Any]) -> list[str]:
     """A row for each peer that is not there, or that can't do it."""
-    absent = case["missing"].items()
-    return [*table(("not measured", "why"), absent), ""] if absent else []
+    missing = case["missing"].items()
+    return [*table(("not measured", "why"), missing), ""] if missing else []
 
 
 def context_text(case: Mapping[str, Any]) -> str:
@@ -164,7 +161,7 @@ def context_text(case: Mapping[str, Any]) -> str:
     by_time = sorted(case["rows"].items(), key=lambda pair: pair[1]["seconds"])
     body = [(k, time_text(r["seconds"]), r["what"]) for k, r in by_time]
     lines += table(("who", "CPU time for a simulated second", "what"), body)
-    return "\n".join([*lines, "", *missing_lines(case)])
+    return "\n".join([*lines, "", *absent(case)])
 
 
 def drawn(case: Mapping[str, Any]) -> dict[str, list[tuple[float, float]]]:

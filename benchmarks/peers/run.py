@@ -25,11 +25,11 @@ PACKAGES = (
 )
 # Kind of a case -> files of the peers that can do it.
 PEERS = {
-    "run": ("ours", "c_cvode", "sundae", "casadi_ode", "scipy_ode"),
+    "run": ("ours", "c_cvode", "sundae", "casadi_ode", "scipy_peer"),
     "steps": ("ours", "c_cvode", "sundae", "casadi_ode"),
     "batch": ("ours", "c_cvode", "jax_diffrax"),
-    "mechanism": ("ours", "casadi_ode", "scipy_ode", "exudyn_models"),
-    "structure": ("ours", "structures", "exudyn_models"),
+    "mechanism": ("ours", "casadi_ode", "scipy_peer", "exudyn_models"),
+    "structure": ("ours", "scipy_peer", "exudyn_models"),
     "context": ("mujoco_scene", "commonroad"),
 }
 NO_TIRES = "no Magic Formula and no Fiala tire: its car would be another one"
