@@ -53,8 +53,8 @@ def export(
     to
         `c`: a folder with C99 sources.  `fmu`: a functional mock-up unit by FMI 2.0 for model
         exchange and co-simulation, with sources, and a binary for this platform where there is a C
-        compiler.  `casadi`: a `Function` (x, u, p) -> (dx, y).  `jax`: a function (x, u, p) ->
-        (dx, y).  `sympy`: expressions.
+        compiler.  `casadi`: a `Function` (x, u, p) -> (dx, y), where p of a full model is its
+        `parameter_values`.  `jax`: a function (x, u, p) -> (dx, y).  `sympy`: expressions.
     out
         File or folder to write.  Without it C and FMU go under the model's name into the working
         folder; of the others the object is returned.  With it CasADi's own file for `Function.load`

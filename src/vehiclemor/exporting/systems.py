@@ -19,7 +19,6 @@ from vehiclemor.reduction.methods.path_map import PathMapModel, map_kernel
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.simulation.constants import solved_parameters
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 
@@ -65,8 +64,6 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
 def full_system(model: DynamicModel, name: str) -> ExportedSystem:
     """A model with its parameters; among them is what it has solved for."""
     definition, sources = model.definition, model.equations.sources
-    flat = model.parameters.flat()
-    solved = solved_parameters(definition, flat, model.equations)
     lines = Lines()
     given = full_arrays(lines, model) | {"_x": lines.entries("x", len(definition.states))}
     return ExportedSystem(
@@ -76,7 +73,7 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
         definition.inputs,
         definition.outputs,
         parameter_quantities(model),
-        np.concatenate([flat, [solved[key] for key in definition.solved]]),
+        model.parameter_values,
         model.initial,
         lines.functions({key: lines.include(sources[key], given) for key in SIGNATURES}),
         lambda: lines.functions(
@@ -116,7 +113,7 @@ def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
         definition.inputs,
         (*definition.outputs, CORRECTION),
         parameter_quantities(model),
-        model.parameters.flat(),
+        model.parameter_values,
         {model.starts[0]: np.zeros(0)},
         lines.functions(
             {

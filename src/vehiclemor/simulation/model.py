@@ -19,7 +19,7 @@ from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
-from vehiclemor.simulation.constants import components, constant_derivatives
+from vehiclemor.simulation.constants import components, constant_derivatives, solved_parameters
 from vehiclemor.simulation.kernel_derivatives import (
     CONSTANTS,
     PLACES,
@@ -110,6 +110,15 @@ class Model(ShortRepr):
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs."""
         return tuple(q.name for q in self.definition.outputs)
+
+    @cached_property
+    def parameter_values(self) -> np.ndarray:
+        """All components of the parameters, then what was solved for: `p` of what is exported."""
+        flat = self.parameters.flat()
+        solved = solved_parameters(self.definition, flat, self.equations)
+        values = np.append(flat, [solved[name] for name in self.definition.solved])
+        values.flags.writeable = False
+        return values
 
     @property
     def starts(self) -> tuple[str, ...]:

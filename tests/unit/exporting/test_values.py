@@ -49,6 +49,15 @@ def test_casadi(name, kind, rng, tmp_path):
     assert (kept(states.T, inputs.T, parameters)[0].full() == found[0].full()).all()
 
 
+@pytest.mark.parametrize("name", ["independent_suspension_vehicle", "high_fidelity_vehicle"])
+def test_a_full_model_tells_the_parameters_of_its_function(name):
+    pytest.importorskip("casadi")
+    model = vm.model(name)
+    x, u = model.start(), [0.01, *[0.0] * (len(model.inputs) - 1)]
+    rates = vm.export(model, "casadi")(x, u, model.parameter_values)[0].full().ravel()
+    np.testing.assert_allclose(rates, model.rhs(x, u), rtol=1e-10, atol=1e-9)
+
+
 def test_jax_over_a_batch(rng):
     jax = pytest.importorskip("jax")
     jax.config.update("jax_enable_x64", True)

@@ -1,0 +1,98 @@
+import json
+
+import numpy as np
+import pytest
+
+from benchmarks.peers import clock, report
+
+
+def points(*triples):
+    return [{"tolerance": t, "error": e, "seconds": s, "spread": [s, s, s]} for t, e, s in triples]
+
+
+SCAN = points((1e-2, 1e-4, 1.0), (1e-3, 5e-2, 2.0), (1e-4, 8e-4, 3.0), (1e-5, 2e-5, 4.0))
+
+
+@pytest.mark.parametrize(("target", "tolerance"), [(1e-3, 1e-4), (1e-1, 1e-2), (2e-5, 1e-5)])
+def test_a_lucky_run_is_not_chosen(target, tolerance):
+    found = report.choose(SCAN, target)
+    assert found is not None
+    assert found["tolerance"] == tolerance
+
+
+def test_the_cheapest_is_chosen_even_if_it_is_tighter():
+    scan = points((1e-2, 1e-4, 5.0), (1e-3, 1e-5, 2.0))
+    assert report.choose(scan, 1e-3)["tolerance"] == 1e-3
+
+
+def test_a_target_that_is_not_reached_has_no_choice():
+    assert report.choose(SCAN, 1e-6) is None
+    assert report.choose([], 1.0) is None
+
+
+def test_the_front_holds_what_would_be_chosen():
+    front = report.front([SCAN])
+    assert front == [(2e-5, 4.0), (8e-4, 3.0), (5e-2, 1.0)]
+
+
+def case(**seconds):
+    curves = {
+        label.replace("_", " "): {"delivers": "states", "points": points((1e-3, 1e-4, s))}
+        for label, s in seconds.items()
+    }
+    about = {"title": "a car", "unit": "m", "targets": [1e-3], "clock": "CPU time", "about": ""}
+    return about | {"curves": curves, "missing": {"other": "not installed (No module)"}}
+
+
+def test_a_peer_that_is_faster_stands_first_and_is_said_so():
+    rows = report.rows(case(ours_slow=2e-3, ours=1e-3, peer=4e-4, late=3e-2), 1e-3, "states")
+    assert [row[0] for row in rows] == ["peer", "ours", "ours slow", "late"]
+    assert [row[3] for row in rows] == ["0.4: FASTER THAN OURS", "1", "2", "30"]
+    assert rows[0][1] == "400 us"
+
+
+def test_the_summary_names_the_faster_first():
+    text = report.summary(
+        {"slower": case(ours=1e-3, peer=4e-4), "faster": case(ours=1e-3, peer=2e-3)}
+    )
+    slower, faster = text.splitlines()[-2:]
+    assert slower.index("peer 400 us") < slower.index("ours 1.00 ms") < slower.index("FASTER")
+    assert faster.index("ours 1.00 ms") < faster.index("peer 2.00 ms")
+
+
+def test_where_ours_do_not_reach_the_error_the_peer_is_first():
+    unreached = case(ours=1e-3, peer=2e-3)
+    unreached["curves"]["ours"]["points"] = points((1e-3, 1e-2, 1e-3))
+    assert report.rows(unreached, 1e-3, "states")[0][3] == "OURS DO NOT REACH IT"
+    assert report.summary({"car": unreached}).splitlines()[-1].count("DO NOT REACH") == 1
+
+
+def test_who_does_not_reach_the_error_and_who_is_missing_are_rows():
+    text = report.case_text(case(ours=1e-3, peer=1e-3) | {"targets": [1e-5]})
+    assert text.count("not reached") == 2
+    assert "| other        | not installed (No module) |" in text
+
+
+def test_a_missing_peer_is_a_row_and_one_that_fails_too(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "failing_peer.py").write_text("def run(case):\n    raise ValueError('no')\n")
+    any_case = clock.Case("run", "", "m", (1.0,), None, None, np.zeros(1))
+    curves, missing = clock.collected(["no_such_peer", "failing_peer"], "run", any_case)
+    assert not curves
+    assert missing["no_such_peer"].startswith("not installed")
+    assert missing["failing_peer"] == "failed: ValueError: no"
+
+
+def test_points_are_measured_and_one_that_fails_is_left_out(capsys):
+    def make(tolerance):
+        if tolerance > 0.5:
+            raise ValueError("too loose")
+        return lambda: np.full(2, 1.0 + tolerance)
+
+    curve = clock.Curve(make, clock.decades(1.0, 1e-2, 1))
+    any_case = clock.Case("run", "", "m", (1.0,), None, None, np.ones(2))
+    found = clock.measured({"peer": curve}, any_case)
+    np.testing.assert_allclose([p["error"] for p in found["peer"]["points"]], [0.1, 0.01])
+    assert all(p["spread"][0] == p["seconds"] > 0.0 for p in found["peer"]["points"])
+    assert "1.0e+00: ValueError: too loose" in capsys.readouterr().out
+    assert json.loads(json.dumps(found)) == found
