@@ -70,7 +70,7 @@ def fit(model: Any, training: Training, settings: Any) -> ReducedVehicle | Reduc
     began = time.process_time()
     if model.kind != "structural":
         return linear_reduction(BTReductor, model, settings, began)
-    s, n, fading = model.system.structure, model.size, 1.0 / FADING
+    s, fading = model.system.structure, 1.0 / FADING
     mass, elastic, ports, beside = (m.toarray() for m in (s.mass, s.stiffness, s.ports, s.dampers))
     stiffness, rates = port_rates(model)
     damping = s.damping_time * elastic + beside @ beside.T + (ports * rates) @ ports.T
@@ -80,10 +80,7 @@ def fit(model: Any, training: Training, settings: Any) -> ReducedVehicle | Reduc
         full = SecondOrderModel.from_matrices(mass, faded, held, ports, ports.T)
         reductor: Any = SOBTfvReductor(full)
         reductor.reduce(settings.rank)
-    vectors = reductor.V.to_numpy()
-    # They are rows in pyMOR 2024.
-    basis = vectors if len(vectors) == n else vectors.T
-    return structural.reduced(model, [basis], settings, began)
+    return structural.reduced(model, [reductor.V.to_numpy()], settings, began)
 
 
 METHOD = Method(

@@ -118,9 +118,6 @@ def linear_reduction(
         made = reductor(LTIModel.from_matrices(lateral.a, lateral.b[:, None], c))
         made.reduce(settings.rank)
     trial, test = (part.to_numpy() for part in (made.V, made.W))
-    if len(trial) != len(lateral.a):
-        # They are rows in pyMOR 2024.
-        trial, test = trial.T, test.T
     left = np.linalg.solve(test.T @ trial, test.T)
     found = Lateral(
         *(left @ lateral.a @ trial, left @ lateral.b, left @ lateral.left),
