@@ -23,7 +23,7 @@ from vehiclemor.study.scenario import start_of, training_run
 RUNS, METHODS = 10, "vehiclemor.reduction.methods."
 # Method -> settings: small ones that are stable in training.
 SETTINGS: dict[str, dict[str, Any]] = {
-    "operator_inference": {"rank": 4, "form": "bilinear"},
+    "operator_inference": {"form": "bilinear"},
     "sparse_identification": {"rank": 4, "degree": 2},
     "dynamic_mode_decomposition": {"rank": 4, "steps": 4},
     "gaussian_process": {"rank": 4, "samples": 1000, "length": 10.0, "noise": 1e-3},
@@ -42,7 +42,7 @@ def integrated(name: str, library: Any, z: np.ndarray, times: np.ndarray, u: Inp
 def stepped(learning: Learning, fitted: Any, z: np.ndarray, times: np.ndarray, u: Inputs) -> Any:
     """Components by the library's `predict`, called for each step."""
     library, scale, *_ = fitted
-    (equations, _), r, path = learning.linear(), len(z), [z]
+    (equations, _), r, path = learning.linear, len(z), [z]
     names = monomials(len(equations.lengths), 1, constant=False)
     for now, after in pairwise(times):
         v = np.concatenate([path[-1], u(now), u(after)])[None]
@@ -59,7 +59,7 @@ def timed(model: Any, runs: Any, tests: Any, name: str) -> tuple[float, float, f
     module = import_module(METHODS + name)
     settings = module.METHOD.settings[model.kind](**SETTINGS[name])
     mapped = name not in ("operator_inference", "sparse_identification")
-    learning = Learning.of(model, runs, settings, mapped)
+    learning = Learning.of(model, runs, settings, mapped, "numpy")
     fitted, ours = module.trained(learning, settings), module.fit(model, runs, settings)
     own, theirs, apart = [], [], []
     for scenario in tests:

@@ -150,7 +150,8 @@ def test_every_preset_simulates_the_nominal_maneuver(pair):
     full = pair.model.simulate(pair.maneuver)
     for preset in pair.method.presets_of(pair.model.kind):
         run = pair.run(pair.fit(preset))
-        assert (run.status, run.message) == ("ok", "")
+        if pair.name not in LEARNED or run.status != "untrusted":
+            assert (run.status, run.message) == ("ok", "")
         for name in ("coordinates", "speeds", "outputs"):
             shape = pair.maneuver.samples, len(getattr(pair.model, name))
             assert getattr(run, name).shape == shape

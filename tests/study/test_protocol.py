@@ -60,7 +60,7 @@ def test_a_study_that_extends_another_has_its_sets_and_the_rows_it_names(
     for old, new, words in (
         ("replay", "rerun", "unknown row of the extended study 'rerun'"),
         ("small.toml", "none.toml", "none.toml: no such file"),
-        ("small.toml", "other.toml", "other.toml extends a study itself"),
+        ("small.toml", "other.toml", "other.toml extends a study itself, or is a collection"),
     ):
         (tmp_path / "other.toml").write_text(more.replace(old, new, 1))
         with pytest.raises(FileError, match=re.escape(words)):

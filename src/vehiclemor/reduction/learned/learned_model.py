@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib import import_module
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import recorded_inputs
-from vehiclemor.reduction.interface import OfflineCost
+from vehiclemor.reduction.interface import OfflineCost, installed
 from vehiclemor.reduction.learned.learned_loops import Equations
 from vehiclemor.reduction.learned.samples import (
     Components,
@@ -24,18 +25,22 @@ from vehiclemor.reduction.learned.samples import (
     gathered,
     online_inputs,
 )
-from vehiclemor.reduction.settings import Settings
+from vehiclemor.reduction.settings import SHORTEST, Settings
 from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.trust import trust_of
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.sizes import require
+from vehiclemor.sizes import require, shaped
 
 # Runge-Kutta steps: longest as a multiple of the fastest linear time, and how many a sample at
 # most.
 STABLE, MOST_STEPS = 2.0, 50
 # Relative singular values that least squares leave out.
 CUT = 1e-10
+# How far a run may leave the samples of training, which lie apart, as a multiple of their range;
+# and part of a parameter by which it may leave the one value of training.
+MARGIN, SLACK = 1.1, 0.05
 
 Terms = Sequence[tuple[int, ...]]
 
@@ -43,10 +48,12 @@ Terms = Sequence[tuple[int, ...]]
 class LearnedSettings(Settings):
     """What all general learners share."""
 
-    rank: int = Field(10, ge=1, le=100, description="principal components, at most")
+    rank: int = Field(
+        4, ge=1, le=100, description="principal components, at most; a mechanism has none"
+    )
     steps: int = Field(1, ge=1, le=100, description="samples in the time between output times")
     skipped: float = Field(
-        1.5, ge=0.0, le=100.0, description="first seconds of a run that are not learned from"
+        0.0, ge=0.0, le=100.0, description="first seconds of a run that are not learned from"
     )
 
 
@@ -124,9 +131,11 @@ class Learning:
 
     @classmethod
     def of(
-        cls, model: Any, training: Training, settings: LearnedSettings, mapped: bool
+        cls, model: Any, training: Training, settings: LearnedSettings, mapped: bool, library: str
     ) -> "Learning":
-        """Samples of the training runs, their components, what is learnt from them."""
+        """What is learned from; `InputError` if the package of the library is missing."""
+        with installed(library):
+            import_module(library)
         samples = gathered(model, training, settings.steps, settings.skipped)
         # As if samples that are known from another fit were made anew.
         began = time.process_time() - samples.seconds
@@ -164,6 +173,7 @@ class Learning:
         """Coefficients (terms, m) of values (samples, m)."""
         return np.linalg.lstsq(columns(terms, arguments), values, rcond=CUT)[0]
 
+    @cached_property
     def linear(self) -> tuple[Equations, np.ndarray]:
         """Linear equations by least squares, and what they leave of the results (samples, m)."""
         arguments, results = self.regression
@@ -177,6 +187,12 @@ class Learning:
         arguments, results = self.regression
         motion = self.least_squares(terms, results[:, coefficients.shape[1] :], arguments)
         return polynomials(terms, np.hstack([coefficients, motion]), arguments.shape[1])
+
+    @cached_property
+    def residual_scale(self) -> np.ndarray:
+        """Magnitudes (m,) of what linear equations leave of the results; 1 of rounding."""
+        sizes = self.linear[1].std(axis=0)
+        return np.where(sizes > CUT * np.abs(self.regression.results).max(initial=0.0), sizes, 1.0)
 
     def model(self, equations: Equations, lifted: Terms = ()) -> "LearnedModel":
         """The model of what has been fitted; `lifted` are monomials of the first components."""
@@ -197,10 +213,18 @@ class Learning:
         count = max(map(len, lifted), default=1)
         table = np.array([[*term, *[0] * (count - len(term))] for term in lifted], dtype=np.int64)
         cost = OfflineCost(time.process_time() - self.began, s.evaluations)
+        largest = np.abs(self.coordinates[0]).max(axis=0, initial=0.0)
+        online = s.inputs[:, len(s.states.model.inputs) :]
+        known = np.vstack([np.column_stack([-largest, largest]), *_ranges(online)])
         return LearnedModel(
             *(s.states, self.components, equations, step, self.mapped),
-            *(self.input_scale, table.reshape(-1, count), outputs, cost),
+            *(self.input_scale, table.reshape(-1, count), outputs, known, cost),
         )
+
+
+def _ranges(values: np.ndarray) -> list[np.ndarray]:
+    """Least and largest value of each column."""
+    return [np.array([column.min(), column.max()]) for column in values.T]
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,6 +245,9 @@ class LearnedModel(ShortRepr):
         Monomials (coordinates, degree) of the components that are coordinates; none: components.
     outputs
         Coefficients (components + inputs + 1, outputs) of a structure's outputs.
+    known
+        Least and largest value in training of each component and online parameter; a run beyond
+        is not trusted.
     """
 
     states: States
@@ -231,6 +258,7 @@ class LearnedModel(ShortRepr):
     input_scale: np.ndarray
     lifted: np.ndarray
     outputs: np.ndarray
+    known: np.ndarray
     offline: OfflineCost
 
     @property
@@ -248,8 +276,16 @@ class LearnedModel(ShortRepr):
             inputs *= 1 + self.mapped
             own = self.order + inputs, self.order + self.states.planar
             require((arguments, m) == own, "equations")
-        require(self.time_step > 0.0, "time_step")
-        r = len(self.components.forward)
+        require(SHORTEST <= self.time_step < np.inf, "time_step")
+        r, online = len(self.components.forward), len(self.model.definition.online)
+        shaped("known", (self.known, r + online, 2))
+        require(len(self.input_scale) == len(self.model.inputs) + online, "input_scale")
+        if not static and self.model.kind != "structural":
+            n = len(self.states.of(self.model.start()[None])[0])
+            shaped("components", (self.components.forward, r, n))
+        elif self.model.kind == "structural":
+            rows = r + len(self.input_scale) + 1
+            shaped("outputs", (self.outputs, rows, len(self.model.outputs)))
         require(bool(((self.lifted >= 0) & (self.lifted <= r)).all()), "lifted")
 
     @property
@@ -263,6 +299,20 @@ class LearnedModel(ShortRepr):
 
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """A run at the maneuver's output times, between steps by linear interpolation."""
+        table, run = self._run(maneuver, start)
+        if self.model.kind == "ae" or run.status != "ok":
+            return run
+        r = len(self.components.forward)
+        online = online_inputs(self.model, run.inputs)[:, len(self.model.inputs) :]
+        (low, high), values = self.known.T, np.hstack([table[:, :r], online])
+        reach = MARGIN * np.maximum(0.5 * (high - low), SLACK * np.abs(high))
+        used = np.abs(values - 0.5 * (low + high)) / np.where(reach > 0.0, reach, 1.0)
+        names = [f"component {i + 1}" for i in range(r)] + [*self.model.definition.online]
+        trust = trust_of(run.times, used, names)
+        return run.judged(trust) if trust.indicator > 1.0 else run
+
+    def _run(self, maneuver: Maneuver, start: Start) -> tuple[np.ndarray, Trajectory]:
+        """Coordinates and quadratures at the output times, and the run."""
         model = self.model
         maneuver = checked_maneuver(maneuver, model.definition)
         times, inputs = recorded_inputs(maneuver)
@@ -270,7 +320,7 @@ class LearnedModel(ShortRepr):
         if model.kind == "ae":
             model.check_start(start)
             path, seconds = timed(lambda: self._values(inputs / self.input_scale))
-            return model.trajectory(times, inputs, path, nothing.tolist(), seconds)
+            return path[:, :0], model.trajectory(times, inputs, path, nothing.tolist(), seconds)
         begun = model.start(start)
         (path, reached), seconds = timed(lambda: self._path(maneuver, begun))
         known = self.time_step * np.arange(len(path))
@@ -283,7 +333,7 @@ class LearnedModel(ShortRepr):
         r = len(self.components.forward)
         if model.kind == "structural":
             u = online_inputs(model, inputs) / self.input_scale
-            return Trajectory.of(
+            return table, Trajectory.of(
                 times=times,
                 inputs=inputs,
                 coordinates=inputs[:, :0],
@@ -298,7 +348,7 @@ class LearnedModel(ShortRepr):
             )
         states = self.states.back(table[:, :r] @ self.components.back.T, table[:, self.order :])
         states[0] = begun
-        return model.trajectory(times, inputs, states, nothing, seconds, failure)
+        return table, model.trajectory(times, inputs, states, nothing, seconds, failure)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """Full states (samples, 2 n) in the span of the components."""

@@ -20,10 +20,12 @@ from vehiclemor.simulation.model import Model
 
 # Samples that a fit sees at most, evenly taken.
 MOST_SAMPLES = 30_000
-# Components below this part of the first one are rounding.
+# Components below this part of the first one are rounding, and a first one below it, in SI units.
 ROUNDING = 1e-9
-# Rate, in ranges of a state in 1 s, below which the start is at rest.
+# Rates of states in SI units below which the start is at rest.
 STILL = 1e-6
+# Fewer samples tell nothing.
+FEWEST = 10
 
 
 def online_inputs(model: Model, inputs: np.ndarray) -> np.ndarray:
@@ -154,6 +156,8 @@ def _gathered(model: Any, runs: tuple[Any, ...], steps: int, skipped: float) -> 
     count = sum((maneuver.samples - 1) * steps for maneuver in maneuvers)
     taken = steps, -(-count // MOST_SAMPLES), skipped
     parts = [_of_run(states, run, *taken) for run in training]
+    if count < FEWEST:
+        raise InputError(f"learned models need at least {FEWEST} samples of training, not {count}")
     *histories, evaluations = zip(*parts, strict=True)
     arrays = [np.concatenate(history) for history in histories]
     seconds = time.process_time() - began
@@ -220,9 +224,11 @@ def components(samples: Samples, rank: int) -> Components:
     """The first components of the samples, at most as many as they span.
 
     States stand in SI units: scaled by their ranges, ringing of the wheels would come first, and
-    learned models of it were unstable.
+    learned models of it were unstable.  `InputError` if nothing moves.
     """
     _, sizes, rows = np.linalg.svd(samples.deviations, full_matrices=False)
+    if sizes[0] < ROUNDING * np.sqrt(len(samples.deviations)):
+        raise InputError("nothing moves in the training runs: there is nothing to learn")
     sizes = sizes[:rank][sizes[:rank] > ROUNDING * sizes[0]] / np.sqrt(len(samples.deviations))
     vectors = rows[: len(sizes)]
     return Components(vectors / sizes[:, None], vectors.T * sizes)

@@ -62,7 +62,7 @@ def check(model: Any, settings: Any) -> None:
 
 def fit(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
     """Balance and truncate; no training run is looked at.  `InputError` if pyMOR is missing."""
-    with installed("balanced_truncation", "pyMOR"):
+    with installed("pyMOR"):
         from pymor.core.logger import log_levels
         from pymor.models.iosys import SecondOrderModel
         from pymor.reductors.bt import BTReductor

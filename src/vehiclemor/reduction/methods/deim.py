@@ -19,7 +19,7 @@ from vehiclemor.reduction.interface import Method, OfflineCost, installed
 from vehiclemor.reduction.projection import dynamic
 from vehiclemor.reduction.projection.bases import Rank
 from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, DynamicProjection
-from vehiclemor.reduction.settings import AT_MOST_COORDINATES
+from vehiclemor.reduction.settings import AT_MOST_COORDINATES, ProjectedSolver
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.dynamic import DynamicModel
 
@@ -32,11 +32,12 @@ class DeimSettings(DynamicPodSettings):
 
     rank: Rank = 4
     rows: Annotated[int, AT_MOST_COORDINATES] = Field(
-        14, ge=1, description="rows of the equations, at least as many as the rank"
+        8, ge=1, description="rows of the equations, at least as many as the rank"
     )
     formulation: Literal["state"] = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
         "state", description="all states in one basis"
     )
+    solver: ProjectedSolver = "rodas4"
     snapshots: int = Field(500, ge=2, description="equidistant snapshots of each training run")
 
 
@@ -63,7 +64,7 @@ def check(model: DynamicModel, settings: DeimSettings) -> None:
 
 def fit(model: DynamicModel, training: Training, settings: DeimSettings) -> InterpolatedProjection:
     """POD with one basis, then rows for its rates; `InputError` if pyMOR is missing."""
-    with installed("deim", "pyMOR"):
+    with installed("pyMOR"):
         from pymor.algorithms.ei import deim
         from pymor.core.logger import log_levels
         from pymor.vectorarrays.numpy import NumpyVectorSpace

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned.learned_model import (
     LearnedModel,
     LearnedSettings,
@@ -32,8 +32,8 @@ class DynamicModeSettings(LearnedSettings):
 
 def trained(learning: Learning, settings: DynamicModeSettings) -> tuple[Any, np.ndarray, Terms]:
     """The library's linear step, the units of its arguments, and the observables."""
-    with installed("dynamic_mode_decomposition", "scikit-learn"):
-        from sklearn.linear_model import Ridge
+    from sklearn.linear_model import Ridge
+
     s, r = learning.samples, len(learning.components.forward)
     observables = monomials(r, settings.degree, s.constant)
     values, following = (columns(observables, z) for z in learning.coordinates)
@@ -41,13 +41,14 @@ def trained(learning: Learning, settings: DynamicModeSettings) -> tuple[Any, np.
     results = np.hstack([following - values, s.motion])
     # Monomials are rare where they are large: each counts alike.
     scale = np.sqrt((arguments**2).mean(axis=0))
+    scale[scale == 0.0] = 1.0
     linear = Ridge(settings.ridge * len(arguments), fit_intercept=False)
     return linear.fit(arguments / scale, results), scale, observables
 
 
 def fit(model: Any, training: Training, settings: DynamicModeSettings) -> LearnedModel:
-    """One linear step of all observables, run by our loop; `InputError` without the library."""
-    learning = Learning.of(model, training, settings, mapped=True)
+    """One linear step of all observables, run by our loop."""
+    learning = Learning.of(model, training, settings, True, "sklearn")
     linear, scale, observables = trained(learning, settings)
     terms = monomials(len(scale), 1, constant=False)
     equations = polynomials(terms, (linear.coef_ / scale).T, len(scale))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
 from vehiclemor.reduction.training import Training
 
@@ -21,17 +21,17 @@ class GaussianProcessSettings(LearnedSettings):
 
     samples: int = Field(1000, ge=10, le=4000, description="training samples, each a kernel")
     length: float = Field(10.0, gt=0.0, description="of the kernels, in standard deviations")
-    noise: float = Field(1e-4, gt=0.0, description="variance of the noise, of the results' own")
+    noise: float = Field(1e-3, gt=0.0, description="variance of the noise, of the results' own")
 
 
 def trained(learning: Learning, settings: GaussianProcessSettings) -> tuple[Any, np.ndarray]:
     """The library's process of what a linear step leaves, in units (m,) of that."""
-    with installed("gaussian_process", "scikit-learn"):
-        from sklearn.gaussian_process import GaussianProcessRegressor
-        from sklearn.gaussian_process.kernels import RBF
-    (arguments, _), (_, left) = learning.regression, learning.linear()
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF
+
+    (arguments, _), (_, left) = learning.regression, learning.linear
     order = np.random.default_rng(SEED).permutation(len(arguments))[: settings.samples]
-    scale = np.maximum(left.std(axis=0), 1e-300)
+    scale = learning.residual_scale
     x, y = arguments[order], left[order] / scale
     # Lengths of largest likelihood are too short: samples lie densely along runs, not beside them.
     kernel: Any = RBF(settings.length)
@@ -40,9 +40,9 @@ def trained(learning: Learning, settings: GaussianProcessSettings) -> tuple[Any,
 
 
 def fit(model: Any, training: Training, settings: GaussianProcessSettings) -> LearnedModel:
-    """A linear step and the library's kernels, run by our loop; `InputError` without it."""
-    learning = Learning.of(model, training, settings, mapped=model.kind != "ae")
-    (equations, _), (process, scale) = learning.linear(), trained(learning, settings)
+    """A linear step and the library's kernels, run by our loop."""
+    learning = Learning.of(model, training, settings, model.kind != "ae", "sklearn")
+    (equations, _), (process, scale) = learning.linear, trained(learning, settings)
     x = process.X_train_
     lengths = np.full(x.shape[1], settings.length)
     heights = np.ascontiguousarray(np.reshape(process.alpha_, (len(x), len(scale))) * scale)

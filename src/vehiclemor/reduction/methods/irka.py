@@ -18,7 +18,7 @@ from vehiclemor.simulation.dynamic import DynamicModel
 
 def fit(model: DynamicModel, training: Training, settings: LinearVehicleSettings) -> ReducedVehicle:
     """Interpolate; no training run is looked at.  `InputError` if pyMOR is missing."""
-    with installed("irka", "pyMOR"):
+    with installed("pyMOR"):
         from pymor.reductors.h2 import IRKAReductor
     return linear_reduction(IRKAReductor, model, settings, time.process_time())
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
 from vehiclemor.reduction.training import Training
 
@@ -28,11 +28,11 @@ class NeuralNetworkSettings(LearnedSettings):
 
 def trained(learning: Learning, settings: NeuralNetworkSettings) -> tuple[Any, np.ndarray]:
     """The library's network of what a linear step leaves, in units (m,) of that."""
-    with installed("neural_network", "scikit-learn"):
-        from sklearn.exceptions import ConvergenceWarning
-        from sklearn.neural_network import MLPRegressor
-    (arguments, _), (_, left) = learning.regression, learning.linear()
-    scale = np.maximum(left.std(axis=0), 1e-300)
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.neural_network import MLPRegressor
+
+    (arguments, _), (_, left) = learning.regression, learning.linear
+    scale = learning.residual_scale
     network = MLPRegressor(
         hidden_layer_sizes=(settings.width,) * settings.layers,
         activation="tanh",
@@ -47,9 +47,9 @@ def trained(learning: Learning, settings: NeuralNetworkSettings) -> tuple[Any, n
 
 
 def fit(model: Any, training: Training, settings: NeuralNetworkSettings) -> LearnedModel:
-    """A linear step and the library's network, run by our loop; `InputError` without it."""
-    learning = Learning.of(model, training, settings, mapped=model.kind != "ae")
-    (equations, _), (network, scale) = learning.linear(), trained(learning, settings)
+    """A linear step and the library's network, run by our loop."""
+    learning = Learning.of(model, training, settings, model.kind != "ae", "sklearn")
+    (equations, _), (network, scale) = learning.linear, trained(learning, settings)
     weights, offsets = [*network.coefs_], [*network.intercepts_]
     weights[-1], offsets[-1] = weights[-1] * scale, offsets[-1] * scale
     flat = [part.ravel() for pair in zip(weights, offsets, strict=True) for part in pair]

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
 from vehiclemor.reduction.training import Training
 
@@ -20,15 +20,15 @@ class OperatorInferenceSettings(LearnedSettings):
     """Settings for every model with states."""
 
     form: Literal["linear", "bilinear", "quadratic"] = Field(
-        "quadratic", description="of the rates: products of states with inputs, and with states"
+        "linear", description="of the rates; products of states with inputs, and with states too"
     )
     ridge: float = Field(1e-6, ge=0.0, description="weight of the operators' size in the fit")
 
 
 def trained(learning: Learning, settings: OperatorInferenceSettings) -> Any:
-    """The library's model, fitted on the exact rates of the training runs."""
-    with installed("operator_inference", "opinf"):
-        import opinf
+    """The library's model, fitted on the rates of the training runs."""
+    import opinf
+
     (arguments, results), r = learning.regression, len(learning.components.forward)
     form = "c" * learning.samples.constant + FORMS[settings.form]
     solver = opinf.lstsq.L2Solver(settings.ridge)
@@ -38,8 +38,8 @@ def trained(learning: Learning, settings: OperatorInferenceSettings) -> Any:
 
 
 def fit(model: Any, training: Training, settings: OperatorInferenceSettings) -> LearnedModel:
-    """Operators by the library, run by our loop; `InputError` without opinf."""
-    learning = Learning.of(model, training, settings, mapped=False)
+    """Operators by the library, run by our loop."""
+    learning = Learning.of(model, training, settings, False, "opinf")
     library, u = trained(learning, settings), learning.inputs.shape[1]
     r, form = len(learning.components.forward), "c" * learning.samples.constant
     terms: dict[str, list[tuple[int, ...]]] = {

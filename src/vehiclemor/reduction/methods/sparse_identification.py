@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
 from vehiclemor.reduction.training import Training
 
@@ -17,16 +17,15 @@ from vehiclemor.reduction.training import Training
 class SparseIdentificationSettings(LearnedSettings):
     """Settings for every model with states."""
 
-    rank: int = Field(6, ge=1, le=30, description="principal components, at most")
-    degree: int = Field(2, ge=1, le=4, description="of the polynomials of components and inputs")
+    degree: int = Field(1, ge=1, le=4, description="of the polynomials of components and inputs")
     threshold: float = Field(0.01, ge=0.0, description="terms of smaller coefficients are dropped")
     ridge: float = Field(1e-6, ge=0.0, description="weight of the coefficients' size in the fit")
 
 
 def trained(learning: Learning, settings: SparseIdentificationSettings) -> Any:
-    """The library's model, fitted on the exact rates of the training runs."""
-    with installed("sparse_identification", "PySINDy"):
-        import pysindy
+    """The library's model, fitted on the rates of the training runs."""
+    import pysindy
+
     arguments, results = learning.regression
     r, samples = len(learning.components.forward), learning.samples
     library: Any = pysindy.SINDy(
@@ -38,8 +37,8 @@ def trained(learning: Learning, settings: SparseIdentificationSettings) -> Any:
 
 
 def fit(model: Any, training: Training, settings: SparseIdentificationSettings) -> LearnedModel:
-    """Terms by the library, run by our loop; `InputError` without PySINDy."""
-    learning = Learning.of(model, training, settings, mapped=False)
+    """Terms by the library, run by our loop."""
+    learning = Learning.of(model, training, settings, False, "pysindy")
     library = trained(learning, settings)
     powers = np.asarray(library.feature_library.powers_)
     terms = [tuple(np.repeat(np.arange(1, len(row) + 1), row).tolist()) for row in powers]

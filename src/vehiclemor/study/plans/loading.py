@@ -29,14 +29,18 @@ def read_study(path: Path) -> StudyFile:
     `FileError` if one of them is missing or wrong.
     """
     content = toml_content(path)
-    rows = content.pop("rows", [])
-    if name := str(content.get("extends", "")):
+    rows, name = content.pop("rows", []), str(content.get("extends", ""))
+    if not isinstance(rows, list) or (rows and not name):
+        raise FileError(f"{path}: rows is a list of labels, of a study that extends another")
+    if name:
         try:
             base = toml_content(study_path(name))
-            if "extends" in base:
-                raise InputError(f"{name} extends a study itself")
+            if "extends" in base or "studies" in base:
+                raise InputError(f"{name} extends a study itself, or is a collection")
             entries = {e.get("label", e.get("method")): e for e in base.pop("methods", [])}
-            methods = [entries[choice("row of the extended study", row, entries)] for row in rows]
+            methods = [
+                entries[choice("row of the extended study", str(row), entries)] for row in rows
+            ]
         except InputError as error:
             raise FileError(f"{path}: extends: {error}") from None
         content = base | content | {"methods": [*methods, *content.get("methods", [])]}

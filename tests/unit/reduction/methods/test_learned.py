@@ -19,6 +19,7 @@ from vehiclemor.reduction.methods import (
     sparse_identification,
 )
 from vehiclemor.simulation.build import build
+from vehiclemor.simulation.trajectory import FINISHED
 
 LINEAR = {
     "operator_inference": {"form": "linear", "ridge": 0.0},
@@ -32,7 +33,7 @@ def learned(module, model, runs, **settings):
     """What a method fits to runs, and what it has seen."""
     chosen = module.METHOD.settings[model.kind](**settings)
     mapped = module not in (operator_inference, sparse_identification)
-    return module.fit(model, runs, chosen), Learning.of(model, runs, chosen, mapped)
+    return module.fit(model, runs, chosen), Learning.of(model, runs, chosen, mapped, "numpy")
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +56,8 @@ def test_a_linear_model_is_learned_and_predicts_another_road(name):
     unseen = vm.maneuver("quarter_car_road", frequency=1.6, amplitude=-0.9)
     for start in ("equilibrium", "dropped"):
         run, full = reduced.simulate(unseen, start), model.simulate(unseen, start)
-        assert run.status == "ok"
+        # It may swing further than in training.
+        assert run.status in FINISHED
         error = np.abs(run.outputs - full.outputs).max(axis=0) / np.ptp(full.outputs, axis=0)
         # Inputs between two samples are known to dynamic mode decomposition as a line alone.
         assert error.max() < (1e-2 if name.startswith("dynamic") else 1e-3)
@@ -66,7 +68,7 @@ def test_the_loop_evaluates_what_the_libraries_have_fitted(car, runs):
 
     few = {"rank": 4, "steps": 1}
     reduced, learning = learned(neural_network, car, runs, epochs=20, **few)
-    linear, left = learning.linear()
+    linear, left = learning.linear
     x, scale = learning.regression.arguments, left.std(axis=0)
     network = MLPRegressor(
         hidden_layer_sizes=(32, 32), activation="tanh", alpha=1e-5, max_iter=20, random_state=0
@@ -82,7 +84,7 @@ def test_the_loop_evaluates_what_the_libraries_have_fitted(car, runs):
     rows = np.random.default_rng(0).permutation(len(x))[:300]
     results = learning.regression.results[rows] + straight
     error = np.abs(reduced._values(x[rows]) - results).max(axis=0)
-    assert (error < 1e-2 * learning.regression.results.std(axis=0)).all()
+    assert (error < 2e-2 * learning.regression.results.std(axis=0)).all()
 
 
 def test_quadratic_operators_are_those_of_the_library(car, runs):
@@ -157,13 +159,40 @@ def test_reduced_lateral_dynamics_answer_slow_steering_as_all_modes_do(car, meth
         vm.reduce(car, method, rank=90)
 
 
+def test_a_run_beyond_the_states_of_training_is_not_trusted(car, runs):
+    reduced, _ = learned(operator_inference, car, runs, rank=4, form="linear")
+    assert reduced.simulate(runs[0].maneuver, "equilibrium").status == "ok"
+    run = reduced.simulate(lane_change, "dropped")
+    assert (run.status, run.trust.until) == ("untrusted", 0.0)
+    assert run.trust.reason.startswith("component ")
+    small = replace(reduced, input_scale=np.ones(2))
+    for wrong in (
+        small,
+        replace(reduced, time_step=np.inf),
+        replace(reduced, known=np.ones((3, 2))),
+    ):
+        with pytest.raises(ValueError, match=r"equations|time_step|known"):
+            wrong.check_sizes()
+
+
+def test_a_truck_without_the_payload_of_training_is_not_trusted():
+    truck = vm.model("flexible_truck")
+    reduced = vm.reduce(truck, "dynamic_mode_decomposition", training="road:1", rank=10)
+    own, empty = reduced.simulate("road:1"), reduced.for_parameters({"payload": 0.0})
+    assert own.status == "ok"
+    assert "payload" in empty.simulate("road:1").message
+
+
 def test_what_cannot_be_learned_is_said_in_one_line(car, runs, monkeypatch):
     faster = replace(runs[1], maneuver=replace(runs[1].maneuver, samples=501))
     with pytest.raises(InputError, match=r"of one spacing, not 0\.02 and 0\.05 s"):
         learned(operator_inference, car, [runs[0], faster], steps=1)
-    monkeypatch.setitem(sys.modules, "opinf", None)
-    with pytest.raises(InputError, match=r'operator_inference needs opinf; .*\[contenders\]"'):
-        vm.reduce(car, "operator_inference", training="lane_change")
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "opinf", None)
+        with pytest.raises(InputError, match=r'this method needs opinf; .*\[contenders\]"'):
+            vm.reduce(car, "operator_inference", training="lane_change")
+    with pytest.raises(InputError, match="nothing moves in the training runs"):
+        vm.reduce(car, "gaussian_process", training="straight_ahead")
     with pytest.raises(InputError, match="reduces kind"):
         vm.reduce("double_wishbone", "sparse_identification")
     with pytest.raises(InputError, match="rows is 3; it must be from rank 4 to 28"):
