@@ -39,8 +39,11 @@ FACTS = ROOT / "paper" / "facts.json"
 # Kinds of sources that one file of the results folder holds; and those of a script each.
 SCRIPTS = {"in_use": in_use}
 FILES = {"benchmark": "benchmark.json"} | {kind: script.FILE for kind, script in SCRIPTS.items()}
-# The truck's protocol takes a quarter of an hour: it is no part of the collection.
-PROTOCOLS = "predictive", "predictive-flexible_truck"
+# The truck's protocol takes a quarter of an hour: it is no part of its collection.
+PROTOCOLS = {
+    "predictive": ("predictive", "predictive-flexible_truck"),
+    "contenders": ("contenders",),
+}
 # [source: variable; label; label; ...]
 QUERY = re.compile(r"\[([^:\[\]]+):([^\[\]]+)\]")
 # What an expression may call; everything else is arithmetic.
@@ -122,8 +125,8 @@ def load(source: str, folder: Path, jobs: int) -> xr.Dataset:
     if kind == "published":
         values = {key: number.value for key, number in load_published().numbers.items()}
         return pd.DataFrame({"value": values}).rename_axis("id").to_xarray()
-    if kind == "predictive":
-        parts = [study_comparison(study, folder, jobs) for study in PROTOCOLS]
+    if kind in PROTOCOLS:
+        parts = [study_comparison(study, folder, jobs) for study in PROTOCOLS[kind]]
         rows = pd.concat(parts, ignore_index=True)
         rows = rows[rows["kind"] == "method"].dropna(axis=1, how="all")
         return rows.set_index(["model", "label"]).to_xarray()
@@ -152,8 +155,8 @@ def stored_files(source: str, folder: Path) -> list[Path]:
         studies = [f"timing-{model}"]
     elif kind == "sizes":
         studies = [model]
-    elif kind == "predictive":
-        studies = [f"predictive-{name}" for name in names("model")]
+    elif kind in PROTOCOLS:
+        studies = [f"{kind}-{name}" for name in names("model")]
     return [folder / "studies" / f"{study}.nc" for study in studies]
 
 
@@ -166,6 +169,7 @@ def origin(source: str, dataset: xr.Dataset, files: list[Path]) -> dict[str, str
     commands |= {
         "operations": "python paper/regenerate.py",
         "predictive": "vehiclemor compare predictive",
+        "contenders": "vehiclemor compare contenders",
         "sizes": "vehiclemor compare size",
     }
     commands |= {kind: f"python paper/{kind}.py" for kind in SCRIPTS}

@@ -57,7 +57,7 @@ def stepped(learning: Learning, fitted: Any, z: np.ndarray, times: np.ndarray, u
 def timed(model: Any, runs: Any, tests: Any, name: str) -> tuple[float, float, float]:
     """Seconds a run by the library and by our loop, and how far they end apart."""
     module = import_module(METHODS + name)
-    settings = module.METHOD.settings[model.kind](**SETTINGS[name])
+    settings = module.METHOD.settings[model.kind](skipped=1.5, **SETTINGS[name])
     mapped = name not in ("operator_inference", "sparse_identification")
     learning = Learning.of(model, runs, settings, mapped, "numpy")
     fitted, ours = module.trained(learning, settings), module.fit(model, runs, settings)
