@@ -41,7 +41,8 @@ def integrated(name: str, library: Any, z: np.ndarray, times: np.ndarray, u: Inp
 
 def stepped(learning: Learning, fitted: Any, z: np.ndarray, times: np.ndarray, u: Inputs) -> Any:
     """Components by the library's `predict`, called for each step."""
-    library, scale, *_ = fitted
+    # Of dynamic mode decomposition the units of its arguments stand beside the library.
+    library, scale, *_ = fitted if isinstance(fitted, tuple) else (fitted, learning.residual_scale)
     (equations, _), r, path = learning.linear, len(z), [z]
     names = monomials(len(equations.lengths), 1, constant=False)
     for now, after in pairwise(times):

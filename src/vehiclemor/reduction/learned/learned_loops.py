@@ -116,10 +116,15 @@ def rates(
         v[i + 1] = state[i]
     evaluate(equations, v, buffer, result)
     if result.shape[0] > k:
-        forward, sideward = result[k + 1], result[k + 2]
-        cosine, sine = math.cos(state[k]), math.sin(state[k])
-        result[k + 1] = forward * cosine - sideward * sine
-        result[k + 2] = forward * sine + sideward * cosine
+        turn(result, k, state[k])
+
+
+def turn(result: Vector, k: int, heading: float) -> None:
+    """Turn the speeds U, V behind k results and psi' into rates of the place at a heading."""
+    forward, sideward = result[k + 1], result[k + 2]
+    cosine, sine = math.cos(heading), math.sin(heading)
+    result[k + 1] = forward * cosine - sideward * sine
+    result[k + 2] = forward * sine + sideward * cosine
 
 
 def march(
@@ -158,13 +163,14 @@ def march(
                 v[1 + k + i] = inputs[2 * row, i]
                 v[1 + k + inputs.shape[1] + i] = inputs[2 * row + (0 if last else 2), i]
             now, before = vector(stages, 0, size), vector(stages, size, size)
-            if size > k and row > 0:
+            for i in range(k):
+                v[i + 1] = path[row, i]
+            evaluate(equations, v, work, now)
+            if size > k:
                 # The heading first: the rates of the place are turned by it.
-                for i in range(k):
-                    v[i + 1] = path[row, i]
-                evaluate(equations, v, work, now)
-                path[row, k] = path[row - 1, k] + 0.5 * step * (before[k] + now[k])
-            rates(equations, path[row], (v, k), work, now)
+                if row > 0:
+                    path[row, k] = path[row - 1, k] + 0.5 * step * (before[k] + now[k])
+                turn(now, k, path[row, k])
             for i in range(k + 1, size):
                 if row > 0:
                     path[row, i] = path[row - 1, i] + 0.5 * step * (before[i] + now[i])

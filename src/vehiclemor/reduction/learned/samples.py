@@ -154,10 +154,10 @@ def _gathered(model: Any, runs: tuple[Any, ...], steps: int, skipped: float) -> 
             f"{min(spacings):g} and {max(spacings):g} s"
         )
     count = sum((maneuver.samples - 1) * steps for maneuver in maneuvers)
-    taken = steps, -(-count // MOST_SAMPLES), skipped
-    parts = [_of_run(states, run, *taken) for run in training]
     if count < FEWEST:
         raise InputError(f"learned models need at least {FEWEST} samples of training, not {count}")
+    taken = steps, -(-count // MOST_SAMPLES), skipped
+    parts = [_of_run(states, run, *taken) for run in training]
     *histories, evaluations = zip(*parts, strict=True)
     arrays = [np.concatenate(history) for history in histories]
     seconds = time.process_time() - began

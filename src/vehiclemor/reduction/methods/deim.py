@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.reduction.interface import Method, OfflineCost, installed
+from vehiclemor.reduction.interface import Method, installed, offline_cost
 from vehiclemor.reduction.projection import dynamic
 from vehiclemor.reduction.projection.bases import Rank
 from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, DynamicProjection
@@ -85,11 +85,11 @@ def fit(model: DynamicModel, training: Training, settings: DeimSettings) -> Inte
         rows, *_ = deim(NumpyVectorSpace(len(scale)).make_array(basis), pod=False)
     oblique = np.zeros_like(test)
     oblique[:, rows] = (test * scale) @ basis @ np.linalg.inv(basis[rows]) / scale[rows]
-    evaluations = projected.offline.evaluations + len(rates)
+    further = projected.offline.evaluations + len(rates)
     return InterpolatedProjection(
         model,
         replace(spaces, test_basis=oblique[None]),
-        OfflineCost(time.process_time() - began, evaluations),
+        offline_cost(began, model, runs, further),
         settings.solver,
         settings.tolerance,
         projected.bases,

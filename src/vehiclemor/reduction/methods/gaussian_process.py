@@ -24,26 +24,25 @@ class GaussianProcessSettings(LearnedSettings):
     noise: float = Field(1e-3, gt=0.0, description="variance of the noise, of the results' own")
 
 
-def trained(learning: Learning, settings: GaussianProcessSettings) -> tuple[Any, np.ndarray]:
-    """The library's process of what a linear step leaves, in units (m,) of that."""
+def trained(learning: Learning, settings: GaussianProcessSettings) -> Any:
+    """The library's process of what a linear step leaves, in units of the `residual_scale`."""
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF
 
     (arguments, _), (_, left) = learning.regression, learning.linear
     order = np.random.default_rng(SEED).permutation(len(arguments))[: settings.samples]
-    scale = learning.residual_scale
-    x, y = arguments[order], left[order] / scale
+    x, y = arguments[order], left[order] / learning.residual_scale
     # Lengths of largest likelihood are too short: samples lie densely along runs, not beside them.
     kernel: Any = RBF(settings.length)
     options: Any = {"alpha": settings.noise, "optimizer": None}
-    return GaussianProcessRegressor(kernel, **options).fit(x, y), scale
+    return GaussianProcessRegressor(kernel, **options).fit(x, y)
 
 
 def fit(model: Any, training: Training, settings: GaussianProcessSettings) -> LearnedModel:
     """A linear step and the library's kernels, run by our loop."""
     learning = Learning.of(model, training, settings, model.kind != "ae", "sklearn")
-    (equations, _), (process, scale) = learning.linear, trained(learning, settings)
-    x = process.X_train_
+    (equations, _), process = learning.linear, trained(learning, settings)
+    scale, x = learning.residual_scale, process.X_train_
     lengths = np.full(x.shape[1], settings.length)
     heights = np.ascontiguousarray(np.reshape(process.alpha_, (len(x), len(scale))) * scale)
     parts = {"lengths": lengths, "centres": x / lengths, "heights": heights}

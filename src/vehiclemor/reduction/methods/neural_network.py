@@ -26,13 +26,12 @@ class NeuralNetworkSettings(LearnedSettings):
     epochs: int = Field(60, ge=1, le=2000, description="passes over the samples, at most")
 
 
-def trained(learning: Learning, settings: NeuralNetworkSettings) -> tuple[Any, np.ndarray]:
-    """The library's network of what a linear step leaves, in units (m,) of that."""
+def trained(learning: Learning, settings: NeuralNetworkSettings) -> Any:
+    """The library's network of what a linear step leaves, in units of the `residual_scale`."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.neural_network import MLPRegressor
 
     (arguments, _), (_, left) = learning.regression, learning.linear
-    scale = learning.residual_scale
     network = MLPRegressor(
         hidden_layer_sizes=(settings.width,) * settings.layers,
         activation="tanh",
@@ -43,13 +42,14 @@ def trained(learning: Learning, settings: NeuralNetworkSettings) -> tuple[Any, n
     with warnings.catch_warnings():
         # The number of epochs is a setting: validation judges what they have reached.
         warnings.simplefilter("ignore", ConvergenceWarning)
-        return network.fit(arguments, left / scale), scale
+        return network.fit(arguments, left / learning.residual_scale)
 
 
 def fit(model: Any, training: Training, settings: NeuralNetworkSettings) -> LearnedModel:
     """A linear step and the library's network, run by our loop."""
     learning = Learning.of(model, training, settings, model.kind != "ae", "sklearn")
-    (equations, _), (network, scale) = learning.linear, trained(learning, settings)
+    (equations, _), network = learning.linear, trained(learning, settings)
+    scale = learning.residual_scale
     weights, offsets = [*network.coefs_], [*network.intercepts_]
     weights[-1], offsets[-1] = weights[-1] * scale, offsets[-1] * scale
     flat = [part.ravel() for pair in zip(weights, offsets, strict=True) for part in pair]
