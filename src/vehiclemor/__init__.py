@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from vehiclemor.reduction.reduced_model import load as load
     from vehiclemor.reduction.reduced_model import rom as rom
     from vehiclemor.report.comparison import compare as compare
+    from vehiclemor.report.figures.animation import animate as animate
     from vehiclemor.report.figures.catalogue import figures as figures
     from vehiclemor.report.page import write_report as write_report
     from vehiclemor.report.study_formats import convert as convert
@@ -37,10 +38,11 @@ if TYPE_CHECKING:
     from vehiclemor.study.dataset import dataset as dataset
     from vehiclemor.study.judge import judge as judge
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 __all__ = [
     "Signal",
     "VehiclemorError",
+    "animate",
     "compare",
     "convert",
     "dataset",
@@ -74,6 +76,7 @@ _DEFINED_IN = {
     **dict.fromkeys(("Signal", "many_signals"), "vehiclemor.inputs.signal"),
     **dict.fromkeys(("load", "rom"), "vehiclemor.reduction.reduced_model"),
     "VehiclemorError": "vehiclemor.exceptions",
+    "animate": "vehiclemor.report.figures.animation",
     "compare": "vehiclemor.report.comparison",
     "convert": "vehiclemor.report.study_formats",
     "dataset": "vehiclemor.study.dataset",

@@ -42,36 +42,23 @@ def not_written(path: Path, error: Exception) -> FileError | MachineError:
 
 
 def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None = None) -> Path:
-    """Let `write` fill a temporary file in a folder, by default that of `path`; then move it there.
+    """Let `write` fill a temporary file or folder, beside `path` by default; then move it there.
 
     The temporary path ends like `path`, on the same disk: a reader sees the old content or the new
     one, never a part.  `FileError` if the folder can't be written, `MachineError` if the disk
     fails.
     """
-    temporary = temporary_path((folder or path.parent) / path.name)
-    try:
-        return _moved(temporary, path, write)
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
-
-
-def write_folder(path: Path, write: Callable[[Path], object]) -> Path:
-    """As `write_whole`, of a folder that is not there yet."""
-    temporary = temporary_path(path.absolute())
-    try:
-        return _moved(temporary, path, write)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _moved(temporary: Path, path: Path, write: Callable[[Path], object]) -> Path:
-    """Fill a temporary file or folder, and move it into place."""
+    whole = path.absolute()
+    temporary = temporary_path((folder or whole.parent) / whole.name)
     try:
         write(temporary)
         os.replace(temporary, path)
     except OSError as error:
         raise not_written(path, error) from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        shutil.rmtree(temporary, ignore_errors=True)
     return path
 
 

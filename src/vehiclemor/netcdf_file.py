@@ -46,7 +46,8 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
             with netCDF4.Dataset(temporary, "w") as file:
                 dataset.dump_to_store(NetCDF4DataStore(file))
                 file.createGroup(INTEGRITY)
-            _seal(temporary)
+            with temporary.open("ab") as file:
+                file.write(SEAL + _digest(temporary.read_bytes()))
         except (OSError, RuntimeError):
             # The library hides the reason; plain writing of as much as there is tells it.
             temporary.write_bytes(bytes(dataset.nbytes + (1 << 16)))
@@ -117,12 +118,6 @@ def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
         detail = getattr(error, "strerror", None) or str(error).splitlines()[0][:80]
         detail = DAMAGED if "NetCDF:" in detail else detail
         raise CorruptError(f"not a readable {kind} ({detail})", path, mend) from None
-
-
-def _seal(path: Path) -> None:
-    """Append the hash of its bytes to a file."""
-    with path.open("ab") as file:
-        file.write(SEAL + _digest(path.read_bytes()))
 
 
 def _sealed(path: Path) -> bool:

@@ -78,18 +78,10 @@ class ParameterFile(FileSchema):
 
 @dataclass(frozen=True)
 class ParameterSet(ShortRepr):
-    """Validated parameters of one model, SI units.
+    """Validated parameters of one model, SI units."""
 
-    Attributes
-    ----------
-    model
-        Name of the model.
-    entries
-        Name -> entry, in the order that the model declares.
-    """
-
-    model: str
-    entries: dict[str, Parameter]
+    model: str  # Name of the model.
+    entries: dict[str, Parameter]  # Name -> entry, in the order that the model declares.
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Value of a parameter as an array, shape () or (3,)."""

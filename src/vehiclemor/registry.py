@@ -14,18 +14,14 @@ from typing import Any
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError, PlugInError, blame, blamed, did_you_mean
 
-GROUPS = {
-    "model": "vehiclemor.models",
-    "method": "vehiclemor.methods",
-    "maneuver": "vehiclemor.maneuvers",
-}
 # Class of the components of a kind, named as in an entry point: most stand in a layer above.
 CLASSES = {
     "model": "vehiclemor.multibody.definition:ModelDefinition",
     "method": "vehiclemor.reduction.interface:Method",
     "maneuver": "vehiclemor.inputs.maneuver:Maneuver",
 }
-
+# Groups of entry points.
+GROUPS = {kind: f"vehiclemor.{kind}s" for kind in CLASSES}
 # One name for each member.  No number has more digits.
 FAMILY = re.compile(r"([^:]+):(0|[1-9][0-9]{0,17})")
 
@@ -97,12 +93,7 @@ def _class(kind: str) -> type:
 @cache
 def _entries(kind: str) -> dict[str, EntryPoint]:
     choice("kind of component", kind, GROUPS)
-    found: dict[str, EntryPoint] = {}
-    # Sorted so that a built-in comes last: no plug-in takes its name away.
-    for entry in sorted(entry_points(group=GROUPS[kind]), key=_is_built_in):
-        found[entry.name] = entry
-    return found
-
-
-def _is_built_in(entry: EntryPoint) -> bool:
-    return entry.value.startswith("vehiclemor.")
+    found = entry_points(group=GROUPS[kind])
+    # Built-ins come last: no plug-in takes the name of one away.
+    ordered = sorted(found, key=lambda entry: entry.value.startswith("vehiclemor."))
+    return {entry.name: entry for entry in ordered}

@@ -18,13 +18,6 @@ def data_folder() -> Path:
     )
 
 
-def handbook_folder() -> Path:
-    """Folder with the handbook: notation, architecture, findings, adding a model or a method."""
-    package = Path(__file__).resolve().parent
-    installed = package / "handbook"
-    return installed if installed.is_dir() else package.parents[1] / "paper" / "handbook"
-
-
 def data_names(kind: str) -> list[str]:
     """Names (without ending) of the data files of one kind, sorted."""
     return sorted(path.stem for path in (data_folder() / kind).glob("*.toml"))

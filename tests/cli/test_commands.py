@@ -21,7 +21,7 @@ from vehiclemor.parameters import load_parameters
 from vehiclemor.reduction.methods import replay
 from vehiclemor.registry import component, names
 from vehiclemor.report.description import SCHEMAS
-from vehiclemor.resources import data_names, handbook_folder
+from vehiclemor.resources import data_names
 from vehiclemor.study import run as study_run
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import load_protocol
@@ -57,9 +57,9 @@ def test_names_and_citation(printed, capsys):
 
 
 def test_help(printed):
-    assert (handbook_folder() / "add-a-model-or-method.md").is_file()
-    assert str(handbook_folder())[:20] in printed("--help").replace("\n", "")
+    text = printed("--help")
     for command in COMMANDS:
+        assert command in text
         printed(command, "--help")
 
 

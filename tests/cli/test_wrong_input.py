@@ -15,28 +15,15 @@ FULL = "simulate high_fidelity_vehicle"
 WRONG = [
     ("simulate double_wishbon", "double_wishbone"),
     (f"{TRAVEL} --method pood", "pod"),
-    (f"{TRAVEL} --maneuver sine", "'sine'"),
     (f"{CAR} --maneuver sine_travel", "z, s0"),
-    (f"{TRAVEL} --start dropped", "'dropped'"),
-    (f"{TRAVEL} --training matchd", "matched"),
-    (f"{TRAVEL} --method pod --preset litteral", "literal"),
     (f"{TRAVEL} --set solver=lu", "solver"),
     (f"{POD} rnak=3", "rank"),
-    (f"{POD} rank=0", "rank is 0"),
     (f"{POD} rank=2.5", "rank"),
-    (f"{POD} snapshots=1000000000", "snapshots"),
-    (f"{POD} control_period=nan", "control_period"),
     (f"{TRAVEL} --frequency 0", "frequency factor: 0"),
     (f"{TRAVEL} --amplitude 3", "out of reach"),
     ("run figure-15", "figure-1"),
-    ("run no-such.toml", "no-such.toml"),
-    ("run figures-6-7 --jobs 0", "jobs is 0"),
     ("run figures-6-7 --seed 3", "seed"),
-    ("status figure-15", "figure-1"),
-    ("status figure-12 --seed 3", "seed"),
-    ("compare papper", "paper"),
     ("figures --only 55", "'55'"),
-    ("show pood", "pod"),
     ("show study-shema", "study-schema"),
     ("show double_wishbone --parameter wheel_centr=1", "wheel_centre"),
 ]
@@ -61,21 +48,14 @@ TEXTS = [
 # A parameter of a model, and what the line must say beside it.
 PARAMETERS = {
     TRAVEL: [
-        ("wheel_centre=1", "3 components"),
-        ("upper_arm_front_pivot=-100,470,105", "millimetres"),
         ("upper_arm_front_pivot=-0.25,0.51,0.11", "can't be assembled"),
     ],
     CAR: [
-        ("sprung_mass=-900", "-900 kg"),
         ("initial_speed=0", "0 m/s"),
-        ("front_track=1386.84", "1386.84 m"),
         # The sprung mass hangs over an axle: the wheels at the other end had to hold it down.
         ("front_axle_distance=0.05", "rear wheels leave the ground"),
     ],
     FULL: [
-        ("cup_holders=4", "not a parameter"),
-        ("chassis_mass=-1515", "-1515 kg"),
-        ("chassis_mass=1,2,3", "a number is needed"),
         ("tie_rod_outer=-150,770,-120", "millimetres"),
         ("chassis_centre=1.7,0,0.2", "lifts the rear wheels"),
         ("tire_stiffness=9000", "presses the front tires flat"),
@@ -130,9 +110,9 @@ def test_output_that_is_something_else_is_kept(fails, tmp_path):
     fails([*simulate, f"{long}.nc"], "too long")
     fails([*study, out], "not a folder")
     fails([*study, long], "too long")
-    fails(["figures", "--only", "5", "--out", out], "not a folder")
+    fails(["figures", "--only", "6", "--out", out], "not a folder")
     fails(["run", f"{long}.toml"], "too long")
     if Path("/proc/self").is_dir():  # a place where nobody writes
         fails([*study, "/proc/self/results"], "can't be written")
-        fails(["figures", "--only", "5", "--out", "/proc/self/figures"], "can't be written")
+        fails(["figures", "--only", "6", "--out", "/proc/self/figures"], "can't be written")
     assert out.read_text() == "my notes"

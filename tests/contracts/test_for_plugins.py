@@ -1,6 +1,5 @@
 """The contracts that authors of plug-ins call: they pass what works and name what is broken."""
 
-import re
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -17,13 +16,13 @@ from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.registry import component, names
 from vehiclemor.study.experiment import complete_settings
 
-PAGE = Path(__file__).parents[2] / "paper" / "handbook" / "add-a-model-or-method.md"
+EXAMPLE = Path(__file__).parents[2] / "examples" / "my_method.py"
 PROJECT = """
 [project]
-name = "handbook"
+name = "example"
 version = "1"
 [project.entry-points."vehiclemor.methods"]
-interpolation = "handbook_method:METHOD"
+polynomials = "example_method:METHOD"
 """
 TRUCK = "flexible_truck"
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
@@ -69,16 +68,16 @@ def test_a_preset_lowers_its_rank_to_the_number_of_coordinates(method):
     assert complete_settings(vm.model("double_wishbone"), method, {})["rank"] == 3
 
 
-def test_the_method_that_the_handbook_shows_works_as_it_stands(tmp_path):
-    method, *_ = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
-    (tmp_path / "handbook_method.py").write_text(method)
+def test_the_method_of_the_example_works_as_it_stands(tmp_path):
+    method, *_ = EXAMPLE.read_text(encoding="utf-8").partition("# An entry point")
+    (tmp_path / "example_method.py").write_text(method)
     (tmp_path / "pyproject.toml").write_text(PROJECT)
     with installed(tmp_path):
-        contracts.check_method("interpolation", "double_wishbone")
+        contracts.check_method("polynomials", "double_wishbone")
         arguments = {"frequency": 1.4, "training": "nominal"}
-        data = vm.simulate("double_wishbone", "interpolation", **arguments)
+        data = vm.simulate("double_wishbone", "polynomials", **arguments)
     # The mechanism's path is a curve: wheel travel alone determines all coordinates.
-    assert float(data["rms_error"].sel(output="second_euler_angle")) < 1e-7
+    assert float(data["rms_error"].sel(output="second_euler_angle")) < 1e-4
 
 
 @pytest.fixture

@@ -217,23 +217,6 @@ def stabilised(
     return phi, rate, loops[1, :26].T, -second - 2 * a * rate - b**2 * phi
 
 
-# what tests use
-
-
-def mass_and_bias(
-    q: np.ndarray, qd: np.ndarray, s: float, sd: float, sdd: float, p: Numbers = PARAMETERS
-) -> tuple[np.ndarray, np.ndarray]:
-    """M (26, 26) and h (26,) of the open loops."""
-    return Instant(q, qd, s, sd, sdd, p).mass_and_bias()
-
-
-def constraints(
-    q: np.ndarray, qd: np.ndarray, s: float, sd: float, sdd: float, p: Numbers = PARAMETERS
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Phi (12,) in m, Phi' (12,), Phi_q (12, 26) and gamma (12,) with the stabilisation."""
-    return stabilised(front_axle(*paths(q, qd, s, sd, sdd), p).loops, p)
-
-
 def accelerations(
     q: np.ndarray, qd: np.ndarray, s: float, sd: float, sdd: float, p: Numbers = PARAMETERS
 ) -> np.ndarray:

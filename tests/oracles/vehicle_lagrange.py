@@ -236,18 +236,16 @@ class Instant:
         angular = axial(np.einsum("yx,ayz->axz", frame, moved))
         return np.hstack([linear, angular, np.zeros((len(linear), 8)) + joints]).T
 
-    def shear_forces(self, shear: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def shear_forces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Fx, Fy, Mz."""
-        if not shear:
-            return 0 * self.load, 0 * self.load, 0 * self.load
         regular = np.where(self.touches, self.load, self.p["FNOMIN"])
         forces = magic_formula(regular, self.kappa, self.alpha, self.p)
         return tuple(np.where(self.touches, force, 0.0) for force in forces)
 
-    def applied(self, dampers: bool, shear: bool) -> np.ndarray:
+    def applied(self) -> np.ndarray:
         """Generalised forces (14,): virtual work over virtual displacement."""
         p, d = self.p, derived(self.p)
-        fx, fy, mz = self.shear_forces(shear)
+        fx, fy, mz = self.shear_forces()
         weight = np.full(4, p["m_u"] * p["g"])
         force = fx[:, None] * self.forward + fy[:, None] * self.sideward
         force = force + np.outer(self.load, [0, 0, 1])
@@ -255,24 +253,16 @@ class Instant:
         q -= self.units.centres[1, ..., 2] @ weight
         q -= p["m_s"] * p["g"] * self.units.cg[1, :, 2]
         q[6:10] -= per_wheel(d, "S0") + per_wheel(p, "k") * self.z
-        if dampers:
-            q[6:10] -= per_wheel(p, "c") * self.z_dot
+        q[6:10] -= per_wheel(p, "c") * self.z_dot
         return q
 
 
-def accelerations(
-    x: np.ndarray,
-    delta: complex,
-    p: Numbers = PARAMETERS,
-    *,
-    dampers: bool = True,
-    shear: bool = True,
-) -> np.ndarray:
+def accelerations(x: np.ndarray, delta: complex, p: Numbers = PARAMETERS) -> np.ndarray:
     """Derivative (28,) of a real or complex state (q, nu), with the steering angle held."""
     now = Instant(np.asarray(x), delta, p)
     mass = inner(now.units, 1, now.units, 1, p)
     bias = 2 * inner(now.units, 1, now.path, 2, p)[:, 0]
-    q_second = np.linalg.solve(mass, now.applied(dampers, shear) - bias)
+    q_second = np.linalg.solve(mass, now.applied() - bias)
     nu_dot = now.speeds @ q_second + 2 * now.quasi_speeds(now.path, 2)[:, 0]
     return np.concatenate([now.q_dot, nu_dot])
 
@@ -284,17 +274,17 @@ def kinetic_matrix(x: np.ndarray, delta: complex, p: Numbers = PARAMETERS) -> np
     return to_rates.T @ inner(now.units, 1, now.units, 1, p) @ to_rates
 
 
-def jacobian(x: np.ndarray, delta: float, p: Numbers = PARAMETERS, **parts: bool) -> np.ndarray:
+def jacobian(x: np.ndarray, delta: float, p: Numbers = PARAMETERS) -> np.ndarray:
     """d(xdot)/dx (28, 28) by complex step."""
     steps = 1e-30j * np.eye(28)
-    columns = [accelerations(x + step, delta, p, **parts).imag / 1e-30 for step in steps]
+    columns = [accelerations(x + step, delta, p).imag / 1e-30 for step in steps]
     return np.array(columns).T
 
 
 def tire_forces(x: np.ndarray, delta: complex, p: Numbers = PARAMETERS) -> dict[str, np.ndarray]:
     """Forces, slips and centre heights of the four wheels."""
     now = Instant(np.asarray(x), delta, p)
-    fx, fy, mz = now.shear_forces(shear=True)
+    fx, fy, mz = now.shear_forces()
     slips = {"kappa": now.kappa, "alpha": now.alpha, "zc": now.height}
     return {"Fx": fx, "Fy": fy, "Fz": now.load, "Mz": mz, **slips}
 
@@ -312,19 +302,12 @@ def energy(x: np.ndarray, p: Numbers = PARAMETERS, delta: float = 0.0) -> float:
     return kinetic + potential
 
 
-def power(
-    x: np.ndarray,
-    delta: float,
-    p: Numbers = PARAMETERS,
-    *,
-    dampers: bool = True,
-    shear: bool = True,
-) -> float:
+def power(x: np.ndarray, delta: float, p: Numbers = PARAMETERS) -> float:
     """Rate of the energy while the steering angle is held (without damping of the tyres)."""
     now = Instant(np.asarray(x), delta, p)
-    fx, fy, mz = now.shear_forces(shear)
+    fx, fy, mz = now.shear_forces()
     turning = now.q_dot @ now.turning
-    lost = dampers * per_wheel(p, "c") * now.z_dot**2
+    lost = per_wheel(p, "c") * now.z_dot**2
     return np.sum(fx * now.slide_x + fy * now.slide_y + mz * turning - lost)
 
 

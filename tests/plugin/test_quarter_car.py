@@ -10,7 +10,6 @@ from scipy.linalg import expm
 
 import vehiclemor as vm
 from vehiclemor.contracts import check_method
-from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.validation import validated
@@ -164,17 +163,6 @@ def test_all_modes_of_a_linear_model_give_its_exact_solution(car):
     assert np.abs(few.simulate(ramp(201), start).states - expected).max() > 1e-4
 
 
-def test_modes_are_projected_without_loss(car, rng):
-    reduced, (matrix, _) = fitted(car, fastest=20.0), matrices(car)
-    best = reduced.best_approximation(rng.normal(size=(6, 4)))
-    np.testing.assert_allclose(reduced.best_approximation(best), best, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(reduced.left @ reduced.right, np.eye(2), rtol=0, atol=1e-12)
-    # The subspace is invariant.
-    image = matrix @ reduced.right
-    close = {"rtol": 0, "atol": 1e-6 * np.abs(image).max()}
-    np.testing.assert_allclose(reduced.right @ reduced.left @ image, image, **close)
-
-
 def test_a_vehicle_is_near_its_modes_at_small_amplitude():
     check_method("quarter_car_modes", "independent_suspension_vehicle")
     model = vm.model("independent_suspension_vehicle")
@@ -185,10 +173,3 @@ def test_a_vehicle_is_near_its_modes_at_small_amplitude():
         column = model.outputs.index(name)
         error = np.abs(run.outputs[:, column] - full.outputs[:, column]).max()
         assert error < 2e-3 * np.abs(full.outputs[:, column]).max()
-
-
-def test_the_method_simulates_as_a_built_in():
-    data = vm.simulate("independent_suspension_vehicle", "quarter_car_modes", amplitude=0.01)
-    assert data["status"].item() == "ok"
-    with pytest.raises(InputError, match="double_wishbone is of kind ae"):
-        vm.simulate("double_wishbone", "quarter_car_modes")

@@ -30,7 +30,6 @@ def test_a_name_stands_wherever_the_template_has_its_own(here, capsys):
     assert main(["new-plugin", "my_car"]) == 0
     told = capsys.readouterr().out
     assert "pip install -e my_car_plugin pytest\n" in told
-    assert Path(told.split()[-1]).name == "my-plug-in.md"
     assert [path.name for path in here.iterdir()] == ["my_car_plugin"]
     written = [path for path in (here / "my_car_plugin").rglob("*") if path.is_file()]
     template = [p for p in (data_folder() / "plugin_template").rglob("*") if p.suffix != ".pyc"]

@@ -8,7 +8,6 @@ import pytest
 from tests.oracles import high_fidelity_vehicle as oracle
 from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS
 from tests.oracles.projected_simulation import (
-    projected_state,
     simulate_projected,
     without_stabilisation,
 )
@@ -107,26 +106,6 @@ def test_violations_decay_as_the_gains_say_and_grow_without_them(vehicle):
         path = integrate(model, STRAIGHT, x, times, tolerance=1e-11)
         found = np.array([model.violations(state, REST)[0] for state in path.states])
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
-
-
-def test_projection_finds_the_nearest_state_that_holds_the_constraints(vehicle):
-    rng = np.random.default_rng(5)
-    u = np.array([0.004, 0.05, 0.0])
-    for _ in range(4):
-        x = vehicle.start() + 1e-3 * np.r_[np.zeros(6), rng.uniform(-1, 1, 16), np.zeros(30)]
-        x[N:] += rng.uniform(-1.0, 1.0, N)
-        found = projected_state(vehicle, x, u)
-        phi, rate, jacobian, _ = oracle.constraints(found[:N], found[N:], *u)
-        assert np.abs(phi).max() < 1e-12
-        assert np.abs(rate).max() < 1e-12
-        # No admissible change of the rates comes nearer to the given ones in kinetic energy.
-        mass, _ = oracle.mass_and_bias(found[:N], found[N:], *u)
-        free = np.linalg.svd(jacobian)[2][12:].T
-        momentum = mass @ (found - x)[N:]
-        assert np.abs(free.T @ momentum).max() < 1e-11 * np.abs(momentum).max()
-        # The corners move, the chassis hardly does.
-        moved = np.abs(found - x)
-        assert moved[:6].max() < 0.02 * moved[6:20].max()
 
 
 # Runs

@@ -6,7 +6,6 @@ from pymor.algorithms.pod import pod
 from pymor.vectorarrays.numpy import NumpyVectorSpace
 
 from tests.reducing import figure_errors, fitted, two_way_travel
-from vehiclemor.reduction.projection.bases import pod_basis
 
 # Test space, frequency and amplitude factor, RMS of spindle y (m) and second Euler angle (rad), to
 # two digits; three coordinates, bases of the unperturbed run.
@@ -40,15 +39,6 @@ def by_pymor(snapshots: np.ndarray, rank: int) -> tuple[np.ndarray, np.ndarray]:
     array = NumpyVectorSpace(len(snapshots)).from_numpy(centred)
     modes, values, *_ = pod(array, modes=rank, rtol=0.0, atol=0.0)
     return modes.to_numpy() @ modes.to_numpy().T, values
-
-
-@pytest.mark.parametrize("rank", [1, 3, 6])
-def test_pymor_has_the_same_subspace_for_random_snapshots(rank, rng):
-    snapshots = rng.standard_normal((8, 20)) * 0.5 ** np.arange(8)[:, None]
-    projector, values = by_pymor(snapshots, rank)
-    basis = pod_basis(snapshots, rank)
-    np.testing.assert_allclose(basis.vectors @ basis.vectors.T, projector, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(basis.singular_values[:rank], values, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("rank", "accuracy"), [(1, 1e-12), (2, 1e-10), (3, 1e-7)])

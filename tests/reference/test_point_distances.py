@@ -32,23 +32,6 @@ def test_wheel_follows_the_same_path(model, mechanism, rack, direction):
 
 
 @pytest.mark.parametrize("side", [0, 1])
-def test_the_jacobian_is_singular_at_the_limits(model, side):
-    limit = model.reach()[side]
-    inward = -np.sign(limit)
-
-    def smallest(distance: float) -> float:
-        u = np.array([limit + inward * distance, 0.0])
-        return np.linalg.svd(model.jacobian(model.solve(u), u)[:7, :7], compute_uv=False)[-1]
-
-    values = [smallest(distance) for distance in (4e-3, 1e-3, 2.5e-4, 1e-6)]
-    assert values[0] > 0.02
-    assert values[-1] < 1e-3
-    # At a fold it falls with the square root of the distance.
-    assert 1.8 < values[0] / values[1] < 3.0
-    assert 1.8 < values[1] / values[2] < 3.0
-
-
-@pytest.mark.parametrize("side", [0, 1])
 def test_no_position_is_near_beyond_the_limits(model, points, side):
     limit = model.reach()[side]
     near = model.solve([limit, 0.0])

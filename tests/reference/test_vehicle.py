@@ -7,12 +7,10 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from tests.oracles import vehicle_lagrange as oracle
-from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.simulation.workspaces import Solver
 
 NAME = "independent_suspension_vehicle"
@@ -220,51 +218,11 @@ def test_the_dropped_start_keeps_its_velocity_in_space(vehicle):
 # Energy
 
 
-def integrate(
-    model: DynamicModel,
-    maneuver: Maneuver,
-    start: np.ndarray,
-    solver: str,
-    tolerance: float,
-    times: np.ndarray,
-) -> Trajectory:
-    found = model.integrate(maneuver, start, whole_space(28), Solver(solver, tolerance, times))
-    assert found.status == "ok", found.message
-    return found
-
-
 def test_energy_changes_by_the_power_of_tires_and_dampers(vehicle):
     for x, delta in LARGE:
         rates = vehicle.rhs(x, delta)
         rate = oracle.energy(x + 1e-30j * rates, delta=delta).imag / 1e-30
         assert rate == pytest.approx(oracle.power(x, delta), rel=1e-9, abs=1e-5)
-
-
-def test_energy_is_conserved_without_dampers_and_shear():
-    # No stiffness of a tire against slip: no force along the road.
-    overrides = dict.fromkeys(("PKX1", "PKX2", "PKY1", "front_damping", "rear_damping"), 0.0)
-    free = build(NAME, overrides=overrides)
-    start = free.start("dropped")
-    # Rolls, pitches and bounces; the rear wheels are off the road at first.
-    start[15:20] = [0.3, start[16], 0.4, 0.1, 0.2]
-    times = np.linspace(0.0, 4.0, 9)
-    path = integrate(free, STRAIGHT, start, "dopri5", 1e-11, times)
-    energies = np.array([oracle.energy(x) for x in path.states])
-    assert np.abs(np.diff(path.outputs[:, 3])).max() > 1e-3
-    np.testing.assert_allclose(energies, energies[0], rtol=1e-8)
-    # Beside the part that springs and body exchange, too.
-    exchanged = oracle.energy(start) - oracle.energy(oracle.equilibrium())
-    np.testing.assert_allclose(energies, energies[0], rtol=0, atol=1e-6 * abs(exchanged))
-    forces = outputs(free, path.states[3], 0.1)
-    assert not any(forces[name].any() for name in ("Fx", "Fy", "Mz"))
-
-
-def test_dampers_and_tires_take_energy_away(vehicle):
-    times = np.linspace(0.0, 3.0, 31)
-    path = integrate(vehicle, STRAIGHT, vehicle.start("dropped"), "dopri5", 1e-9, times)
-    energies = np.array([oracle.energy(x) for x in path.states])
-    assert np.all(np.diff(energies) < 1e-3)
-    assert energies[0] - energies[-1] > 50.0
 
 
 # Linear theory
@@ -307,6 +265,8 @@ def test_eigenvalues_are_those_of_the_exact_jacobian(vehicle):
 
 
 def test_the_lane_change_ends_where_its_amplitude_was_calibrated(vehicle):
-    end = integrate(vehicle, LANE_CHANGE, vehicle.start(), "dopri5", 1e-10, np.array([25.0]))
+    how = Solver("dopri5", 1e-10, np.array([25.0]))
+    end = vehicle.integrate(LANE_CHANGE, vehicle.start(), whole_space(28), how)
+    assert end.status == "ok", end.message
     assert end.outputs[0, 1] == pytest.approx(3.4999973, abs=1e-6)
     assert end.outputs[0, 2] == pytest.approx(6.8e-4, abs=5e-6)

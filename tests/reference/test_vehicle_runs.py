@@ -94,15 +94,6 @@ def test_mirrored_turned_and_moved_the_vehicle_accelerates_alike(name, rng):
         close(model.rhs(moved, u), expected)
 
 
-@pytest.mark.parametrize("start", STARTS)
-def test_the_mirrored_steering_drives_the_mirror_image(start):
-    model = build(FIDELITY)
-    x = model.start(start)
-    left, right = (integrate(model, x, tolerance=1e-10, factor=f).states for f in (1.0, -1.0))
-    assert left[-1, 1] > 3.0
-    np.testing.assert_allclose(right, MIRROR[FIDELITY](left), rtol=0, atol=1e-6)
-
-
 @each_vehicle
 @each_solver
 def test_the_run_does_not_depend_on_the_heading(name, solver):

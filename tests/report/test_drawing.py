@@ -143,12 +143,13 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeyp
         raise IndexError("index 51 is out of bounds")
 
     monkeypatch.setitem(result_plot.DRAWINGS, "histories", broken)
-    only = ["--only", f"{folder / 'late.toml'},1", "--results", str(folder)]
+    only = ["--only", f"{folder / 'late.toml'},{folder / 'numbers.toml'}"]
+    only += ["--results", str(folder)]
     assert main(["figures", *only, "--out", str(folder / "some"), "--dpi", "20"]) == 1
     printed = capsys.readouterr()
-    (line,) = printed.err.splitlines()
+    *_, line = printed.err.splitlines()
     assert line.startswith("figure late-histories can't be drawn: IndexError")
-    assert [row.rpartition("-")[2] for row in printed.out.split()] == ["errors.png", "1.png"]
+    assert [row.rpartition("-")[2] for row in printed.out.split()] == ["errors.png"] * 2
     page = vm.write_report([str(folder / "late.toml")], folder / "page.html", folder)
     head, _, rest = page.read_text(encoding="utf-8").partition("<ol")
     assert "late (IndexError: index 51" in head

@@ -9,10 +9,8 @@ from matplotlib.image import imread
 
 from tests.report.figure_texts import checked, varied
 from vehiclemor.exceptions import InputError
-from vehiclemor.parameters import load_parameters
-from vehiclemor.registry import component
 from vehiclemor.report.figures.catalogue import FIGURES
-from vehiclemor.report.figures.paper import figure_pareto
+from vehiclemor.report.figures.pareto import figure_pareto
 from vehiclemor.report.figures.theme import panels, save_figure, styled
 from vehiclemor.report.sizes import size_rows
 from vehiclemor.study.run import run_studies
@@ -48,15 +46,6 @@ def unseen_travels(small_protocol, tmp_path_factory):
     failing["status"][:] = "diverged"
     found = xr.concat([found, failing], "label", data_vars="minimal", join="outer")
     return found.assign_attrs(study=PARETO)
-
-
-def unseen(results):
-    """Runs of the lane change under the names of those on unseen inputs."""
-    runs = results["figures-2-4"].sel(start="equilibrium").isel(amplitude_factor=0, drop=True)
-    parts = [runs.assign_coords(amplitude_factor=factor) for factor in (-1.2, 0.5, 0.0)]
-    dataset = xr.concat(parts, "amplitude_factor", coords="different", compat="equals")
-    manifold = dataset.sel(label=["pod_state"]).assign_coords(label=["slow_manifold"])
-    return {"unseen-inputs": dataset, "unseen-inputs-trained": manifold}
 
 
 def sized():
@@ -103,8 +92,6 @@ def drawn(results, unseen_travels):
             data[entry.studies[0]] = unseen_travels
         elif entry.drawing == "size":
             data = {"size": sized()}
-        elif entry.drawing == "unseen inputs":
-            data = unseen(results)
         with styled():
             figures[name] = checked(entry.draw(data))
     return figures
@@ -112,7 +99,7 @@ def drawn(results, unseen_travels):
 
 def test_axes_have_units_and_no_label_is_longer_than_its_axis(drawn):
     for name, figure in drawn.items():
-        for axis in figure.axes if FIGURES[name].drawing != "schematic" else ():
+        for axis in figure.axes:
             label = axis.yaxis.label
             if label.get_text():
                 assert any(unit in label.get_text() for unit in ("(", "/", "energy")), name
@@ -123,7 +110,7 @@ def test_axes_have_units_and_no_label_is_longer_than_its_axis(drawn):
 
 def test_lines_differ_in_grey_too(drawn):
     for name, figure in drawn.items():
-        for axis in figure.axes if FIGURES[name].drawing != "schematic" else ():
+        for axis in figure.axes:
             looks = {}
             for line in axis.lines:
                 label = line.get_label()
@@ -133,23 +120,6 @@ def test_lines_differ_in_grey_too(drawn):
                     grey = round(luminance(to_rgb(line.get_color())), 1), line.get_linewidth()
                     look = str((line._dash_pattern, line.get_marker(), face, grey))
                     assert looks.setdefault(look, label) == label, name
-
-
-def test_schematics_are_to_scale(drawn):
-    for name, model in (("1", "independent_suspension_vehicle"), ("8", "high_fidelity_vehicle")):
-        radius = load_parameters(model, component("model", model).parameters)["tire_radius"]
-        space = drawn[name].axes[0]
-        assert space.get_aspect() == 1.0
-        wheels = [line.get_xydata() for line in space.lines if len(line.get_xdata()) > 100]
-        assert len(wheels) == 4
-        for wheel in wheels:
-            # The longer half axis of a circle's projection is its radius.
-            longest = np.linalg.norm(wheel - wheel[:-1].mean(axis=0), axis=1).max()
-            assert longest == pytest.approx(float(radius), rel=1e-3)
-    texts = " ".join(text.get_text() for text in drawn["1"].axes[0].texts)
-    # Of the public data.
-    assert "$a$ = 1.156 m" in texts
-    assert "$T_f$ = 1.387 m" in texts
 
 
 def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, results):

@@ -13,8 +13,10 @@ import vehiclemor as vm
 from tests.study.small import small_study
 from tests.texts.markdown import ROOT
 from vehiclemor.cli import main
+from vehiclemor.report.published import fixed_test_sets
 from vehiclemor.study import timing
-from vehiclemor.study.plans.protocol import load_protocol, sampled_sets
+from vehiclemor.study.dataset import digest_of
+from vehiclemor.study.plans.protocol import load_protocol, protocol_names, sampled_sets
 
 BOUNDED = ("spindle_y", "second_euler_angle")
 CAR = """
@@ -29,6 +31,15 @@ training = [{ maneuver = "road:1", parameters = { payload = [500.0] } }, { maneu
 validation = [{ maneuver = "road:2" }]
 test = [{ maneuver = "road:3" }]
 """
+
+
+def test_fixed_test_sets_never_change(capsys):
+    protocols = [load_protocol(name) for name in protocol_names().values()]
+    names = [protocol.test_set.partition(",")[0] for protocol in protocols]
+    assert fixed_test_sets() == dict(zip(names, map(digest_of, protocols), strict=True))
+    assert main(["cite"]) == 0
+    told = capsys.readouterr().out
+    assert all(f"{name}: digest {digest}" in told for name, digest in fixed_test_sets().items())
 
 
 def read(path):
@@ -111,7 +122,7 @@ def test_a_method_of_another_program_competes(truth, capsys):
     subprocess.run(command, check=True)
     assert main(["judge", "out.nc", "--dataset", "data", "--results", ".", "--json"]) == 0
     row, other, *_ = json.loads(capsys.readouterr().out)
-    assert (row["label"], other["label"]) == ("polynomials", "replay")
+    assert (row["label"], other["label"]) == ("polynomials of degree 3", "replay")
     assert 0.0 < row["median_score"] < row["score"] < other["score"]
 
 

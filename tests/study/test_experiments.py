@@ -1,7 +1,6 @@
 """Experiments: identity follows from content, runs are measured, what is common is fitted once."""
 
 import dataclasses
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -228,19 +227,6 @@ def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
     found = [kept_fit(vehicle, wanted).status for _ in range(4)]
     assert found == ["error", "error", "diverged", "diverged"]
     assert len(raised) == 3
-
-
-def sent(maneuver):
-    """What another process gets of a scenario's maneuver."""
-    return pickle.loads(pickle.dumps(Scenario(maneuver, "equilibrium"))).maneuver  # noqa: S301 - own
-
-
-def test_a_registered_maneuver_that_was_sent_is_the_same_again():
-    # Its functions are made by another, which no process could find by name.
-    maneuver = component("maneuver", "lane_change").perturbed(1.1, 0.9)
-    assert sent(maneuver) == maneuver
-    # Of two batches it is one, by which a worker finds what it has fitted.
-    assert sent(maneuver) is sent(maneuver)
 
 
 MODELS = {

@@ -108,7 +108,6 @@ LARGE = """[grid]
 frequency_factor = { first = 0.7, last = 1.3, count = 600 }
 amplitude_factor = { first = 0.5, last = 0.9, count = 60 }
 """
-SETTING = 'grid = { rank = [2] }\nmethods = [{ method = "pod", settings = { rank = 3 } }]'
 
 
 @pytest.mark.parametrize(
@@ -118,12 +117,7 @@ SETTING = 'grid = { rank = [2] }\nmethods = [{ method = "pod", settings = { rank
         (WISHBONE, 'grid = { "parameters.tie_rod_inner" = [0.1] }', "tie_rod_inner"),
         (WISHBONE, 'grid = { "parameters.tie_rod_inner.z" = [-90.0] }', "millimetres"),
         (WISHBONE, 'grid = { training = ["mached"] }', "matched"),
-        (WISHBONE, "grid = { rnk = [2] }", "rnk"),
-        (WISHBONE, "grid = { rank = [99] }\nmethods = [{ method = 'pod' }]", "rank"),
-        (WISHBONE, 'training = "lane_change"', "delta"),
-        (WISHBONE, 'training = "set"', "training_set"),
         (WISHBONE, TWICE, "start is set twice"),
-        (WISHBONE, SETTING, "rank is set twice"),
         (WISHBONE, 'start = ["equilibrium", "equilibrium"]', "start"),
         (WISHBONE, LARGE, "GB"),
         (CAR, 'grid = { maneuver = ["lane_change", "step_steer"] }', "metrics"),

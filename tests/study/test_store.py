@@ -131,13 +131,6 @@ def test_a_corrupt_run_is_quarantined_and_computed_again(done, place, computed, 
     assert len(caplog.messages) == 2
 
 
-def test_a_run_that_is_missing_is_computed_again(done, place, computed):
-    first, _ = sorted((place / "out" / "cells").glob("??/*"))
-    first.unlink()
-    xr.testing.assert_identical(run(place / "small.toml", place / "out"), reread(done))
-    assert computed == [first.stem]
-
-
 def test_a_combined_dataset_with_any_damage_is_made_again(done, place, computed, caplog):
     path, study = place / "out" / "studies" / "small.nc", place / "small.toml"
     whole, rng = path.read_bytes(), np.random.default_rng(2)

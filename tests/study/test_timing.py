@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import accumulate, count
 
 import numpy as np
+import pytest
 
 from vehiclemor.reduction.methods.full_order import FullOrder
 from vehiclemor.simulation import run_timer
@@ -35,8 +36,14 @@ def cases(*names):
     return found
 
 
+@pytest.fixture(autouse=True)
+def _few_rounds(monkeypatch):
+    monkeypatch.setattr(timing, "CASE_ROUNDS", 3)
+    monkeypatch.setattr(timing, "PROTOCOL_ROUNDS", 4)
+
+
 def test_speed_ups_are_against_names_wherever_they_stand():
-    data = timed_cases(cases("pod_r3", "strongest", "replay", "baseline"), 3)
+    data = timed_cases(cases("pod_r3", "strongest", "replay", "baseline"))
     assert list(data["case"].values) == ["pod_r3", "strongest", "replay", "baseline"]
     of = {name: data.sel(case=name) for name in data["case"].values}
     assert float(of["baseline"]["speed_up"]) == 1.0
@@ -63,7 +70,7 @@ def test_what_a_model_tells_of_its_own_time_decides_nothing(monkeypatch):
     monkeypatch.setattr(FullOrder, "simulate", flattering)
     # A clock that tells how often it has been read: twice more inside of a call.
     monkeypatch.setattr(run_timer, "clock", count(0.0, 1e-3).__next__)
-    data = timed_cases(cases("strongest", "baseline"), 2)
+    data = timed_cases(cases("strongest", "baseline"))
     assert float(data["loop_seconds"].sel(case="baseline")) == 0.0
     assert np.isnan(data["loop_speed_up"]).all()
     np.testing.assert_allclose(data["seconds"], 3e-3)
@@ -83,7 +90,7 @@ def test_no_row_is_timed_cold_whatever_ran_before_it(monkeypatch):
 
     monkeypatch.setattr(FullOrder, "simulate", simulate)
     monkeypatch.setattr(run_timer, "clock", lambda: now[0])
-    data = timed_tests(cases("strongest", "baseline"), np.ones((2, 1), dtype=bool), 4)
+    data = timed_tests(cases("strongest", "baseline"), np.ones((2, 1), dtype=bool))
     np.testing.assert_allclose(data["seconds"], 1e-4)
 
 
@@ -97,8 +104,7 @@ def test_the_first_call_warms_the_caches_and_the_median_of_the_others_counts(mon
     assert called(lambda: replace(ended, status="diverged"), 1).status == "diverged"
 
 
-def test_what_was_measured_is_measured_again_only_if_it_has_changed(tmp_path, monkeypatch):
-    monkeypatch.setattr(timing, "CASE_ROUNDS", 2)
+def test_what_was_measured_is_measured_again_only_if_it_has_changed(tmp_path):
     path = tmp_path / "studies" / "mine.nc"
     first = timed_starts({"equilibrium": cases("pod_r3", "baseline")}, path)
     assert (first.sizes["start"], first.sizes["case"]) == (1, 2)

@@ -1,1 +1,1 @@
-"""README and handbook agree with what is there."""
+"""README and pages agree with what is there."""

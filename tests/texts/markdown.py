@@ -1,4 +1,4 @@
-"""README and handbook, taken apart."""
+"""README and the pages of the site, taken apart."""
 
 import re
 import shlex
@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
-TEXTS = [ROOT / "README.md", *sorted((ROOT / "paper" / "handbook").glob("*.md"))]
+DOCS = ROOT / "docs"
+GENERATED = DOCS / "study-file-reference.md"
+TEXTS = [ROOT / "README.md", *sorted({*DOCS.glob("*.md")} - {GENERATED})]
 NAMES = [str(path.relative_to(ROOT)) for path in TEXTS]
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 

@@ -1,127 +1,76 @@
-"""Numbers in README and handbook are those of the facts, and none stands outside of a fragment."""
+"""Texts take measured numbers by name; README is current, and a missing name is an error."""
 
 import json
+import re
 
-import facts
-import fragments
-import numpy as np
+import measured_numbers
+import numbers_by_name
 import pytest
 import xarray as xr
-from fragments import Fragments, Manifest, Verbatim
+from numbers_by_name import load, render, shown
 
-from tests.texts.markdown import NAMES
-from vehiclemor import VehiclemorError
-
-DECLARED = fragments.manifest()
-# The other is generated.
-MEASURED = [name for name in NAMES if not name.endswith("study-schema.md")]
+NUMBERS = load()
 
 
-def test_every_number_in_a_text_is_its_fact_and_has_an_origin():
-    stored = facts.stored_facts()
-    printed = list(fragments.printed_numbers(DECLARED))
-    for number in printed:
-        value = stored["facts"][number.expression]["value"]
-        assert number.text == fragments.rendered(value, number.form), number
-    assert {number.expression for number in printed} == set(stored["facts"])
-    sources = {source for number in printed for source in facts.sources_of(number.expression)}
-    assert sources == set(stored["sources"]) == set(DECLARED.sources)
-    assert set(DECLARED.varying) <= sources
-    for source, origin in stored["sources"].items():
-        assert origin["results"] == DECLARED.sources[source]
-        assert origin["date"]
-        assert origin["commit"]
+def test_readme_is_rendered_and_keeps_its_commands():
+    source = measured_numbers.SOURCE.read_text(encoding="utf-8")
+    readme = measured_numbers.README.read_text(encoding="utf-8")
+    assert readme == render(source), "run `python paper/measured_numbers.py --readme`"
+    assert len(readme.splitlines()) <= 90
+    # Continuous integration runs them.
+    blocks = re.findall(r"^```sh\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    assert blocks == ["sh .ci/tox -e bench\n", "sh .ci/tox -e tests\n"]
 
 
-def test_no_measured_number_stands_outside_of_a_fragment():
-    assert [wrong for n in MEASURED for wrong in fragments.uncovered(DECLARED, n)] == []
-    for part in DECLARED.verbatim:
-        text = (fragments.ROOT / part.file).read_text(encoding="utf-8")
-        assert part.source
-        for words in part.texts:
-            assert fragments.matches(text, words), f"{part.file}: {words}"
+def test_a_missing_number_is_named_with_its_text():
+    with pytest.raises(KeyError, match=r"page.md: no number 'time.no_car.us'"):
+        render('{{ n("time.no_car.us") }}', name="page.md")
+
+
+def test_numbers_are_formatted_and_calculated_with():
+    numbers = {"a": {"value": 4.9e-7}, "b": {"value": 1e-7}}
+    text = 'off {{ n("a", ".1e") }} m, {{ shown(n("a") / n("b"), ".2f") }} times, {{ n("b") }}\n'
+    assert render(text, numbers) == "off 4.9e-7 m, 4.90 times, 1e-07\n"
+    assert [shown(4e7, ".0e"), shown(24.6, "d"), shown(0.3, ".2f")] == ["4e7", "25", "0.30"]
+
+
+def test_every_number_has_a_value_a_unit_and_an_origin():
+    assert list(NUMBERS) == sorted(NUMBERS)
+    for name, entry in NUMBERS.items():
+        assert re.fullmatch(r"[a-z0-9_.+-]+", name), name
+        assert list(entry) == ["value", "unit", "source", "command"], name
+        assert entry["unit"], name
+        assert entry["source"], name
+        assert float(f"{entry['value']:.6g}") == entry["value"], name
 
 
 @pytest.fixture
-def page(tmp_path, monkeypatch):
-    """A small project: one text, one fragment, results of one study."""
-    monkeypatch.setattr(fragments, "ROOT", tmp_path)
-    monkeypatch.setattr(facts, "ROOT", tmp_path)
-    monkeypatch.setattr(facts, "FACTS", tmp_path / "facts.json")
-    (tmp_path / "page.md").write_text("pitch 9.9e-9\nrad at r = 3 over 7 ways\n")
-    texts = [
-        "pitch {[s: rms_error; pod; rank=3] | .1e} rad at r = 3",
-        "over {count([s: status] == 'ok') | d} ways",
-        "{[s: rms_error; pod; rank=3] | .1e} rad at r = 3 over",
-    ]
-    part = Fragments(file="page.md", texts=texts)
-    declared = Manifest(sources={"s": "study"}, varying=[], fragments=[part], verbatim=[])
-    data = xr.Dataset(
-        {
-            "rms_error": (("rank", "method"), [[0.1, 0.2], [4.26e-5, 0.3]], {"units": "rad"}),
-            "status": (("rank", "method"), [["ok", "ok"], ["ok", "diverged"]]),
-        },
-        {"rank": [2, 3], "method": ["pod", "replay"]},
+def results(tmp_path, monkeypatch):
+    """A results folder with one file, and numbers of one more that is no longer there."""
+    monkeypatch.setattr(measured_numbers, "operations", lambda: iter(()))
+    monkeypatch.setattr(measured_numbers, "published", lambda: iter(()))
+    names = {"name": ["gv step", "restart -1"], "output_unit": ("name", ["us", "m"])}
+    xr.Dataset({"value": ("name", [12.3456789, float("nan")])}, names).to_netcdf(
+        tmp_path / "in_use.nc"
     )
-    monkeypatch.setattr(facts, "manifest", lambda: declared)
-    monkeypatch.setattr(facts, "load", lambda *_: data)
-    monkeypatch.setattr(facts, "stored_files", lambda *_: [tmp_path / "page.md"])
-    return tmp_path, declared
+    return tmp_path
 
 
-def test_the_script_writes_numbers_and_leaves_words_and_line_ends(page):
-    folder, _ = page
-    assert facts.measure(folder, 1, stored_only=False) == []
-    assert (folder / "page.md").read_text() == "pitch 4.3e-5\nrad at r = 3 over 3 ways\n"
-    known = json.loads((folder / "facts.json").read_text())["facts"]
-    assert known["[s: rms_error; pod; rank=3]"] == {"value": 4.26e-5, "unit": "rad"}
+def test_the_script_reads_what_is_stored_and_keeps_the_rest(results, monkeypatch, capsys):
+    old = {"value": 2.0, "unit": "s", "source": "benchmark.json", "command": "tox -e bench"}
+    known = {"benchmark.x.median": old, "in_use.gone": old | {"source": "in_use.nc"}}
+    found = measured_numbers.measured(results, known)
+    new = {"value": 12.3457, "unit": "us", "source": "in_use.nc"}
+    new |= {"command": "python paper/in_use.py"}
+    assert found == {"benchmark.x.median": old, "in_use.gv_step": new}
+    assert "benchmark.json: missing; 1 numbers stay" in capsys.readouterr().err
 
-
-def test_what_is_not_stored_stays_and_is_named(page, monkeypatch):
-    folder, _ = page
-    facts.measure(folder, 1, stored_only=False)
-    monkeypatch.setattr(facts, "stored_files", lambda *_: [folder / "absent.nc"])
-    before = (folder / "page.md").read_text(), (folder / "facts.json").read_text()
-    (line,) = facts.measure(folder, 1, stored_only=True)
-    assert "study" in line
-    assert ((folder / "page.md").read_text(), (folder / "facts.json").read_text()) == before
-
-
-@pytest.mark.parametrize(
-    ("text", "times"), [("pitch\n", 0), ("pitch 1 rad at r = 3, pitch 2 rad at r = 3\n", 2)]
-)
-def test_a_fragment_that_is_gone_or_ambiguous_is_named(page, text, times):
-    folder, declared = page
-    (folder / "page.md").write_text(text)
-    with pytest.raises(VehiclemorError, match=rf"{times} times.*pitch"):
-        list(fragments.printed_numbers(declared))
-
-
-def test_a_decimal_outside_of_fragments_is_found(page):
-    folder, declared = page
-    with (folder / "page.md").open("a") as file:
-        file.write(
-            "off by 0.37 m, `0.1 s`, [5.5](a-1.2.md), at most 4e-3, version 1.2.3, after 0.5 s\n"
-        )
-    condition = Verbatim(file="page.md", source="condition", texts=["after 0.5 s"])
-    declared = declared.model_copy(update={"verbatim": [condition]})
-    found = fragments.uncovered(declared, "page.md")
-    assert found == [f"page.md, line 3: {number}" for number in ("0.37", "5.5", "4e-3")]
-
-
-def test_a_wrong_query_or_a_missing_result_is_named(page, tmp_path, monkeypatch):
-    data = {"s": facts.load()}
-    for labels, word in (("; pdo", "pdo"), ("; rank=4", "rank=4"), ("", "no number")):
-        with pytest.raises(VehiclemorError, match=word):
-            facts.evaluate(f"[s: rms_error{labels}]", data)
-    monkeypatch.undo()
-    with pytest.raises(VehiclemorError, match="tox -e bench"):
-        facts.load("benchmark", tmp_path, 1)
-
-
-@pytest.mark.parametrize(
-    ("value", "form", "text"),
-    [(5.6e-5, ".1e", "5.6e-5"), (25.0, "d", "25"), (4e7, ".0e", "4e7"), (0.3, ".2f", "0.30")],
-)
-def test_numbers_are_printed_as_the_texts_have_them(value, form, text):
-    assert fragments.rendered(np.float64(value), form) == text
+    monkeypatch.setattr(measured_numbers, "FILE", results / "numbers.json")
+    monkeypatch.setattr(measured_numbers, "README", results / "README.md")
+    monkeypatch.setattr(measured_numbers, "SOURCE", results / "source.in")
+    (results / "source.in").write_text('a step takes {{ n("in_use.gv_step", "d") }} us\n')
+    monkeypatch.setattr("sys.argv", ["measured_numbers.py", "--results", str(results)])
+    measured_numbers.main()
+    assert (results / "README.md").read_text() == "a step takes 12 us\n"
+    assert json.loads((results / "numbers.json").read_text()) == {"in_use.gv_step": new}
+    assert numbers_by_name.load(results / "numbers.json") == {"in_use.gv_step": new}

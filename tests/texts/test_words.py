@@ -7,7 +7,7 @@ import pytest
 from tests.texts.markdown import ROOT, TEXTS
 
 CHANGELOG = ROOT / "CHANGELOG.md"
-FOLDERS = ("src", "examples", "data/plugin_template", "data/studies", "paper/tasks")
+FOLDERS = ("src", "examples", "data/plugin_template", "data/studies")
 # Help on the command line is made of docstrings.
 FILES = [
     *TEXTS,

@@ -39,40 +39,6 @@ def test_a_full_model_and_a_reduced_one_are_run_and_compared(car, pod):
     np.testing.assert_array_equal(some.times, full.times[::250])
 
 
-def test_a_reduced_model_is_stepped_and_saved(pod, tmp_path):
-    state = pod.step(pod.state("equilibrium"), [0.02], 0.01)
-    pod.save(tmp_path / "pod.nc")
-    loaded = vm.load(tmp_path / "pod.nc")
-    np.testing.assert_array_equal(loaded.step(loaded.state("equilibrium"), [0.02], 0.01), state)
-
-
-def test_many_inputs_are_run_at_once(pod):
-    inputs = [vm.maneuver("lane_change", amplitude=size) for size in (0.5, 1.0)]
-    many = vm.simulate_many(pod, inputs, outputs=["yaw"])
-    assert dict(many.sizes) == {"run": 2, "time": 1251, "output": 1}
-    for run, maneuver in enumerate(inputs):
-        alone = pod.simulate(maneuver, outputs=["yaw"])
-        np.testing.assert_array_equal(many["values"][run, :, 0], alone["yaw"])
-
-
-def test_a_model_that_comes_along_is_exported(tmp_path):
-    vm.export(vm.rom(VEHICLE), "fmu", tmp_path / "car.fmu")
-    assert (tmp_path / "car.fmu").stat().st_size > 1000
-
-
-def test_a_study_is_run_and_selected_by_labels(tmp_path):
-    study = tmp_path / "mine.toml"
-    study.write_text(
-        'title = "Yaw"\nmodel = "double_wishbone"\n[grid]\nfrequency_factor = [1.0, 1.2]\n'
-        'amplitude_factor = [1.0]\n[[methods]]\nmethod = "pod"\n'
-        'label = "POD, r = 3"\n[methods.settings]\n'
-        "rank = 3\n"
-    )
-    result = vm.run_study(study, results=tmp_path)
-    cell = result.sel(frequency_factor=1.2, label="POD, r = 3")
-    assert float(cell["rms_error"].sel(output="spindle_y").squeeze()) > 0.0
-
-
 @pytest.mark.parametrize(
     ("call", "word"),
     [

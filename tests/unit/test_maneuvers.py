@@ -96,13 +96,6 @@ def test_travel_and_rack_never_repeat():
     assert lines == pytest.approx([0.1, 0.1618], abs=1e-3)
 
 
-def spectral_derivative(values: np.ndarray, period: float) -> np.ndarray:
-    """Derivative of equidistant values of a periodic function with few harmonics: exact."""
-    n = len(values)
-    rates = 2j * np.pi * np.fft.fftfreq(n, period / n)
-    return np.fft.ifft(rates * np.fft.fft(values)).real
-
-
 @settings(max_examples=30)
 @given(frequency=factors, amplitude=amplitudes)
 def test_the_rack_pulse_is_as_described_and_has_no_corner(frequency, amplitude):
@@ -126,16 +119,9 @@ def test_the_rack_pulse_is_as_described_and_has_no_corner(frequency, amplitude):
     near = np.abs(pulse.at(np.array([begin + step, end - step]))[:, 1:])
     expected = abs(amplitude) * third * np.array([step**2 / 2.0, step])
     np.testing.assert_allclose(near, [expected, expected], rtol=1e-5, atol=3e-12)
-    # Its two harmonics are derived exactly; its values are of the order of the amplitude.
-    places, speeds, accelerations = pulse.at(np.linspace(begin, end, 33)[:-1]).T
-    rate = 2.0 * np.pi / (end - begin)
-    off = 1e-12 * 0.0047 * max(abs(amplitude), 1e-6) * rate
-    np.testing.assert_allclose(spectral_derivative(places, end - begin), speeds, 0, off)
-    found = spectral_derivative(speeds, end - begin)
-    np.testing.assert_allclose(found, accelerations, 0, off * rate)
 
 
-@pytest.mark.parametrize("shape", ["step_steer", "sine_sweep", "multisine"])
+@pytest.mark.parametrize("shape", ["lane_change", "step_steer", "sine_sweep", "multisine"])
 def test_racks_move_as_they_say(shape):
     rack, steering = vm.maneuver(f"rack_{shape}"), vm.maneuver(shape)
     times = np.linspace(0.0, rack.duration, 20001)

@@ -107,11 +107,6 @@ def test_speed_amplitude_and_seed():
     np.testing.assert_array_equal(travel.at(times), np.column_stack([same[:, 0], 0.0 * times]))
 
 
-def test_importing_imports_no_scipy():
-    code = "import sys, vehiclemor as vm; vm.road; raise SystemExit('scipy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
 # Families
 
 
@@ -123,7 +118,10 @@ def test_members_have_names_and_are_sent_by_them():
     assert _sent(sent) == ("road:17", 0.8, 2.0)
     scenario = Scenario.of("road:17", (0.8, 2.0), "equilibrium")
     assert len(pickle.dumps(scenario)) < 300
-    assert pickle.loads(pickle.dumps(scenario)).maneuver == sent  # noqa: S301
+    # Of two batches it is one, by which a worker finds what it has fitted.
+    one, other = (pickle.loads(pickle.dumps(scenario)).maneuver for _ in "12")  # noqa: S301
+    assert one == sent
+    assert one is other
     shorter = replace(sent, duration=5.0)
     assert pickle.loads(pickle.dumps(shorter)) == shorter  # noqa: S301
     assert vm.describe("road:17")["maneuver"] == "road:17"

@@ -4,6 +4,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from hypothesis import given, settings
@@ -11,9 +12,8 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, interp1d
 
 import vehiclemor as vm
-from vehiclemor.exceptions import InputError, VehiclemorError
+from vehiclemor.exceptions import VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.registry import component
 from vehiclemor.simulation.dynamic import DynamicModel
 
 GAPS = st.lists(st.floats(1e-3, 0.5), min_size=1, max_size=30)
@@ -56,19 +56,15 @@ def of_csv(text, **given):
         return vm.Signal.from_csv(path, **given)
 
 
-def of_array(name=None, attributes=None, **given):
-    times = ("time", [0.0, 1.0], attributes or {})
-    return vm.Signal.from_xarray(xr.DataArray([1.0, 2.0], {"time": times}, "time", name), **given)
-
-
 def of_inputs(**given):
     signal = vm.Signal.from_samples([0.0, 1.0], [0.0, 1.0], **given)
     return signal.for_inputs(("s", "s_dot", "s_ddot"))
 
 
-TABLE, UNNAMED = "time,delta\n0,1\n1,2\n", xr.DataArray([1.0, 2.0], dims="time")
+TABLE = "time,delta\n0,1\n1,2\n"
 CAR = "independent_suspension_vehicle"
 BEYOND = vm.Signal.from_samples([0.0, 1.0], [0.0, 2.0])
+SQUARE = vm.Signal.from_samples([0.0, 1.0], np.eye(2))
 HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
 
 
@@ -87,6 +83,7 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: of_inputs(inputs=["s"]), "derivatives of s follow from a cubic hold alone"),
         (lambda: of_inputs(inputs=["angle"]), "'angle', the model needs s, s_dot, s_ddot"),
         (of_inputs, "1 columns without names"),
+        (lambda: SQUARE.for_inputs(("s",)), "2 columns without names"),
         (lambda: vm.simulate(CAR, maneuver=BEYOND), r"input delta is 1\.08 rad at t = 0\.54 s"),
         (lambda: of_csv(None), "no such file"),
         (lambda: of_csv(""), "no CSV file"),
@@ -100,10 +97,6 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: of_csv(TABLE, inputs=["s"]), "no column 's' among time, delta"),
         (lambda: of_csv(TABLE, inputs=3), "inputs is 3, not a list of names"),
         (lambda: of_csv(TABLE, inputs={"d": ["delta"]}), "not a list of names"),
-        (of_array, "the data: ValueError"),
-        (lambda: vm.Signal.from_xarray(UNNAMED), "a coordinate 'time' is needed"),
-        (lambda: vm.Signal.from_xarray([1.0, 2.0]), "neither a DataArray nor a Dataset"),
-        (lambda: of_array("a", {"units": "ms"}), "'time' is in ms, not in s"),
     ],
 )
 def test_bad_samples_are_refused_in_one_line(call, told):
@@ -222,16 +215,15 @@ def test_a_table_gives_its_signal_back(tmp_path, car):
     t = np.linspace(0.0, 2.0, 101)
     u = np.column_stack([0.01 * np.sin(t), np.cos(t)])
     wanted = vm.Signal.from_samples(t, u[:, 0], inputs="delta")
-    table = xr.Dataset({"delta": ("time", u[:, 0]), "other": ("time", u[:, 1])}, coords={"time": t})
-    table.to_dataframe().to_csv(tmp_path / "log.csv")
-    table.to_dataframe().to_csv(tmp_path / "log.txt", sep=";")
-    array = xr.DataArray(u, {"time": t, "input": ["delta", "other"]}, ("time", "input"))
+    table = pd.DataFrame({"time": t, "delta": u[:, 0], "other": u[:, 1]})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    table.to_csv(tmp_path / "log.txt", sep=";", index=False)
     renamed = {"delta": "steering angle"}
+    table.rename(columns=renamed).to_csv(tmp_path / "renamed.csv", index=False)
+    labelled = xr.Dataset.from_dataframe(table.set_index("time"))
     found = [
-        vm.Signal.from_xarray(table, inputs=["delta"]),
-        vm.Signal.from_xarray(table["delta"]),
-        vm.Signal.from_xarray(array, inputs=["delta"]),
-        vm.Signal.from_xarray(table.rename(renamed), inputs=renamed),
+        vm.Signal.from_samples(labelled["time"], labelled["delta"], inputs="delta"),
+        vm.Signal.from_csv(tmp_path / "renamed.csv", inputs=renamed),
         # One name may stand alone.
         vm.Signal.from_csv(tmp_path / "log.csv", inputs="delta"),
         vm.Signal.from_csv(tmp_path / "log.txt", separator=";", inputs="delta"),
@@ -242,28 +234,6 @@ def test_a_table_gives_its_signal_back(tmp_path, car):
         read, written = signal.pieces.coefficients, wanted.pieces.coefficients
         np.testing.assert_allclose(read, written, 1e-12, atol=1e-15)
         np.testing.assert_allclose(car.simulate(signal).inputs, car.simulate(wanted).inputs)
-
-
-@pytest.mark.parametrize("unit", ["rad", "m s-2", "", "deg"])
-def test_units_are_those_of_si(unit):
-    attributes = {"units": unit} if unit else {}
-    data = xr.DataArray([1.0, 2.0], {"time": [0.0, 1.0]}, "time", "a", attributes)
-    table = xr.Dataset({"a": data, "other": data.assign_attrs(units="km/h")})
-    for labelled in (data, table, data.expand_dims(input=["a"])):
-        if unit != "deg":
-            assert vm.Signal.from_xarray(labelled, inputs="a").inputs == ("a",)
-            continue
-        with pytest.raises(InputError, match="'a' is in deg"):
-            vm.Signal.from_xarray(labelled, inputs="a")
-
-
-def test_a_mechanism_is_moved_by_a_signal():
-    suspension = vm.model("double_wishbone")
-    nominal = component("maneuver", suspension.definition.maneuver)
-    t = nominal.times
-    signal = vm.Signal.from_samples(t, nominal.at(t)[:, 0], inputs=["z"], output_step=0.01)
-    found, wanted = suspension.simulate(signal), suspension.simulate(nominal)
-    np.testing.assert_allclose(found.coordinates, wanted.coordinates, atol=1e-12)
 
 
 def test_a_signal_is_run_wherever_a_maneuver_is(car):

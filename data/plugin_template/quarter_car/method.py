@@ -53,7 +53,7 @@ class Modal:
 
 
 def fit(model, training, settings):
-    """Reduce a model; `training` holds runs (time, inputs, states, outputs) to learn from."""
+    """Reduce a model; `training` holds runs (times, inputs, states, outputs) to learn from."""
     began, x, none = process_time(), model.start(), np.zeros(len(model.inputs))
     a, rate = model.system.jacobian(x, none), model.rhs(x, none)
     steps = 1e-6 * np.eye(len(none))

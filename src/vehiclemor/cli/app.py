@@ -13,15 +13,13 @@ from vehiclemor.cli.options import FAILED, strict
 from vehiclemor.cli.runs import dataset, export, judge, plot, simulate
 from vehiclemor.cli.studies import compare, convert, figures, report, run, status
 from vehiclemor.exceptions import MachineError, PlugInError, VehiclemorError, machine_reason
-from vehiclemor.resources import handbook_folder
 
 # Wrong input; and what the number of a signal is added to.
 WRONG_INPUT, STOPPED = 2, 128
 app = App(
     name="vehiclemor",
     version=__version__,
-    help="Benchmark suite for model order reduction of multibody vehicle models.\n\n"
-    f"Handbook (notation, findings, how to add a model or a method): {handbook_folder()}",
+    help="Benchmark suite for model order reduction of multibody vehicle models.",
     default_parameter=Parameter(converter=strict, negative=""),
     help_epilogue="""Exit status: 0 done; 1 a simulation has diverged, runs of a study have the
 status error, a plug-in breaks, the machine has failed (no space, no memory, a killed worker), or a

@@ -10,10 +10,10 @@ from typing import Any, Literal
 from vehiclemor import api
 from vehiclemor.cli.options import All, Json, ParameterFile, Parameters, key_values
 from vehiclemor.exceptions import FileError, InputError
-from vehiclemor.files import write_folder
+from vehiclemor.files import write_whole
 from vehiclemor.registry import GROUPS, names
 from vehiclemor.report.printing import table, wrapped
-from vehiclemor.resources import data_folder, data_names, handbook_folder
+from vehiclemor.resources import data_folder, data_names
 
 KINDS = ("models", "methods", "maneuvers", "studies")
 # A longer name has its text right behind it.
@@ -147,12 +147,12 @@ def new_plugin(name: str, *, out: Path | None = None) -> None:
             raise FileError(f"{folder}: the folder {folder.parent} does not exist")
     except OSError as error:
         raise FileError(f"{folder}: can't be written ({error.strerror})") from None
-    write_folder(folder, lambda temporary: _write(temporary, name))
+    write_whole(folder, lambda temporary: _write(temporary, name))
     print(f"written: {folder}, a package that works as it stands; to install and try it:\n")
     print(f"  pip install -e {folder} pytest")
     print(f"  pytest {folder}")
     print(f"  vehiclemor simulate {name} --method {name}_modes --frequency 1.2\n")
-    print(f"Step by step: {handbook_folder() / 'my-plug-in.md'}")
+    print("Further steps: vehiclemor show parameter-schema, vehiclemor show study-schema")
 
 
 def _write(folder: Path, name: str) -> None:

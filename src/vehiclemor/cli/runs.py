@@ -16,6 +16,7 @@ from vehiclemor.cli.options import (
     Results,
     Settings,
     key_values,
+    new_file,
     picture_file,
     result_file,
 )
@@ -44,6 +45,7 @@ def simulate(
     parameter_file: ParameterFile = None,
     out: Path | None = None,
     plot: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
+    animate: Path | None = None,
     all_outputs: bool = False,
 ) -> int:
     """Simulate a model with a method; errors are against the full-order solution.
@@ -71,6 +73,8 @@ def simulate(
         netCDF file for the result.
     plot
         Draw the result into this file, or into MODEL-METHOD.png here.
+    animate
+        GIF file for a film of the moving vehicle, reduced and full order together.
     all_outputs
         Print errors of every output, not only of those that tables show.
     """
@@ -82,6 +86,8 @@ def simulate(
         if len(plot) > 1:
             raise InputError(f"--plot: one file, not {len(plot)}")
         picture = picture_file("--plot", plot[0] if plot else Path(f"{model}-{method}.png"))
+    if animate is not None:
+        new_file("--animate", animate, (".gif",))
     if out is not None:
         result_file("--out", out)
     ready = vm.model(model, key_values("--parameter", parameter), parameter_file)
@@ -100,7 +106,9 @@ def simulate(
     if picture:
         vm.plot(dataset, out=picture)
         print(f"written: {picture}")
-    if out is None and picture is None:
+    if animate:
+        print(f"written: {vm.animate(dataset, out=animate)}")
+    if out is None and picture is None and animate is None:
         print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
@@ -111,9 +119,10 @@ def plot(
     kind: Literal["histories", "paths", "errors"] = "histories",
     select: list[str] | None = None,
     out: Path | None = None,
+    animate: Path | None = None,
     results: Results = RESULTS,
 ) -> None:
-    """Draw a stored result: histories of the outputs, paths, or errors.
+    """Draw a stored result: histories of the outputs, paths, or errors; or a film of it.
 
     Parameters
     ----------
@@ -126,13 +135,20 @@ def plot(
         factors are 1, other values are the first, errors are over all and methods all drawn.
     out
         Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
+    animate
+        GIF file for a film of the moving vehicle, in place of a picture.
     """
-    picture = picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
+    if animate is not None:
+        new_file("--animate", animate, (".gif",))
+    picture = animate or picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
     from vehiclemor.report.figures.result_plot import plot_result
     from vehiclemor.report.result_selection import drawn, stored_result
 
     dataset, point = drawn(stored_result(result, results), kind, key_values("--select", select))
-    plot_result(dataset, picture, kind)
+    if animate:
+        vm.animate(dataset, out=animate)
+    else:
+        plot_result(dataset, picture, kind)
     if point:
         print(wrapped(f"at {point}; --select dimension=value draws another point", 0, 2))
     print(f"written: {picture}")

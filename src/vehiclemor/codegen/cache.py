@@ -22,9 +22,9 @@ from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
 from threading import RLock
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, TypeVar
 
-from vehiclemor.exceptions import FileError, MachineError, machine_reason
+from vehiclemor.exceptions import FileError, MachineError
 from vehiclemor.files import write_whole
 from vehiclemor.progress import making
 
@@ -50,16 +50,12 @@ def cache_folder() -> Path:
     Where it can't be written, or others could write it, a temporary folder: then every process
     compiles for itself, with its workers.
     """
-    return _folders(_chosen())[0]
-
-
-def _chosen() -> str | None:
-    return os.environ.get("VEHICLEMOR_CACHE")
+    return _folder(os.environ.get("VEHICLEMOR_CACHE"))[0]
 
 
 @cache
-def _folders(chosen: str | None) -> list[Path]:
-    """Where files are looked for; new ones are kept in the last."""
+def _folder(chosen: str | None) -> list[Path]:
+    """The folder, the only item; another takes its place if files in it can't be trusted."""
     import platformdirs
 
     folder = Path(chosen) if chosen else platformdirs.user_cache_path("vehiclemor")
@@ -72,29 +68,25 @@ def _folders(chosen: str | None) -> list[Path]:
         reason = _distrust(folder.stat())
     except OSError as error:
         reason = error.strerror or "it can't be written"
-    return _instead(folder, reason) if reason else [folder]
+    return [_instead(folder, reason) if reason else folder]
 
 
-def _folders_of(name: str) -> list[Path]:
-    """As `_folders`, of which another is used if others may put a file of this name there."""
-    folders = _folders(_chosen())
+def _folder_of(name: str) -> Path:
+    """The folder of the cache; from here on another if others may put a file of this name there."""
+    held = _folder(os.environ.get("VEHICLEMOR_CACHE"))
     for part in list(Path(name).parents)[:-1]:
         with suppress(OSError):
-            if reason := _distrust((folders[0] / part).lstat()):
-                folders[:] = _instead(folders[0] / part, reason)
-    return folders
+            if reason := _distrust((held[0] / part).lstat()):
+                held[0] = _instead(held[0] / part, reason)
+    return held[0]
 
 
-def _instead(folder: Path, reason: str) -> list[Path]:
+def _instead(folder: Path, reason: str) -> Path:
+    """A temporary folder, removed when this process ends."""
     _LOG.warning("cache %s is not used (%s): every process compiles for itself", folder, reason)
-    return [_temporary()]
-
-
-def _temporary() -> Path:
-    """Folder that is removed when this process ends."""
-    folder = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
+    temporary = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
+    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
+    return temporary
 
 
 def _distrust(status: os.stat_result) -> str:
@@ -121,20 +113,18 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
     One process makes it, while others that want it wait.  Its name, a path in the cache, holds the
     hash of all that determines the content.
     """
-    folders = _folders_of(name)
-    for folder in folders:
-        content, reason = _checked(folder / name, name)
-        if content is not None:
-            return content
-        if reason:
-            _LOG.warning("%s is made again: %s", folder / name, reason)
-    path = folders[-1] / name
+    path = _folder_of(name) / name
+    content, reason = _checked(path, name)
+    if content is not None:
+        return content
+    if reason:
+        _LOG.warning("%s is made again: %s", path, reason)
     told = nullcontext() if name.startswith("sources") else making(path.stem.partition("-")[0])
     with told, locked(path), _no_collection():
         content, _ = _checked(path, name)
         if content is None:
             content = make()
-            _keep(folders, name, _digest(name, content) + b"\n" + content)
+            _keep(path, _digest(name, content) + b"\n" + content)
     return content
 
 
@@ -169,12 +159,8 @@ def _checked(path: Path, name: str) -> tuple[bytes | None, str]:
     return content, ""
 
 
-def _keep(folders: list[Path], name: str, content: bytes) -> None:
-    """Write a file of the cache that nobody else can write; where that can't be, go on.
-
-    Without space, a temporary folder is added to those where files are looked for.
-    """
-    path = folders[-1] / name
+def _keep(path: Path, content: bytes) -> None:
+    """Write a file of the cache that nobody else can write; where that can't be, go on."""
 
     def write(temporary: Path) -> None:
         temporary.touch(0o600)
@@ -184,14 +170,7 @@ def _keep(folders: list[Path], name: str, content: bytes) -> None:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_whole(path, write)
     except (OSError, FileError, MachineError) as error:
-        full = isinstance(error, MachineError) or machine_reason(error)
-        if not full:
-            _LOG.warning("%s is not kept: %s", path, error)
-        elif len(folders) == 1:
-            _LOG.warning("what is compiled is kept until this process ends: %s", error)
-            with suppress(OSError):
-                folders.append(_temporary())
-                _keep(folders, name, content)
+        _LOG.warning("%s is not kept: %s", path, error)
 
 
 @contextmanager
@@ -200,8 +179,13 @@ def locked(path: Path) -> Iterator[None]:
 
     Where it has no locks, or the folder can't be written, each makes the file for itself.
     """
-    lock = path.with_name(f"{path.name}.lock")
-    file = _lock_of(lock)
+    lock, file = path.with_name(f"{path.name}.lock"), None
+    with suppress(ImportError, OSError):
+        from fcntl import LOCK_EX, flock
+
+        lock.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        file = lock.open("wb")
+        flock(file, LOCK_EX)
     try:
         yield
     finally:
@@ -209,18 +193,6 @@ def locked(path: Path) -> Iterator[None]:
             # Who waits finds what was made, and who comes later does too.
             lock.unlink(missing_ok=True)
             file.close()
-
-
-def _lock_of(lock: Path) -> BinaryIO | None:
-    try:
-        from fcntl import LOCK_EX, flock
-
-        lock.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        file = lock.open("wb")
-        flock(file, LOCK_EX)
-    except (ImportError, OSError):
-        return None
-    return file
 
 
 def once(make: Callable[..., Made]) -> Callable[..., Made]:

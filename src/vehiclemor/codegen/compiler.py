@@ -169,7 +169,10 @@ def _export(module: ir.Module, name: str, described: Any) -> None:
         if hasattr(wanted, "types"):
             return context.make_tuple(builder, wanted, [taken(kind) for kind in wanted.types])
         if isinstance(wanted, types.Array):
-            return _array(context, builder, wanted, word)
+            pointer = context.get_data_type(wanted.dtype).as_pointer()
+            data = builder.inttoptr(word(), pointer)
+            shape = [word() for _ in range(wanted.ndim)]
+            return _array(context, builder, wanted, data, shape)
         value = word()
         return builder.bitcast(value, ir.DoubleType()) if wanted == types.float64 else value
 
@@ -180,12 +183,9 @@ def _export(module: ir.Module, name: str, described: Any) -> None:
     builder.ret(result)
 
 
-def _array(context: Any, builder: Any, wanted: Any, word: Callable[[], Any]) -> Any:
-    array = context.make_array(wanted)(context, builder)
-    pointer = context.get_data_type(wanted.dtype).as_pointer()
-    data = builder.inttoptr(word(), pointer)
-    shape = [word() for _ in range(wanted.ndim)]
-    size, strides = WORD(8), []
+def _array(context: Any, builder: Any, kind: Any, data: Any, shape: Sequence[Any]) -> Any:
+    """A C-contiguous array of a shape at an address."""
+    array, size, strides = context.make_array(kind)(context, builder), WORD(8), []
     for length in reversed(shape):
         strides.insert(0, size)
         size = builder.mul(size, length)
@@ -216,20 +216,7 @@ def _view(kind: Any) -> Callable[..., Any]:
             context.cast(builder, value, given, types.intp)
             for value, given in zip(args[1:], sig.args[1:], strict=True)
         ]
-        size, strides = WORD(8), []
-        for length in reversed(shape):
-            strides.insert(0, size)
-            size = builder.mul(size, length)
-        array = context.make_array(kind)(context, builder)
-        populate_array(
-            array,
-            data=builder.gep(buffer.data, [first]),
-            shape=shape,
-            strides=strides,
-            itemsize=WORD(8),
-            meminfo=None,
-        )
-        return array._getvalue()
+        return _array(context, builder, kind, builder.gep(buffer.data, [first]), shape)
 
     return generate
 
@@ -243,8 +230,7 @@ def call_kernel(
     _require_plain(x, u, constants, result)
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        place = context.cast(builder, args[1], sig.args[1], types.intp)
-        address = builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
+        address = _address(context, builder, sig, args)
         pointers = [_data(context, builder, sig, args, k) for k in range(2, 6)]
         # Steps execute others themselves; a kernel that takes no such argument doesn't see it.
         pointers.append(builder.bitcast(_data(context, builder, sig, args, 0), DOUBLE.as_pointer()))
@@ -277,9 +263,8 @@ def call_lanes(
 def _call_of_rows(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     """Call a kernel: matrices from a row on, the last argument, with the length of their rows."""
     last = len(args) - 1
-    place, first = (context.cast(builder, args[k], sig.args[k], types.intp) for k in (1, last))
-    address = builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
-    pointers, strides = [], []
+    first = context.cast(builder, args[last], sig.args[last], types.intp)
+    address, pointers, strides = _address(context, builder, sig, args), [], []
     for k in range(2, last):
         array = context.make_array(sig.args[k])(context, builder, args[k])
         pointers.append(array.data)
@@ -352,6 +337,12 @@ def _require_plain(*arrays: Any) -> None:
         plain = isinstance(kind, types.Array) and kind.dtype == types.float64
         if not (plain and kind.layout == "C"):
             raise TypingError(f"a kernel needs C-contiguous arrays of floats, not {kind}")
+
+
+def _address(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """The address of a kernel: that at a place, the second argument, of the list before it."""
+    place = context.cast(builder, args[1], sig.args[1], types.intp)
+    return builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
 
 
 def _data(context: Any, builder: Any, sig: Any, args: Any, place: int) -> Any:

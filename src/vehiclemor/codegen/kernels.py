@@ -19,18 +19,9 @@ class BareKernel(NamedTuple):
     """A compiled function of a model for integrators of others.
 
     Nothing is checked: arguments are C-contiguous arrays of floats that can be written, as long as
-    the model's.
-
-    Attributes
-    ----------
-    address
-        Of `void f(double *x, double *u, double *constants, double *result)`.
-    constants
-        Third argument: hoisted constants of the model.
-    function, constants_address
-        The same for Python, by addresses.
-    owner
-        Keeps the machine code.
+    the model's.  The address is that of `void f(double *x, double *u, double *constants,
+    double *result)`, constants are its third argument; function and constants address are the same
+    for Python, and the owner keeps the machine code.
     """
 
     address: int
@@ -129,9 +120,7 @@ def _target() -> Any:
     return llvm.Target.from_triple(llvm.get_process_triple())
 
 
-@lru_cache(maxsize=64)
-def _of(kernel: Kernel, results: tuple[int, ...]) -> Kernel:
-    return kernel.of(results)
+_of = lru_cache(maxsize=64)(Kernel.of)
 
 
 @once

@@ -24,13 +24,9 @@ POINTER = DOUBLE.as_pointer()
 def kernel_module(kernels: Sequence[Kernel], lanes: int = 1) -> ir.Module:
     """LLVM module of kernels, each a C function of pointers to floats by the kernel's name.
 
-    Parameters
-    ----------
-    lanes
-        Of how many samples a kernel computes the results at once, a SIMD batch.  If several,
-        arguments are rows of matrices as `Kernel.by_row` says, and further arguments say how many
-        floats from one row to the next, in order.  What does not depend on the row is computed
-        once.
+    Of several lanes, samples that it computes at once, arguments are rows of matrices as
+    `Kernel.by_row` says, and further arguments say how many floats from one row to the next, in
+    order.  What does not depend on the row is computed once.
     """
     module = ir.Module("kernels")
     for kernel in kernels:

@@ -112,13 +112,11 @@ def address_of_array(array: np.ndarray) -> int:
     return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
 
 
-def cache_lines(rows: int, columns: int) -> tuple[np.ndarray, int]:
-    """A matrix to be written that begins with a cache line, and its address."""
-    size = rows * columns
-    space = np.empty(size + LINE)
-    address = address_of_array(space)
-    first = -(address // 8) % LINE
-    return space[first : first + size].reshape(rows, columns), address + 8 * first
+def cache_lines(rows: int, columns: int) -> np.ndarray:
+    """A matrix to be written that begins with a cache line."""
+    space = np.empty(rows * columns + LINE)
+    first = -(address_of_array(space) // 8) % LINE
+    return space[first : first + rows * columns].reshape(rows, columns)
 
 
 def _words(loop: str, kinds: Sequence[Kind], value: Any) -> bytes:

@@ -250,8 +250,7 @@ class Kernel:
     def counts(self) -> dict[str, int]:
         """How many operations it executes.
 
-        `add` (and subtract), `multiply`, `divide`, `negate`, `sqrt`, `trigonometric` (one for each
-        sine, cosine or inverse), `power`, and their sum `total`.  Loads and stores are not counted.
+        By kind, see `COUNTED` (`trigonometric`: sines, cosines and inverses), and in `total`.
         """
         operations, used = self.operations, uses(self.operations)
         known = {kind: kind for kind in COUNTED} | {"subtract": "add", "atan2": "trigonometric"}

@@ -16,6 +16,7 @@ from types import CodeType, FunctionType, ModuleType
 
 from vehiclemor.codegen.cache import fetched
 from vehiclemor.exceptions import PlugInError
+from vehiclemor.resources import data_folder
 
 PACKAGE = Path(__file__).resolve().parents[1]
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
@@ -69,6 +70,9 @@ def source_digest(layers: Sequence[str], files: Sequence[str] = ()) -> str:
     paths = [path for layer in layers for path in sorted((PACKAGE / layer).rglob("*.py"))]
     paths += [PACKAGE / name for name in files]
     texts = [(path.relative_to(PACKAGE).as_posix(), path.read_bytes()) for path in paths]
+    # What models declare of themselves takes part in all that is derived of them.
+    models = sorted((data_folder() / "models").glob("*.toml"))
+    texts += [(path.name, path.read_bytes()) for path in models]
     # This file decides what a text means.
     written = _hash([("", Path(__file__).read_bytes()), *texts])
     name = f"sources/source-{written}"
@@ -110,7 +114,8 @@ def _written(node: object) -> str:
 def _plug_in_files(thing: object) -> list[Path] | None:
     """Files of the top-level package, or the single one with its neighbours; None without any."""
     module = _module_of(thing)
-    if module is None or module.__file__ is None:
+    # `__main__` has no such attribute at a prompt.
+    if module is None or getattr(module, "__file__", None) is None:
         return None
     top = module.__name__.split(".")[0]
     if top == "vehiclemor":

@@ -49,13 +49,7 @@ STEPPER, DRIVER = "vehiclemor_step.c", "vehiclemor_driver.c"
 
 
 def c_files(system: ExportedSystem, step: float) -> dict[str, str]:
-    """Name -> text of the files of a system.
-
-    Parameters
-    ----------
-    step
-        Step size in s that the header names.
-    """
+    """Name -> text of the files of a system; the header names a step size in s."""
     shipped = {name: (SOURCES / name).read_text(encoding="utf-8") for name in (STEPPER, DRIVER)}
     values = [
         _array("parameters", system.values),

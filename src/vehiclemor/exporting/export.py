@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -25,7 +24,7 @@ Target = Literal[FileTarget, "jax", "sympy"]
 TARGETS: tuple[str, ...] = Target.__args__
 # How the name of what is written ends; C is a folder.
 ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi"}
-# Step in s of the integrator in C: stable for modes of up to 2780 1/s; see the handbook.
+# Step in s of the integrator in C: stable for modes of up to 2780 1/s.
 STEP = 1e-3
 # Shortest and longest: below, rounding is all; above, no model of a vehicle is stable.
 STEPS = 1e-7, 1.0
@@ -84,26 +83,30 @@ def export(
 
         model = build(model)
     system = system_of(model)
-    kept = out is not None or to in FILES
-    place = destination(system.name, to, out, overwrite) if kept else None
+    place: Any = None
+    if out is not None or to in FILES:
+        place = destination(system.name, to, out, overwrite)
     if len(system.table) and to in ("casadi", "sympy"):
         raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
-    if place is None:
-        return _object(system, to)
     if to == "c":
         from vehiclemor.exporting.c import c_files
 
         return _write_folder(place, c_files(system, step))
-    return write_whole(place, _writer(system, to, step))
+    if to == "fmu":
+        from vehiclemor.exporting.fmu import fmu_files, write_archive
+
+        files = fmu_files(system, step)
+        return write_whole(place, lambda path: write_archive(files, path))
+    from vehiclemor.exporting.libraries import OBJECTS
+
+    made = OBJECTS[to](system)
+    return made if place is None else write_whole(place, lambda path: made.save(str(path)))
 
 
 def destination(name: str, to: str, out: str | Path | None, overwrite: bool) -> Path:
     """Where an export goes, by default under the model's name into the working folder.
 
-    Raises
-    ------
-    InputError
-        If something is there that must not be replaced, or nothing can be written there.
+    `InputError` if what is there must not be replaced, or nothing can be written there.
     """
     found = Path(f"{name}{ENDINGS[to]}") if out is None else file_path("out", out)
     try:
@@ -138,28 +141,6 @@ def system_of(model: Model | ReducedOrderModel) -> ExportedSystem:
     if not isinstance(model, Model):
         raise InputError(f"model: {quoted(model)} is neither a name nor a full or reduced model")
     return exported_system(model, name_of(model.name, None))
-
-
-def _object(system: ExportedSystem, to: str) -> Any:
-    from vehiclemor.exporting import libraries
-
-    made = {
-        "casadi": libraries.casadi_function,
-        "jax": libraries.jax_function,
-        "sympy": libraries.sympy_expressions,
-    }
-    return made[to](system)
-
-
-def _writer(system: ExportedSystem, to: str, step: float) -> Callable[[Path], object]:
-    """What writes a file; all of its content is made before."""
-    if to == "casadi":
-        function = _object(system, to)
-        return lambda path: function.save(str(path))
-    from vehiclemor.exporting.fmu import fmu_files, write_archive
-
-    files = fmu_files(system, step)
-    return lambda path: write_archive(files, path)
 
 
 def _write_folder(path: Path, files: dict[str, str]) -> Path:

@@ -30,13 +30,7 @@ LONG_AGO = (1980, 1, 1, 0, 0, 0)
 
 
 def fmu_files(system: ExportedSystem, step: float) -> dict[str, bytes]:
-    """Path in the archive -> content; without a binary where there is no compiler.
-
-    Parameters
-    ----------
-    step
-        Of the integrator inside, in s.
-    """
+    """Path in the archive -> content, with the integrator's step in s; a binary if it compiles."""
     texts = {name: text for name, text in c_files(system, step).items() if name != DRIVER}
     texts[UNIT] = (SOURCES / UNIT).read_text(encoding="utf-8")
     token = hashlib.sha256("".join(texts.values()).encode()).hexdigest()[:32]
@@ -45,7 +39,9 @@ def fmu_files(system: ExportedSystem, step: float) -> dict[str, bytes]:
     files["modelDescription.xml"] = model_description(system, token)
     binary = shared_library(texts)
     if binary is not None:
-        files[binary_path(system)] = binary
+        kind = platform.system()
+        folder, ending = BINARIES.get(kind, (f"{kind.lower()}64", ".so"))
+        files[f"binaries/{folder}/{system.name}{ending}"] = binary
     return files
 
 
@@ -56,27 +52,9 @@ def write_archive(files: dict[str, bytes], path: Path) -> None:
             archive.writestr(zipfile.ZipInfo(name, LONG_AGO), files[name], zipfile.ZIP_DEFLATED)
 
 
-def binary_path(system: ExportedSystem) -> str:
-    """Where the binary for this platform stands in the archive."""
-    kind = platform.system()
-    folder, ending = BINARIES.get(kind, (f"{kind.lower()}64", ".so"))
-    return f"binaries/{folder}/{system.name}{ending}"
-
-
-def compiler() -> str | None:
-    """The system's C compiler, or that of the variable CC; none if there is none."""
-    return shutil.which(os.environ.get("CC", "cc"))
-
-
 def shared_library(texts: dict[str, str]) -> bytes | None:
-    """Machine code of C sources; none where there is no compiler.
-
-    Raises
-    ------
-    InputError
-        If the compiler fails.
-    """
-    command = compiler()
+    """Machine code of C sources, none without a compiler; `InputError` if the compiler fails."""
+    command = shutil.which(os.environ.get("CC", "cc"))
     if command is None:
         _LOG.warning("no C compiler (cc, or the variable CC): the unit has sources, but no binary")
         return None

@@ -35,13 +35,7 @@ def _needed(package: str) -> None:
 
 
 def casadi_function(system: ExportedSystem) -> casadi.Function:
-    """Function (x, u, p) -> (dx, y) of states, inputs and parameters; columns.
-
-    Raises
-    ------
-    InputError
-        If CasADi isn't installed.
-    """
+    """Function (x, u, p) -> (dx, y) of states, inputs and parameters; columns."""
     _needed("casadi")
     import casadi
 
@@ -59,11 +53,6 @@ def jax_function(system: ExportedSystem) -> Callable[..., tuple[Any, Any]]:
     """Function (x, u, p=own values) -> (dx, y) of arrays; for `jit`, `vmap`, `jacfwd` and so on.
 
     It is as accurate as its arguments: in double precision where `jax_enable_x64` is set.
-
-    Raises
-    ------
-    InputError
-        If JAX isn't installed.
     """
     _needed("jax")
     import jax.numpy as jnp  # pyright: ignore[reportMissingImports]  (an extra)
@@ -90,14 +79,8 @@ class Expressions(ShortRepr):
     `sympy.lambdify([e.x, e.u, e.p], e.derivative, cse=lambda y: (e.assignments, [*e.derivative]))`
     makes a function that gives a list of numbers.
 
-    Attributes
-    ----------
-    x, u, p
-        Symbols of states, inputs and parameters.
-    assignments
-        Symbol -> expression, in order: constants first, then what rates and outputs need.
-    derivative, outputs
-        Columns.
+    x, u and p are symbols of states, inputs and parameters; assignments symbol -> expression in
+    order, constants first; derivative and outputs columns.
     """
 
     repr_fields = ("x", "u")
@@ -133,3 +116,6 @@ def sympy_expressions(system: ExportedSystem) -> Expressions:
         arrays["c"] = found["constants"]
     derivative, outputs = (sp.Matrix(found[name]) for name in ("derivative", "outputs"))
     return Expressions(arrays["x"], arrays["u"], arrays["p"], assignments, derivative, outputs)
+
+
+OBJECTS = {"casadi": casadi_function, "jax": jax_function, "sympy": sympy_expressions}

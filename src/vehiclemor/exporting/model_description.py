@@ -6,14 +6,13 @@ Value references count time, states, their derivatives, inputs, outputs and para
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 from vehiclemor.exporting.c import MODEL, STEPPER, TANGENT
 from vehiclemor.exporting.system import TOOL, ExportedSystem
-from vehiclemor.inputs.columns import base_units
-from vehiclemor.multibody.quantities import Quantity
 
 CAPABILITIES = ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative")
 # Files that a binary is compiled of, the interface first.
@@ -39,14 +38,13 @@ class Variable(NamedTuple):
 def variables(system: ExportedSystem) -> dict[int, Variable]:
     """Variables by value reference, in order; without parameters that nothing depends on."""
     start = next(iter(system.starts.values()))
+    of_states = "local", "continuous"
     found = [Variable("time", "s", "time", "independent", "continuous")]
-    for quantity, value in zip(system.states, start.tolist(), strict=True):
-        found.append(_local(f"state.{quantity.name}", quantity, "exact", value))
+    for q, value in zip(system.states, start.tolist(), strict=True):
+        found.append(Variable(f"state.{q.name}", q.unit, q.long_name, *of_states, "exact", value))
     for reference, q in enumerate(system.states, 1):
-        rate = _local(f"der(state.{q.name})", q, "calculated")
-        described = f"rate of: {q.long_name}"
-        unit = f"{q.unit}/s"
-        found.append(rate._replace(unit=unit, description=described, derivative_of=reference))
+        named = f"der(state.{q.name})", f"{q.unit}/s", f"rate of: {q.long_name}"
+        found.append(Variable(*named, *of_states, "calculated", None, reference))
     found += [
         Variable(q.name, q.unit, q.long_name, "input", "continuous", "", 0.0) for q in system.inputs
     ]
@@ -64,18 +62,8 @@ def variables(system: ExportedSystem) -> dict[int, Variable]:
     return every
 
 
-def _local(name: str, quantity: Quantity, initial: str, start: float | None = None) -> Variable:
-    return Variable(name, quantity.unit, quantity.long_name, "local", "continuous", initial, start)
-
-
 def model_description(system: ExportedSystem, token: str) -> bytes:
-    """The file.
-
-    Parameters
-    ----------
-    token
-        By which an importer's file and binary know one another.
-    """
+    """The file; by the token an importer's file and binary know one another."""
     every = variables(system)
     root = ElementTree.Element(
         "fmiModelDescription",
@@ -97,13 +85,8 @@ def model_description(system: ExportedSystem, token: str) -> bytes:
         for name in COMPILED:
             ElementTree.SubElement(files, "File", name=name)
     _units(root, (v.unit for v in every.values()))
-    ElementTree.SubElement(
-        root,
-        "DefaultExperiment",
-        startTime="0.0",
-        stopTime=repr(STOP),
-        stepSize=repr(COMMUNICATION),
-    )
+    times = {"startTime": "0.0", "stopTime": repr(STOP), "stepSize": repr(COMMUNICATION)}
+    ElementTree.SubElement(root, "DefaultExperiment", times)
     listed = ElementTree.SubElement(root, "ModelVariables")
     for reference, variable in every.items():
         _variable(listed, variable, reference)
@@ -118,8 +101,7 @@ def _units(root: ElementTree.Element, names: Iterable[str]) -> None:
         if name == "1":
             continue
         unit = ElementTree.SubElement(listed, "Unit", name=name)
-        powers = base_units(name)
-        if powers is not None:
+        if (powers := base_units(name)) is not None:
             given = {base: str(power) for base, power in powers.items() if power}
             ElementTree.SubElement(unit, "BaseUnit", given)
 
@@ -147,13 +129,36 @@ def _variable(listed: ElementTree.Element, variable: Variable, reference: int) -
 def _structure(structure: ElementTree.Element, every: Mapping[int, Variable]) -> None:
     outputs = [i for i, v in every.items() if v.causality == "output"]
     rates = [i for i, v in every.items() if v.derivative_of is not None]
-    kinds = (
-        ("Outputs", outputs),
-        ("Derivatives", rates),
-        ("InitialUnknowns", sorted(outputs + rates)),
-    )
-    for name, places in kinds:
+    kinds = {"Outputs": outputs, "Derivatives": rates, "InitialUnknowns": sorted(outputs + rates)}
+    for name, places in kinds.items():
         if places:
             listed = ElementTree.SubElement(structure, name)
             for place in places:
                 ElementTree.SubElement(listed, "Unknown", index=str(place + 1))
+
+
+# Unit -> powers of base units.
+DERIVED = {
+    **{name: {name: 1} for name in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "Hz": {"s": -1},
+}
+
+
+def base_units(unit: str) -> dict[str, int] | None:
+    """Powers of base units in a unit such as `N s/m` or `m s-1`; none where a name is unknown."""
+    powers: dict[str, int] = {}
+    numerator, *denominators = unit.split("/")
+    for sign, part in ((1, numerator), *((-1, part) for part in denominators)):
+        for factor in part.split():
+            match = re.fullmatch(r"([A-Za-z]+)(?:\^?(-?\d+))?", factor)
+            if factor == "1":
+                continue
+            if match is None or match[1] not in DERIVED:
+                return None
+            for base, power in DERIVED[match[1]].items():
+                powers[base] = powers.get(base, 0) + sign * power * int(match[2] or 1)
+    return powers

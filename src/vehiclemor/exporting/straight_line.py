@@ -75,13 +75,7 @@ class Lines(Listing):
         return {name: StraightLine(self.operations, numbers) for name, numbers in listed.items()}
 
     def include(self, kernel: Kernel, given: Given) -> list[Value]:
-        """Write a kernel out; its results, row by row.
-
-        Parameters
-        ----------
-        given
-            Argument -> its entries.
-        """
+        """Write a kernel out, given entries of its arguments; its results, row by row."""
         written: list[Any] = []
         stored = {}
         for kind, arguments, detail in kernel.operations:
@@ -156,14 +150,8 @@ def evaluated(
 ) -> list[Any]:
     """Results of a function over values of another system: symbols, or arrays of a batch.
 
-    Parameters
-    ----------
-    arrays
-        Name -> values of its entries, by number.
-    functions
-        Name of `FUNCTIONS`, `select` and, of a table, `entry` -> what computes it.
-    let
-        Value that is used more than once -> what stands for it from there on.
+    Arrays have the values of their entries; functions are those of `FUNCTIONS`, `select` and, of a
+    table, `entry`; `let` gives what stands for a value that is used more than once.
     """
     computed = OPERATORS | dict(functions)
     counts, known = uses(function.operations), {}

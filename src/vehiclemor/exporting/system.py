@@ -32,38 +32,25 @@ TRUST = Quantity("trust_indicator", "1", "how far it goes: beyond 1 the reduced 
 
 @dataclass(frozen=True, eq=False)
 class ExportedSystem(ShortRepr):
-    """A system x' = f(x, u, c(p)), y = g(x, u, c(p)).
-
-    Attributes
-    ----------
-    name, summary
-        Of the model, or of the model and the method; one line.
-    states, inputs, outputs, parameters
-        Quantities in order; of a reduced model nothing is a parameter, its numbers are in the code.
-    values
-        Of the parameters.
-    starts
-        Name -> state; the default first.
-    functions
-        `constants` of the array `p`, `derivative` and `outputs` of the arrays `x`, `u` and `c`.
-    tangents
-        Makes the derivatives of these functions, by the same names, see `TANGENTS`.
-    table
-        What `entry(row, place)` reads, a number at row + place; empty if there is none.
-    """
+    """A system x' = f(x, u, c(p)), y = g(x, u, c(p))."""
 
     repr_fields = ("name", "summary")
 
+    # Of the model, or of the model and the method; one line.
     name: str
     summary: str
+    # Quantities in order; of a reduced model nothing is a parameter, its numbers are in the code.
     states: tuple[Quantity, ...]
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
     parameters: tuple[Quantity, ...]
-    values: np.ndarray
-    starts: Mapping[str, np.ndarray]
+    values: np.ndarray  # Of the parameters.
+    starts: Mapping[str, np.ndarray]  # Name -> state; the default first.
+    # `constants` of the array `p`, `derivative` and `outputs` of the arrays `x`, `u` and `c`.
     functions: Mapping[str, StraightLine]
+    # Makes the derivatives of these functions, by the same names, see `TANGENTS`.
     tangents: Callable[[], Mapping[str, StraightLine]]
+    # What `entry(row, place)` reads, a number at row + place; empty if there is none.
     table: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property

@@ -30,17 +30,9 @@ CORRECTION = Quantity(
 
 
 def exported_system(what: Any, name: str) -> ExportedSystem:
-    """The system of a model, or of what the fit of a method has given.
+    """The system, called so, of a model or of what the fit of a method has given.
 
-    Parameters
-    ----------
-    name
-        What it is called.
-
-    Raises
-    ------
-    InputError
-        If it is no system of straight-line equations.
+    `InputError` if it is no system of straight-line equations.
     """
     match what:
         case DynamicModel():
@@ -154,11 +146,8 @@ def reduced_system(
 ) -> ExportedSystem:
     """A reduced system: its states are decoded, then the model's outputs follow from them.
 
-    Parameters
-    ----------
-    decoder
-        The kernel that gives full states, and after them what is watched, with its constants; none
-        where the states are the model's.
+    The decoder is the kernel that gives full states, and after them what is watched, with its
+    constants; none where the states are the model's.
     """
     model, system = reduced.model, reduced.system
     definition, full = model.definition, 2 * len(model.coordinates)

@@ -44,11 +44,6 @@ class Maneuver(ShortRepr):
         alone share what is made of the signal.
     member
         Of a family, such as roads of other seeds: number -> maneuver, whose name is `NAME:NUMBER`.
-
-    Raises
-    ------
-    InputError
-        If it contradicts this, or its functions give anything else when they are called.
     """
 
     repr_fields = ("name", "inputs", "duration", "samples", "frequency_factor", "amplitude_factor")
@@ -122,13 +117,7 @@ class Maneuver(ShortRepr):
         return values
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> "Maneuver":
-        """The maneuver with its factors set.
-
-        Raises
-        ------
-        InputError
-            If a factor is not finite, or out of its bounds.
-        """
+        """The maneuver with its factors set; `InputError` if one is out of its bounds."""
         return replace(self, frequency_factor=frequency, amplitude_factor=amplitude)
 
     def for_inputs(self, names: tuple[str, ...]) -> "Maneuver":  # noqa: ARG002
@@ -151,11 +140,5 @@ def smooth(frequency: float) -> tuple[float, ...]:
 
 
 def maneuver(name: str, frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
-    """A registered maneuver, see `maneuvers()`, with factors on its frequency and amplitude.
-
-    Raises
-    ------
-    InputError
-        If none has the name, or a factor is out of its bounds.
-    """
+    """A registered maneuver, see `maneuvers()`, with factors on its frequency and amplitude."""
     return component("maneuver", name).perturbed(frequency, amplitude)

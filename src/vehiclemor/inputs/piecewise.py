@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
-from numpy.polynomial.polynomial import polyval
 
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.sample_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
 
-# Times that differ by so little, relative to what they are, are one.
-ROUNDING = 1e-12
 # What lies between samples, and the degree of its polynomials.
 HOLDS = {"linear": 1, "zero": 0, "cubic": 3}
 
@@ -43,22 +39,17 @@ def derivative(pieces: Pieces) -> Pieces:
 
 def at(pieces: Pieces, times: np.ndarray) -> np.ndarray:
     """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
-    edges, first, starts, coefficients = pieces
-    if len(starts):
-        rows = np.searchsorted(starts, times, side="right") - 1
-        rows = np.clip(rows, 0, len(starts) - 1)
-        parts = (times - starts[rows]) / lengths(pieces)[rows]
-    else:
-        segments: Any = 0
-        if len(edges) > 2:
-            reached = times + ROUNDING * (1.0 + times)
-            segments = np.searchsorted(edges, reached, side="right") - 1
-            segments = np.clip(segments, 0, len(edges) - 2)
-        counts, begin = first[segments + 1] - first[segments], edges[segments]
-        places = (times - begin) / (edges[segments + 1] - begin) * counts
-        rows = np.clip(places.astype(np.int64), 0, counts - 1)
-        parts, rows = places - rows, rows + first[segments]
-    return polyval(parts[:, None], np.moveaxis(coefficients[rows], 2, 0), tensor=False)
+    order, values = np.argsort(times), np.empty((len(times), pieces.coefficients.shape[1]))
+    increasing = np.empty_like(values)
+    polynomial_loops()["sampled"](pieces, times[order], increasing)
+    values[order] = increasing
+    return values
+
+
+@cache
+def polynomial_loops() -> dict[str, Loop]:
+    """Loops over polynomials of time."""
+    return loops(("inputs.polynomial_loops",), ("sampled", "extent"))
 
 
 def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
@@ -71,7 +62,8 @@ def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
     runs, n, inputs = samples.shape
     coefficients = np.empty((runs * (n - 1), inputs, HOLDS[hold] + 1))
     rows, counts = np.empty((runs, n), dtype=np.int64), np.empty(runs, dtype=np.int64)
-    even = _loop()(times, samples, np.empty((ROWS, n)), coefficients, rows, counts)
+    loop = loops(("inputs.sample_loops",), ("through",))["through"]
+    even = loop(times, samples, np.empty((ROWS, n)), coefficients, rows, counts)
     if even < 0:
         raise InputError(f"samples of a signal: {_wrong(even, times, samples)}")
     starts, own = np.empty(0) if even else times[:-1].copy(), n - 1
@@ -84,11 +76,6 @@ def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
             shared[key] = Pieces(times[first], first.copy(), starts, part)
         found.append(shared[key]._replace(coefficients=part))
     return found
-
-
-@cache
-def _loop() -> Loop:
-    return loops(("inputs.sample_loops",), ("through",))["through"]
 
 
 def _wrong(status: int, times: np.ndarray, samples: np.ndarray) -> str:

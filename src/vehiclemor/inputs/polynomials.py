@@ -14,15 +14,15 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from vehiclemor.arguments import loop_array
-from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.piecewise import polynomial_loops
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.inputs.signal import Signal
 
 Made = TypeVar("Made")
 ACCURACY = 1e-11
-SIGNAL_LOOPS = ("inputs.polynomial_loops",)
 MOST_PIECES = 1 << 15
 DEGREE = 5
 # Maneuvers whose inputs are kept: more than the drawn runs of a protocol, over which all rows go.
@@ -51,7 +51,7 @@ def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     if isinstance(maneuver, Signal):
         signal, times = signal_of(maneuver), _times(maneuver.duration, maneuver.samples)
         inputs = np.empty((len(times), signal.bundle.coefficients.shape[1]))
-        _signal_loops()["sampled"](signal, times, inputs)
+        polynomial_loops()["sampled"](signal, times, inputs)
     elif (unit := _of_unit_amplitude(maneuver)) is not None:
         times, inputs = recorded_inputs(unit)
         inputs = maneuver.amplitude_factor * inputs
@@ -62,18 +62,11 @@ def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
     return times, inputs
 
 
-@cache
-def _signal_loops() -> dict[str, Loop]:
-    """Loops over the polynomials of a signal."""
-    return loops(SIGNAL_LOOPS, ("sampled", "extent"))
-
-
 class Extent(NamedTuple):
-    """How far inputs go in whole signals, between output times too.
+    """How far inputs go in whole signals, between output times too, see `polynomial_loops.extent`.
 
-    Smallest and largest value of each input (inputs,); sizes (3, inputs): largest magnitudes of the
-    inputs and of what of them is above 2 Hz, root of the integral of the square of what is above 8
-    Hz, see `polynomial_loops.extent`.
+    Largest (3, inputs) are magnitudes of the inputs, of what of them is above 2 Hz, and the root of
+    the integral of the square of what is above 8 Hz.
     """
 
     low: np.ndarray
@@ -84,10 +77,8 @@ class Extent(NamedTuple):
 @kept
 def extent_of(maneuver: Maneuver) -> Extent:
     """Extent of the inputs of a maneuver."""
-    found = _extent(maneuver)
-    largest = found[1:4].copy()
-    np.maximum(-found[0], found[1], out=largest[0])
-    return Extent(found[0], found[1], largest)
+    low, high, *quick, _ = _extent(maneuver, np.inf)
+    return Extent(low, high, np.array([np.maximum(-low, high), *quick]))
 
 
 def first_beyond(maneuver: Maneuver, limits: np.ndarray) -> np.ndarray:
@@ -95,19 +86,14 @@ def first_beyond(maneuver: Maneuver, limits: np.ndarray) -> np.ndarray:
     return _extent(maneuver, limits)[4]
 
 
-def _extent(maneuver: Maneuver, limits: np.ndarray | None = None) -> np.ndarray:
+def _extent(maneuver: Maneuver, limits: np.ndarray | float) -> np.ndarray:
     """Result (5, inputs) of `polynomial_loops.extent`."""
     signal = signal_of(maneuver)
-    inputs = signal.bundle.coefficients.shape[1]
-    found = np.empty((5, inputs))
-    _signal_loops()["extent"](signal, _no_limits(inputs) if limits is None else limits, found)
+    found = np.empty((5, signal.bundle.coefficients.shape[1]))
+    given = np.empty((4, found.shape[1]))
+    given[:] = limits
+    polynomial_loops()["extent"](signal, given, found)
     return found
-
-
-@cache
-def _no_limits(inputs: int) -> np.ndarray:
-    """Limits (4, inputs) that nothing passes."""
-    return np.repeat([[-np.inf], [np.inf], [np.inf], [np.inf]], inputs, axis=1)
 
 
 def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:

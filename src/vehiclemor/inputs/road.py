@@ -18,7 +18,7 @@ exp(i difference) is g: so both tracks have the density exactly.
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -114,14 +114,10 @@ def tracks(seed: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache(maxsize=4096)
-def _member(seed: int) -> Maneuver:
-    return replace(roads, name=f"road:{seed}", signal=Road(seed), member=None)
-
-
-@lru_cache(maxsize=4096)
-def _member_travel(seed: int) -> Maneuver:
-    name, signal = f"road_travel:{seed}", Road(seed, travel=True)
-    return replace(road_travel, name=name, signal=signal, member=None)
+def _member(family: str, seed: int) -> Maneuver:
+    of = road_travel if family == "road_travel" else roads
+    signal = Road(seed, travel=of is road_travel)
+    return replace(of, name=f"{family}:{seed}", signal=signal, member=None)
 
 
 _heights = tuple(f"road_{wheel}" for wheel in ("FL", "FR", "RL", "RR"))
@@ -134,7 +130,7 @@ roads = Maneuver(
     samples=1001,
     corners=smooth,
     linear_in_amplitude=True,
-    member=_member,
+    member=partial(_member, "road"),
 )
 road_travel = replace(
     roads,
@@ -142,7 +138,7 @@ road_travel = replace(
     summary="wheel travel on a random road of ISO 8608 class C at 20 m/s, rack fixed, 10 s",
     signal=Road(1, travel=True),
     inputs=("z", "s0"),
-    member=_member_travel,
+    member=partial(_member, "road_travel"),
 )
 
 
@@ -153,11 +149,6 @@ def road(road_class: str = "C", seed: int = 1, speed: float = SPEED) -> Maneuver
     ----------
     road_class, seed, speed
         A (smooth) to E (very rough); 0 to 999999, each gives another road; 1 to 40 m/s.
-
-    Raises
-    ------
-    InputError
-        If there is no such road, or the speed is out of its bounds.
     """
     amplitude = CLASSES[choice("road class", road_class, CLASSES)]
     frequency = within("speed", number("speed", speed), SPEEDS, " m/s") / SPEED

@@ -8,8 +8,8 @@ from vehiclemor.codegen.loop_types import Cube, Int, IntMatrix, IntVector, Matri
 # Samples whose spacings differ by less, relative to them, are equidistant.
 EQUIDISTANT = 1e-8
 # Change of slope beside that of the neighbouring samples, times the spacing or `FINE` (s), relative
-# to the largest value: from here on a sample is a break point.  What it buys: `my-signal` in the
-# handbook.
+# to the largest value: from here on a sample is a break point.  Without it, steps of a loose
+# tolerance pass over noise that they do not see.
 KINK, FINE = 1e-3, 0.01
 # A stretch of equal samples is quiet from so long (s) on: a run at rest could step over its end.
 QUIET = 0.1
@@ -25,17 +25,10 @@ ROWS = 5
 class Pieces(NamedTuple):
     """Piecewise polynomials.
 
-    Attributes
-    ----------
-    edges
-        Ends of the smooth segments (segments + 1,) in s.
-    first
-        Number of the first piece of each segment (segments + 1,).
-    starts
-        Times (pieces,) in s at which pieces begin; empty if those of a segment are of one length.
-    coefficients
-        Polynomials (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest
-        power first.
+    Ends of the smooth segments (segments + 1,) in s; number of the first piece of each (segments +
+    1,); times (pieces,) in s at which pieces begin, empty if those of a segment are of one length;
+    coefficients (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest power
+    first.
     """
 
     edges: Vector

@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
 from vehiclemor.exceptions import InputError, blamed, one_line
-from vehiclemor.inputs.columns import array_columns, chosen_columns, csv_columns, listed
+from vehiclemor.inputs.columns import chosen_columns, csv_columns, listed
 from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
 from vehiclemor.inputs.piecewise import HOLDS, at, derivative, scaled, through
 from vehiclemor.inputs.sample_loops import Pieces
 from vehiclemor.registry import choice
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Time (s) between output times, as of the registered maneuvers of vehicles.
 OUTPUT_STEP = 0.02
@@ -28,21 +25,11 @@ FUNCTION_STEP = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Signal(Maneuver):
-    """Inputs through samples; made by `from_samples` and its kin.
+    """Inputs through samples, from the first to the last; made by `from_samples` and its kin.
 
-    It begins with the first sample and ends with the last.  `perturbed` scales its time, so its
-    duration, and its values.
-
-    Attributes
-    ----------
-    inputs
-        Names of the inputs that are given; empty if they are all of a model's, in its order.
-    hold
-        What lies between samples.
-    pieces
-        Polynomials for factors of 1.
-    kept
-        What is made of it when it is first run.
+    `perturbed` scales its time, so its duration, and its values.  Inputs are the names of those
+    that are given, empty if they are all of a model's, in its order; `hold` is what lies between
+    samples, `pieces` the polynomials for factors of 1, `kept` what is made of it when it is run.
     """
 
     hold: str = "linear"
@@ -142,13 +129,7 @@ class Signal(Maneuver):
         )
 
     def for_inputs(self, names: tuple[str, ...]) -> Signal:
-        """The signal with all inputs of a model, in its order.
-
-        Raises
-        ------
-        InputError
-            If it gives an input that the model doesn't have, or unnamed columns, but not as many.
-        """
+        """The signal with all inputs of a model, in its order; `InputError` if they don't fit."""
         if self.inputs == names:
             return self
         if names not in self.kept:
@@ -157,7 +138,9 @@ class Signal(Maneuver):
 
     def _completed(self, names: tuple[str, ...]) -> Signal:
         columns, needed = self.pieces.coefficients.shape[1], ", ".join(names)
-        if not self.inputs and columns != len(names):
+        if not self.inputs:
+            if columns == len(names):
+                return replace(self, inputs=names, kept={})
             raise InputError(
                 f"{self} has {columns} columns without names, the model needs {needed}: "
                 f"name those that are given by inputs=[...]"
@@ -165,8 +148,6 @@ class Signal(Maneuver):
         for name in self.inputs:
             if name not in names:
                 raise InputError(f"{self} gives input {name!r}, the model needs {needed}")
-        if not self.inputs:
-            return replace(self, inputs=names, kept={})
         coefficients = np.stack([self._column(name) for name in names], axis=1)
         pieces = self.pieces._replace(coefficients=coefficients)
         return replace(self, inputs=names, pieces=pieces, kept={})
@@ -202,12 +183,10 @@ class Signal(Maneuver):
         ----------
         function
             Times (n,) in s -> inputs (n,) or (n, inputs).
-        duration
-            In s.
-        step
-            About the time in s between samples.
-        **further
-            As of `from_samples`, which tells the rest.
+        duration, step
+            In s; the time between samples is about the step.
+        inputs, **further
+            As of `from_samples`.
         """
         within("duration of a signal", number("duration", duration), (0.0, LONGEST_DURATION), " s")
         times = np.linspace(0.0, duration, _output_samples(duration, step))
@@ -230,50 +209,15 @@ class Signal(Maneuver):
 
         Parameters
         ----------
-        separator
-            Character between columns.
-        time
-            Column of the times in s.
+        separator, time
+            Character between columns; column of the times in s.
         inputs
             Columns to take, or input -> column where they have other names; all by default.
         **further
-            As of `from_samples`, which tells the rest.
-
-        Raises
-        ------
-        FileError
-            If there is no such file, or it is none.
+            As of `from_samples`.
         """
         columns = csv_columns(file_path("path", path), separator)
-        times, values, names = chosen_columns(str(path), columns, {}, time, inputs)
-        return cls.from_samples(times, values, hold, inputs=names, **further)
-
-    @classmethod
-    def from_xarray(
-        cls,
-        data: xr.DataArray | xr.Dataset,
-        hold: str = "linear",
-        *,
-        time: str = "time",
-        inputs: str | Sequence[str] | Mapping[str, str] = (),
-        **further: Any,
-    ) -> Signal:
-        """A signal through labelled data.
-
-        Parameters
-        ----------
-        data
-            Dataset with one variable an input, array of one input, or array of several whose second
-            dimension names them, as the `inputs` of a result.  If they tell `units`, these are SI.
-        time
-            Dimension of the times in s.
-        inputs
-            As of `from_csv`.
-        **further
-            As of `from_samples`, which tells the rest.
-        """
-        columns, units = array_columns(data, time)
-        times, values, names = chosen_columns("the data", columns, units, time, inputs)
+        times, values, names = chosen_columns(path, columns, time, inputs)
         return cls.from_samples(times, values, hold, inputs=names, **further)
 
 
@@ -290,17 +234,10 @@ def many_signals(
 
     Parameters
     ----------
-    t
-        Increasing times (n,) in s.
-    u
-        Inputs (runs, n) or (runs, n, inputs) at these times, SI units.
+    t, u
+        Increasing times (n,) in s; inputs (runs, n) or (runs, n, inputs) at these, SI units.
     hold, inputs, output_step, name
         See `Signal.from_samples`.
-
-    Raises
-    ------
-    InputError
-        If the samples are none of signals.
     """
     choice("hold", hold, HOLDS)
     times, values = _arrays(t, u)

@@ -47,38 +47,26 @@ def _pulse(times: np.ndarray, frequency: float) -> np.ndarray:
     part = (times - BEGIN) * frequency / LANE_CHANGE_LENGTH
     angle = 2.0 * np.pi * np.clip(part, 0.0, 1.0)
     rate = 2.0 * np.pi * frequency / LANE_CHANGE_LENGTH
-    pulse = np.column_stack(
-        [
-            np.sin(angle) - 0.5 * np.sin(2.0 * angle),
-            rate * (np.cos(angle) - np.cos(2.0 * angle)),
-            rate**2 * (2.0 * np.sin(2.0 * angle) - np.sin(angle)),
-        ]
-    )
+    value = np.sin(angle) - 0.5 * np.sin(2.0 * angle)
+    slope = rate * (np.cos(angle) - np.cos(2.0 * angle))
+    change = rate**2 * (2.0 * np.sin(2.0 * angle) - np.sin(angle))
     inside = (part > 0.0) & (part < 1.0)
-    return np.where(inside[:, None], pulse, 0.0)
+    return np.where(inside[:, None], np.column_stack([value, slope, change]), 0.0)
 
 
 def ramp(part: np.ndarray, length: float) -> np.ndarray:
     """Quintic from 0 to 1 while `part` (n,) goes from 0 to 1, with derivatives (n, 3) in time."""
     z = np.clip(part, 0.0, 1.0)
-    return np.column_stack(
-        [
-            z**3 * (10.0 - 15.0 * z + 6.0 * z**2),
-            30.0 * z**2 * (1.0 - z) ** 2 / length,
-            60.0 * z * (1.0 - z) * (1.0 - 2.0 * z) / length**2,
-        ]
-    )
+    value = z**3 * (10.0 - 15.0 * z + 6.0 * z**2)
+    slope = 30.0 * z**2 * (1.0 - z) ** 2 / length
+    change = 60.0 * z * (1.0 - z) * (1.0 - 2.0 * z) / length**2
+    return np.column_stack([value, slope, change])
 
 
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Product of two signals (n, 3) with first and second derivatives."""
-    return np.column_stack(
-        [
-            a[:, 0] * b[:, 0],
-            a[:, 1] * b[:, 0] + a[:, 0] * b[:, 1],
-            a[:, 2] * b[:, 0] + 2.0 * a[:, 1] * b[:, 1] + a[:, 0] * b[:, 2],
-        ]
-    )
+    (a0, a1, a2), (b0, b1, b2) = a.T, b.T
+    return np.column_stack([a0 * b0, a1 * b0 + a0 * b1, a2 * b0 + 2.0 * a1 * b1 + a0 * b2])
 
 
 def _sine(phase: np.ndarray, rate: np.ndarray, change: float | np.ndarray) -> np.ndarray:
@@ -154,14 +142,10 @@ def _racked(steered: Maneuver, shape: Shape, summary: str = "") -> Maneuver:
     )
 
 
-def _held(inputs: int) -> Callable[[np.ndarray, float, float], np.ndarray]:
+def _straight(times: np.ndarray, frequency: float) -> np.ndarray:
     """No steering."""
-
-    def signal(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
-        del frequency, amplitude
-        return np.zeros((len(times), inputs))
-
-    return signal
+    del frequency
+    return np.zeros((len(times), 3))
 
 
 lane_change = _steered(
@@ -176,23 +160,12 @@ rack_lane_change = _racked(
     _pulse,
     "single lane change of 3.5 m at 20 m/s, a pulse of the rack of 2.5 s from 1 s on, 10 s",
 )
-straight_ahead = replace(
-    lane_change, name="straight_ahead", summary="no steering, 25 s", signal=_held(1), corners=smooth
+straight_ahead = _steered(
+    "straight_ahead", "no steering, 25 s", _straight, smooth, LANE_CHANGE_DURATION
 )
-rack_straight_ahead = replace(
-    rack_lane_change,
-    name="rack_straight_ahead",
-    summary="rack held in the middle, 10 s",
-    signal=_held(3),
-    corners=smooth,
-)
-step_steer = _steered(
-    "step_steer",
-    "step of the steering to 4 m/s^2 at 20 m/s within 0.2 s, 5 s",
-    _step,
-    _step_corners,
-    STEP_DURATION,
-)
+rack_straight_ahead = _racked(straight_ahead, _straight, "rack held in the middle, 10 s")
+STEP_SUMMARY = "step of the steering to 4 m/s^2 at 20 m/s within 0.2 s, 5 s"
+step_steer = _steered("step_steer", STEP_SUMMARY, _step, _step_corners, STEP_DURATION)
 rack_step_steer = _racked(step_steer, _step)
 sine_sweep = _steered(
     "sine_sweep", "steering swept from 0.2 to 1.6 Hz, 10 s", _sweep, _periodic_corners

@@ -24,29 +24,17 @@ class Structure:
 
     Outputs are those of the motion about the static state, but for the forces:
     y = Cq (q - q0) + Cv q' + Ca q'' + Cf f.
-
-    Attributes
-    ----------
-    mass, stiffness
-        M and K (n, n), symmetric; K without what acts at the ports.
-    damping_time
-        d in s, of damping that is proportional to K.
-    dampers
-        W (n, k): few linear dampers, by their deflections times the root of their rates.
-    ports
-        B (n, p): deflections of the ports are w = B' q.
-    load
-        Weight (n,) in N and N m.
-    outputs
-        Cq, Cv, Ca (outputs, n) and Cf (outputs, p).
     """
 
+    # M and K (n, n), symmetric; K without what acts at the ports.
     mass: csc_array
     stiffness: csc_array
-    damping_time: float
+    damping_time: float  # d in s, of damping that is proportional to K.
+    # W (n, k): few linear dampers, by their deflections times the root of their rates.
     dampers: csc_array
-    ports: csc_array
-    load: np.ndarray
+    ports: csc_array  # B (n, p): deflections of the ports are w = B' q.
+    load: np.ndarray  # Weight (n,) in N and N m.
+    # Cq, Cv, Ca (outputs, n) and Cf (outputs, p).
     outputs: tuple[csc_array, csc_array, csc_array, csc_array]
 
     def held(self, stiffness: np.ndarray) -> csc_array:

@@ -20,22 +20,14 @@ INDICATOR, LEFT, REPORTED = range(3)
 
 
 class Cells(NamedTuple):
-    """A box of inputs in equal cells, with a polynomial in each.
+    """A box of inputs in equal cells, with a polynomial in each."""
 
-    Attributes
-    ----------
-    centres, scales
-        The box is where all |input - centre| * scale <= 1 (INPUTS,); the largest is the indicator.
-    numbers
-        Number of cells along each input (INPUTS,), 1 for an input that rests.
-    coefficients
-        Of each monomial for each quantity, padded (cells, monomials, quantities); the cells of the
-        last input stand together.
-    """
-
+    # The box is where all |input - centre| * scale <= 1 (INPUTS,); the largest is the indicator.
     centres: Vector
     scales: Vector
-    numbers: IntVector
+    numbers: IntVector  # Number of cells along each input (INPUTS,), 1 for an input that rests.
+    # Of each monomial for each quantity, padded (cells, monomials, quantities); the cells of the
+    # last input stand together.
     coefficients: Cube
 
     @property
@@ -65,13 +57,8 @@ def polynomials(x: Vector, coefficients: Matrix, result: Vector) -> None:
 def map_path(inputs: Matrix, cells: Cells, space: Vector) -> Int:
     """Polynomials at every sample, outside of the box those of the nearest cell.
 
-    Parameters
-    ----------
-    inputs
-        At the samples (samples, INPUTS).
-    space
-        Quantities of all samples, then what is reported, see above, then scratch space (INPUTS,):
-        one array is sooner handed over than three.
+    The space holds quantities of all samples, then what is reported, see above, then scratch space
+    (INPUTS,): one array is sooner handed over than three.
     """
     centres, scales, numbers, coefficients = cells
     samples = inputs.shape[0]

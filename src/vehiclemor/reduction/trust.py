@@ -99,27 +99,19 @@ def bands_of(maneuver: Maneuver) -> np.ndarray:
 
 @dataclass(frozen=True)
 class InputRange:
-    """Inputs, initial speeds and durations of the training runs: a method's least claim.
+    """Inputs, initial speeds and durations of the training runs: a method's least claim."""
 
-    Attributes
-    ----------
-    largest
-        Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a structure
-        these and shares of `BANDS` in their RMS values (6, inputs); of a dynamic model sizes of
-        whole signals (3, inputs), see `Extent`.
-    speed, reach
-        Middle of the initial speeds in m/s, and how far they lie from it.
-    longest
-        Duration of the longest run in s; a kinematic model has no memory, and any is known.
-    histories
-        Inputs of the training runs (runs, samples, inputs) at equidistant times of the first, where
-        the model follows the times of its training; else none.
-    """
-
+    # Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a structure
+    # these and shares of `BANDS` in their RMS values (6, inputs); of a dynamic model sizes of whole
+    # signals (3, inputs), see `Extent`.
     largest: np.ndarray
+    # Middle of the initial speeds in m/s, and how far they lie from it.
     speed: float
     reach: float
+    # Duration of the longest run in s; a kinematic model has no memory, and any is known.
     longest: float
+    # Inputs of the training runs (runs, samples, inputs) at equidistant times of the first, where
+    # the model follows the times of its training; else none.
     histories: np.ndarray | None = None
 
     def check_sizes(self) -> None:
@@ -195,10 +187,7 @@ def input_range(
 ) -> InputRange:
     """Range of some training runs, each a maneuver and an initial speed in m/s.
 
-    Parameters
-    ----------
-    follows_time
-        Whether the method follows the times of its training, see `Method`.
+    Of `follows_time` see `Method`.
     """
     maneuvers = [maneuver.for_inputs(model.inputs) for maneuver, _ in runs]
     speeds = [speed for _, speed in runs]

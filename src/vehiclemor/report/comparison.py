@@ -10,10 +10,9 @@ import xarray as xr
 
 from vehiclemor.arguments import count, file_path
 from vehiclemor.exceptions import InputError
-from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import component, names, unknown
-from vehiclemor.report.criteria import CRITERIA, SUBSTANTIAL
+from vehiclemor.report.criteria import CRITERIA
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.findings import Criterion, Finding, Results, judged
 from vehiclemor.report.frames import frame, grid_rows
@@ -28,7 +27,6 @@ from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.store import combined_path
 from vehiclemor.study.timing import timed_starts
 
 PAPER = "paper"
@@ -36,8 +34,6 @@ ALL_MODELS = "all three models"
 NOTHING_MEASURED = "an explanation or a judgement; the paper prints nothing that could be measured"
 # The paper says nothing of another start.
 PUBLISHED_START = "equilibrium"
-# The claim that the size study bears on, beside the paper's own models.
-LESS_TIME = "all_close_agreement_less_time"
 Row = dict[str, Any]
 
 
@@ -91,28 +87,8 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
     judged_by = [(number, number_criterion(number)) for number in numbers]
     judged_by += [(claim, claim_criterion(claim)) for claim in claims if claim.kind != "setup"]
     rows = [row for entry, criterion in judged_by for row in rows_of(entry, criterion, results)]
-    rows.append(_of_size(load_published().claims[LESS_TIME], folder))
     place = {model: index for index, model in enumerate(dict.fromkeys(n.model for n in numbers))}
     return pd.DataFrame(sorted(rows, key=lambda row: place.get(row["model"], len(place))))
-
-
-def _of_size(claim: Claim, folder: Path) -> Row:
-    """The claim of less computation on the largest mesh of the truck, if that has been timed."""
-    text = (
-        "time of a Craig-Bampton model over that of its full model, the largest mesh of the truck"
-    )
-    finding = Finding(math.nan, 1.0 - SUBSTANTIAL, None, text, "vehiclemor run size measures it")
-    path = combined_path(folder, "size")
-    if path.exists():
-        known = list(size_rows(read_dataset(path, "study", "size")))
-        chosen = [row for row in known if row["label"] == "Craig-Bampton"]
-        row = max(chosen, key=lambda row: row["coordinates"])
-        share = row["seconds"] / row["full_seconds"]
-        seen = f"n = {row['coordinates']}: {row['gain_mesh']:.3g} times faster"
-        finding = Finding(share, 1.0 - SUBSTANTIAL, share < 1.0 - SUBSTANTIAL, text, seen)
-    head = {"id": claim.id, "model": ALL_MODELS, "item": claim.statement, "published": math.nan}
-    own = {"variant": "a truck of finite elements", "verdict": judged(finding.within)}
-    return head | own | {"replay": math.nan} | finding._asdict()
 
 
 def claim_criterion(claim: Claim) -> Criterion:
@@ -140,9 +116,9 @@ def rows_of(entry: Number | Claim, criterion: Criterion, results: Results) -> It
     else:
         head["item"] = f"figure {entry.figure}: " * bool(entry.figure) + entry.statement
     head["published"] = entry.value if isinstance(entry, Number) else math.nan
-    replay = criterion(results, "replay").reproduced if criterion.of_replay else math.nan
+    replay = criterion.judge(results, "replay").reproduced if criterion.of_replay else math.nan
     for label, variant in criterion.variants.items():
-        finding = criterion(results, label)
+        finding = criterion.judge(results, label)
         own = {"variant": variant, "verdict": judged(finding.within), "replay": replay}
         yield head | own | finding._asdict()
 

@@ -27,7 +27,7 @@ INDISTINGUISHABLE = 0.01
 SMALLEST_CHANGE = 0.01
 # Whose the threshold of a criterion is: the paper prints it, the claim's words leave no other, or
 # it is ours.
-PRINTED, IN_WORDS, OWN = "published", "the claim's words", "ours"
+PRINTED, IN_WORDS, OWN = "published", "the claim's words", "added here"
 # Label of a method in the paper's studies -> what its rows are called.
 VARIANTS = {"pod": "default", "pod_literal": "literal"}
 Results = Mapping[str, xr.Dataset]
@@ -58,19 +58,14 @@ class Finding(NamedTuple):
 class Criterion:
     """A number or claim of the paper as a number that can miss its bound.
 
-    `judge` gets the results of the `studies` (and timings) that it needs, and the label of a
-    method; `variants` are what the rows of labels are called.  Replay has no subspaces, and
-    integrates nothing: it is not judged by all of them.
+    It gets the results of studies and timings by name, and the label of a method; `variants` are
+    what the rows of labels are called.  Replay has no subspaces, and integrates nothing: it is not
+    judged by all of them.
     """
 
     judge: Callable[[Results, str], Finding]
-    studies: tuple[str, ...] = ()
     variants: Mapping[str, str] = field(default_factory=lambda: VARIANTS)
     of_replay: bool = True
-
-    def __call__(self, results: Results, label: str) -> Finding:
-        """The finding for one method."""
-        return self.judge({name: results[name] for name in self.studies}, label)
 
 
 def at_point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
@@ -107,7 +102,7 @@ def agree(study: str, outputs: tuple[str, ...], bound: float = VISIBLE, rank: in
     def judge(results: Results, label: str) -> Finding:
         return not_visible(at_point(results[study], label, rank=rank), outputs, bound)
 
-    return Criterion(judge, (study,))
+    return Criterion(judge)
 
 
 def judged(within: bool | None) -> str:

@@ -20,7 +20,7 @@ from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
 from vehiclemor.report.comparison import paper_comparison
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.figures.paper import figure_pareto
+from vehiclemor.report.figures.pareto import figure_pareto
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.runs import PATH
 from vehiclemor.report.figures.theme import METADATA, styled

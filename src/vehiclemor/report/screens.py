@@ -120,7 +120,7 @@ def _missed(rows: list[Row]) -> Table:
         first = own[0]
         values = ", ".join(f"{shown(r['reproduced'], '.3g')} ({r['variant']})" for r in own)
         measure, bound = first["measure"].split("; ")[0], shown(first["bound"], ".3g")
-        # Without a threshold of ours what was seen says why.
+        # A claim without a threshold is explained by what was seen.
         by_claim = first["threshold_source"] == IN_WORDS
         found = first["reason"] if by_claim else f"{measure}: {values}; bound {bound}"
         lines.append({"missed_claims": f"- {first['item']}: {found}"})
@@ -130,9 +130,9 @@ def _missed(rows: list[Row]) -> Table:
 def claim_parts(rows: pd.DataFrame) -> list[Part]:
     """All rows with their reasons, by model."""
     note = (
-        "The paper's parameters were never published; ours are public data.  default: our settings "
-        "of POD, picked by model after a sweep over all settings on the runs that are judged here; "
-        "literal: the paper's words.  A bound with * is our own, since the paper gives none: "
+        "The paper's parameters were never published; these models use public data.  default: "
+        "settings of POD chosen by a sweep over the runs that are judged here; literal: the "
+        "paper's words.  A bound with * is added here, since the paper gives none: "
         f"{100 * VISIBLE:g} % of a signal's range is visible in a figure (2 mm on a curve 40 mm "
         f"high), {100 * INDISTINGUISHABLE:g} % is not.  "
         "replay: returns the training run.  Times are medians of interleaved rounds, not "
@@ -152,7 +152,7 @@ def claim_parts(rows: pd.DataFrame) -> list[Part]:
 
 
 def _judged(row: Row) -> Row:
-    """Bound, with a mark if it is ours, and verdict of a row as they are printed."""
+    """Bound, with a mark if it is added here, and verdict of a row as they are printed."""
     mark = "*" if row["threshold_source"] == OWN else ""
     return {"limit": shown(float(row["bound"]), ".3g") + mark, "word": VERDICTS[row["verdict"]]}
 

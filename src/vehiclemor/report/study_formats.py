@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 from vehiclemor.arguments import file_path
 from vehiclemor.exceptions import FileError, InputError
-from vehiclemor.files import write_folder, write_text, write_whole
+from vehiclemor.files import write_text, write_whole
 from vehiclemor.registry import choice
 
 Format = Literal["zarr", "parquet", "csv"]
@@ -62,7 +62,7 @@ def convert(
         # Texts of any length, as those of other chunks may be longer.
         texts = {n: v.astype(object) for n, v in dataset.variables.items() if v.dtype.kind == "U"}
         written = dataset.assign(texts).drop_encoding()
-        return write_folder(path, partial(written.to_zarr, mode="w", consolidated=False))
+        return write_whole(path, partial(written.to_zarr, mode="w", consolidated=False))
     described = column_meanings(dataset).to_csv(index=False)
     # Those of another format of the same result are the same.
     if columns.exists() and columns.read_bytes() != described.encode():

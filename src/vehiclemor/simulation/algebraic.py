@@ -38,8 +38,8 @@ CLOSED = 1e-6
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
-KINEMATIC_LOOPS = ("simulation.newton.newton_loops",)
-INLINED_KERNELS = ("residual", "residual_jacobian", "newton_step", "tangent_parts", "tangent")
+KINEMATIC_LOOPS = ("simulation.integrators.dense_solves", "simulation.newton.newton_loops")
+INLINED_KERNELS = ("residual_jacobian", "newton_step", "tangent_parts", "tangent")
 REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
     newton_loops.NOT_FINITE: "a coordinate is not finite",
@@ -92,12 +92,7 @@ class AlgebraicModel(Model):
 
         By the state: of the residual or of the outputs as functions of q.  By inputs or parameters:
         of the residual with q held, of coordinates and outputs with q following, by the implicit
-        function theorem dq = -Phi_q^-1 Phi_u du.
-
-        Raises
-        ------
-        InputError
-            If an argument is wrong, or the coordinates that are to follow don't close the joints.
+        function theorem dq = -Phi_q^-1 Phi_u du; the coordinates must close the joints.
         """
         function, by = chosen(of, RESULTS), with_respect_to
         if by == "state" and not function:
@@ -130,13 +125,7 @@ class AlgebraicModel(Model):
         return dict(zip(self.definition.joints, places, strict=True))
 
     def solve(self, u: Any) -> np.ndarray:
-        """Coordinates (n,) at inputs u, on the branch of the design position.
-
-        Raises
-        ------
-        UnreachableError
-            If the mechanism can't reach the height; the reachable range is named.
-        """
+        """Coordinates (n,) at inputs u, on the branch of the design position, see `simulate`."""
         inputs = self._inputs(u)[None, :]
         return self.solve_path(np.zeros(1), inputs).coordinates[0]
 
@@ -149,12 +138,7 @@ class AlgebraicModel(Model):
         the double wishbone's lower limit end in a cusp at a rack of 0.28 mm, beyond which the wheel
         goes 39 mm further down while its steering angle runs from 1 to 3 rad.
 
-        Raises
-        ------
-        InputError
-            If the displacement is not a finite number.
-        UnreachableError
-            If not even the design height can be reached at this displacement.
+        `UnreachableError` if not even the design height can be reached at this displacement.
         """
         (rack,) = checked_array(rack, 1, "rack displacement", self.name)
         low, high = (self._limit(rack, end) for end in (-1.0, 1.0))
@@ -193,38 +177,14 @@ class AlgebraicModel(Model):
         tolerance: float | None = None,
         outputs: Names = None,
     ) -> Trajectory:
-        """Full-order solution at the given times (the maneuver's output times by default).
-
-        Parameters
-        ----------
-        maneuver
-            Its inputs are the model's.
-        start
-            One of `starts`; a mechanism's coordinates follow from its inputs, not from a state.
-        times
-            Increasing times (samples,) in s.
-        solver
-            `newton`, the default: fresh Jacobians, generated elimination, started at the previous
-            sample.  `newton_lanes`: started at a quadratic extrapolation, the samples in vector
-            lanes; where that fails, `newton`.
-        tolerance
-            Largest component of the last step of an iteration (rad or m), 1e-12 by default.
-        outputs
-            Names of outputs or coordinates to keep, see `Trajectory.chosen`.
-
-        Raises
-        ------
-        UnreachableError
-            If a height can't be reached.
-        ConvergenceError
-            If an iteration fails; time and reachable range are named.
-        """
+        """Full-order solution, see `Model.simulate`."""
         self.check_start(start)
         if times is None:
             sampled = self.sampled(maneuver)
         else:
+            maneuver = checked_maneuver(maneuver, self.definition)
             times = output_times(times, maneuver, repeats=True)
-            inputs = self.inputs_of(maneuver, times)
+            inputs = checked_inputs(maneuver.at(times), times, self.inputs)
             sampled = times, inputs, ready(newton_loops.Samples(inputs))
         tolerance = NEWTON_TOLERANCE if tolerance is None else tolerance
         run = self._solved(sampled, "newton" if solver is None else solver, tolerance)
@@ -233,11 +193,6 @@ class AlgebraicModel(Model):
     def sampled(self, maneuver: Maneuver) -> Sampled:
         """Output times in s of a maneuver and its inputs, ready for loops; to be read only."""
         return _sampled(checked_maneuver(maneuver, self.definition))
-
-    def inputs_of(self, maneuver: Maneuver, times: np.ndarray) -> np.ndarray:
-        """Inputs (samples, inputs) of a maneuver as loops want them, or `InputError`."""
-        maneuver = checked_maneuver(maneuver, self.definition)
-        return checked_inputs(maneuver.at(times), times, self.inputs)
 
     def solve_path(
         self,
@@ -256,14 +211,19 @@ class AlgebraicModel(Model):
         check_positive("tolerance", tolerance)
         choice("solver", solver, SOLVERS)
         times, inputs, given = sampled
-        if solver == "newton_lanes":
-            found, solver = self._side_by_side(sampled, tolerance), "newton"
+        n = len(self.coordinates)
+        if solver == "newton_lanes" and len(times) >= LANES:
+            found = self._lanes.solved(given, _iteration(tolerance, SHORTEST_STEP))
             if found is not None:
-                return found
-        path = np.full((len(inputs), len(self.coordinates)), np.nan)
+                table, counts, seconds = found
+                lanes = table[:, :n], counts, seconds, None, table[:, n:]
+                return self.trajectory(times, inputs, *lanes)
+        path = np.full((len(inputs), n), np.nan)
         solution = newton_loops.Solution(path, new_counts())
         iteration, buffer = _iteration(tolerance, SHORTEST_STEP), self._buffer()
-        run = self._newton.prepared(self._ready_mechanism, given, iteration, solution, buffer)
+        run = self.loop("newton_path").prepared(
+            self._ready_mechanism, given, iteration, solution, buffer
+        )
         status, seconds = timed(run)
         if not status:
             return self.trajectory(times, inputs, path, solution.counts.tolist(), seconds)
@@ -271,18 +231,7 @@ class AlgebraicModel(Model):
         self._check_reach(times, inputs, sample)
         failure = int(status), sample
         failed = self.trajectory(times, inputs, path, solution.counts.tolist(), seconds, failure)
-        raise ConvergenceError(f"{self.name}: {failed.message} ({solver})", failed)
-
-    def _side_by_side(self, sampled: Sampled, tolerance: float) -> Trajectory | None:
-        """Solution with the samples in vector lanes; none if it has failed."""
-        times, inputs, given = sampled
-        if len(times) < LANES:
-            return None
-        found = self._lanes.solved(given, _iteration(tolerance, SHORTEST_STEP))
-        if found is None:
-            return None
-        (table, counts, seconds), n = found, len(self.coordinates)
-        return self.trajectory(times, inputs, table[:, :n], counts, seconds, None, table[:, n:])
+        raise ConvergenceError(f"{self.name}: {failed.message} (newton)", failed)
 
     @cached_property
     def _lanes(self) -> LaneRuns:
@@ -292,10 +241,6 @@ class AlgebraicModel(Model):
         sizes = len(self.coordinates), len(self.inputs), len(self.outputs)
         loop = self.loop("lane_path", "simulation.newton.lane_loops")
         return LaneRuns(loop, self._ready_mechanism, kernels, sizes)
-
-    @cached_property
-    def _newton(self) -> Loop:
-        return self.loop("newton_path")
 
     @cached_property
     def _ready_mechanism(self) -> Ready:

@@ -97,11 +97,6 @@ def simulate_many(
         `values` (run, time, output) and, by run, `status`, `message`, `remark`, `indicator` and
         `until` (of its trust), `seconds` and solver counts.  A run that has failed, or that the
         model refuses, tells so in its status, and is not a number from there on.
-
-    Raises
-    ------
-    InputError
-        If an argument is wrong, or the result does not fit into memory.
     """
     from joblib import cpu_count
 
@@ -139,11 +134,9 @@ def simulate_many(
 def _about(given: Any, full: Model, signals: Sequence[Maneuver]) -> dict[str, Any]:
     """Attributes of the result: of which model with which settings it is."""
     solver, tolerance = reference_solver(signals[0])
+    others = {"structural": (SOLVER, TIGHT), "ae": ("newton", NEWTON_TOLERANCE)}
+    solver, tolerance = others.get(full.kind, (solver, tolerance))
     runs, default = len(signals), {"solver": solver, "tolerance": tolerance}
-    if full.kind == "structural":
-        default = {"solver": SOLVER, "tolerance": TIGHT}
-    elif full.kind == "ae":
-        default = {"solver": "newton", "tolerance": NEWTON_TOLERANCE}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
     title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}
     return attributes(title, full.kernel_hash, **of, settings=repr(dict(settings)))

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
 if TYPE_CHECKING:
     from vehiclemor.simulation.algebraic import AlgebraicModel
-    from vehiclemor.simulation.dynamic import DynamicModel
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.structures.model import StructuralModel
     from vehiclemor.symbolic.program import Program
@@ -63,8 +62,70 @@ def _made(
     derived: tuple[Derivation, str] | None = None,
 ) -> Model:
     """A model of equations that may have been derived already, see `compiled`."""
-    make = {"ae": _algebraic, "structural": _structural}.get(definition.kind, _dynamic)
-    return make(definition, parameters, derived)
+    name, flat = definition.name, parameters.flat()
+    make, loops = _kind(definition.kind)
+    values, initial = values_of(definition, flat), {DESIGN_START: np.zeros(0)}
+    with blamed(f"model {name!r}: check", definition.check):
+        definition.check(values)
+    if definition.kind == "ae":
+        with blamed(f"model {name!r}: design_coordinates", definition.design_coordinates):
+            initial = {DESIGN_START: real_array(definition.design_coordinates(parameters.values()))}
+    equations, digest = derived or compiled(name, definition.derive, loops)
+    check_equations(definition, equations)
+    with blamed(f"model {name!r}: solve_equilibrium", definition.solve_equilibrium):
+        values |= solved_parameters(definition, flat, equations)
+        solved = [float(values[key]) for key in definition.solved]
+    if definition.kind in ("ode", "dae"):
+        with blamed(f"model {name!r}: starts", definition.starts):
+            initial = {start: real_array(x) for start, x in definition.starts(values).items()}
+    _check_states(definition, initial)
+    constants = hoisted_constants(equations, flat, solved)
+    return make(definition, equations, parameters, digest, constants, initial)
+
+
+def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:
+    """What makes models of a kind, and the loops that run them."""
+    # Imported here: a model of one kind needs nothing of the others.
+    if kind == "ae":
+        from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS
+
+        return _assembled, KINEMATIC_LOOPS
+    if kind == "structural":
+        from vehiclemor.simulation.structures.system import STRUCTURAL_LOOPS
+
+        return _standing, STRUCTURAL_LOOPS
+    from vehiclemor.simulation.dynamic import DynamicModel
+
+    return DynamicModel, LOOP_SOURCES
+
+
+def _assembled(*fields: Any) -> AlgebraicModel:
+    """A kinematic model; `GeometryError` where it can't be assembled or is locked at design."""
+    from vehiclemor.simulation.algebraic import AlgebraicModel
+
+    model = AlgebraicModel(*fields)
+    nothing = np.zeros(len(model.inputs))
+    gap = float(np.abs(model.residual(model.design, nothing)).max())
+    if not gap < CLOSED:
+        raise GeometryError(f"the geometry can't be assembled: the joints are {gap:.3g} m apart")
+    jacobian = model.jacobian(model.design, nothing)
+    smallest = float(np.linalg.svd(jacobian, compute_uv=False)[-1])
+    if smallest < SMALLEST_SINGULAR_VALUE:
+        raise GeometryError(
+            f"the geometry can't be assembled: the mechanism is locked at design "
+            f"(smallest singular value of the Jacobian {smallest:.1e})"
+        )
+    return model
+
+
+def _standing(*fields: Any) -> StructuralModel:
+    """A model of sparse matrices and a port law; `GeometryError` where it can't stand."""
+    from vehiclemor.simulation.structures.model import StructuralModel
+
+    model = StructuralModel(*fields)
+    # What is wrong with the matrices is told now.
+    _ = model.system
+    return model
 
 
 def kept_build(name: str) -> Model:
@@ -87,74 +148,6 @@ def build_derived(name: str) -> Model | None:
     """A model that was derived before; deriving one takes long where it is only described."""
     definition: ModelDefinition = component("model", name)
     return build(name) if is_derived(name, definition.derive) else None
-
-
-def _algebraic(
-    definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
-) -> AlgebraicModel:
-    """A kinematic model; `GeometryError` where it can't be assembled or is locked at design."""
-    # Imported here: a model of one kind needs nothing of the other.
-    from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS, AlgebraicModel
-
-    with blamed(f"model {definition.name!r}: design_coordinates", definition.design_coordinates):
-        design = real_array(definition.design_coordinates(parameters.values()))
-    equations, digest = derived or compiled(definition.name, definition.derive, KINEMATIC_LOOPS)
-    check_equations(definition, equations)
-    _check_states(definition, {DESIGN_START: design})
-    constants = hoisted_constants(equations, parameters.flat(), [])
-    model = AlgebraicModel(
-        definition, equations, parameters, digest, constants, {DESIGN_START: design}
-    )
-    nothing = np.zeros(len(model.inputs))
-    gap = float(np.abs(model.residual(design, nothing)).max())
-    if not gap < CLOSED:
-        raise GeometryError(f"the geometry can't be assembled: the joints are {gap:.3g} m apart")
-    smallest = float(np.linalg.svd(model.jacobian(design, nothing), compute_uv=False)[-1])
-    if smallest < SMALLEST_SINGULAR_VALUE:
-        raise GeometryError(
-            f"the geometry can't be assembled: the mechanism is locked at design "
-            f"(smallest singular value of the Jacobian {smallest:.1e})"
-        )
-    return model
-
-
-def _dynamic(
-    definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
-) -> DynamicModel:
-    """A model of equations of motion."""
-    from vehiclemor.simulation.dynamic import DynamicModel
-
-    values = values_of(definition, parameters.flat())
-    with blamed(f"model {definition.name!r}: check", definition.check):
-        definition.check(values)
-    equations, digest = derived or compiled(definition.name, definition.derive)
-    check_equations(definition, equations)
-    with blamed(f"model {definition.name!r}: solve_equilibrium", definition.solve_equilibrium):
-        values |= solved_parameters(definition, parameters.flat(), equations)
-        solved = [float(values[key]) for key in definition.solved]
-    constants = hoisted_constants(equations, parameters.flat(), solved)
-    with blamed(f"model {definition.name!r}: starts", definition.starts):
-        initial = {name: real_array(x) for name, x in definition.starts(values).items()}
-    _check_states(definition, initial)
-    return DynamicModel(definition, equations, parameters, digest, constants, initial)
-
-
-def _structural(
-    definition: ModelDefinition, parameters: ParameterSet, derived: tuple[Derivation, str] | None
-) -> StructuralModel:
-    """A model of sparse matrices and a port law; `GeometryError` where it can't stand."""
-    from vehiclemor.simulation.structures.model import StructuralModel
-    from vehiclemor.simulation.structures.system import STRUCTURAL_LOOPS
-
-    with blamed(f"model {definition.name!r}: check", definition.check):
-        definition.check(values_of(definition, parameters.flat()))
-    equations, digest = derived or compiled(definition.name, definition.derive, STRUCTURAL_LOOPS)
-    check_equations(definition, equations)
-    constants = hoisted_constants(equations, parameters.flat(), [])
-    initial = {DESIGN_START: np.zeros(0)}
-    model = StructuralModel(definition, equations, parameters, digest, constants, initial)
-    model.assemble()
-    return model
 
 
 def check_equations(definition: ModelDefinition, equations: Derivation) -> None:

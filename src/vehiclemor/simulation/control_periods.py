@@ -18,18 +18,9 @@ MOST_SPANS = 64
 class ControlPeriods(ShortRepr):
     """Formulation of a system with one affine subspace for each window.
 
-    Attributes
-    ----------
-    formulation
-        `full`, `state` or `coordinates`, see the modules of these names in `formulations`.
-    edges
-        Window edges (windows + 1,) in s.
-    means
-        Means (windows, 2 n).
-    trial_basis, test_basis
-        Bases and projections by rows (windows, R, 2 n); rows beyond a window's rank are not used.
-    ranks
-        Dimensions (windows,) of the reduced systems.
+    One of the `formulations`; window edges (windows + 1,) in s; means (windows, 2 n); bases and
+    projections by rows (windows, R, 2 n), of which rows beyond a window's rank are not used; ranks,
+    the dimensions (windows,) of the reduced systems.
     """
 
     formulation: str

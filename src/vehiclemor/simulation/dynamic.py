@@ -100,13 +100,7 @@ class DynamicModel(Model):
         )
 
     def rhs(self, x: Any, u: Any) -> np.ndarray:
-        """Right-hand side f(x, u) (2 n,): the time derivative of the state x at inputs u.
-
-        Raises
-        ------
-        InputError
-            If a value isn't finite, or if the derivative isn't.
-        """
+        """Right-hand side f(x, u) (2 n,); `InputError` if a value or the result isn't finite."""
         result = self.evaluated("derivative", x, u)
         if not np.isfinite(result).all():
             raise InputError(f"the derivative of {self.name} is not finite at this state")
@@ -119,18 +113,7 @@ class DynamicModel(Model):
     def jacobian(
         self, state: Any, u: Any, with_respect_to: By = "state", of: str = "rhs"
     ) -> np.ndarray:
-        """Derivatives of the right-hand side or of the outputs, see `Model.jacobian`.
-
-        Parameters
-        ----------
-        of
-            `rhs` or `outputs`.
-
-        Raises
-        ------
-        InputError
-            If an argument is wrong, or the derivatives aren't finite.
-        """
+        """Analytic derivatives of `rhs` or `outputs`, see `Model.jacobian`."""
         return self.jacobian_of(chosen(of, RESULTS), state, u, with_respect_to)
 
     def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
@@ -168,38 +151,14 @@ class DynamicModel(Model):
         longest_step: float | None = None,
         begin: float = 0.0,
     ) -> Trajectory:
-        """Full-order trajectory at the given times (the maneuver's output times by default).
+        """Full-order trajectory, see `Model.simulate`.
 
         Parameters
         ----------
-        maneuver
-            Its inputs are the model's.
-        start
-            Named initial condition, or a state (2 n,).
-        times
-            Increasing times (samples,) in s.
-        solver
-            `dopri5`: Dormand-Prince 5(4).  `rodas4`: Rosenbrock method of order 4, a fresh
-            Jacobian in every step.  `ros34pw2`: W-method of order 3 with one Jacobian, that of
-            straight running, for all steps and runs.  With the same `etdrk4`: exponential
-            Runge-Kutta method of order 4, and `exponential_adams`: exponential Adams method of
-            order up to 6.  By default that, or `dopri5` through samples on straight lines.
-        tolerance
-            Largest local error of a state relative to its typical size plus its own.
-        outputs
-            Names of outputs, coordinates or speeds to keep, see `Trajectory.chosen`; only these
-            are computed.
         longest_step
             In s; unlimited by default.
         begin
             Time in s at which the run begins with the start, in mid-maneuver if it isn't 0.
-
-        Raises
-        ------
-        InputError
-            If an input isn't finite or a name is unknown.
-        ConvergenceError
-            If the integration fails or leaves the model's range of validity.
         """
         if solver is None:
             solver, usual = reference_solver(maneuver)

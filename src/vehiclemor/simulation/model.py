@@ -48,12 +48,8 @@ class Model(ShortRepr):
 
     Attributes
     ----------
-    definition
-        What was declared of it.
-    equations
-        What was derived.
-    parameters
-        Validated parameter set.
+    definition, equations, parameters
+        What was declared of it, what was derived, its validated parameter set.
     kernel_hash
         Hash of the source of kernels and loops, whatever compiles it.
     constants
@@ -146,13 +142,7 @@ class Model(ShortRepr):
         return self.equations.kernels
 
     def start(self, name: Start | None = None) -> np.ndarray:
-        """State (n,) of an initial condition (the first by default), or a copy of the one given.
-
-        Raises
-        ------
-        InputError
-            If it is neither a known name nor a state.
-        """
+        """State (n,) of an initial condition, the first by default, or a copy of the one given."""
         if not isinstance(name, str | None):
             return self._state(name, "start").copy()
         name = self.starts[0] if name is None else name
@@ -170,7 +160,42 @@ class Model(ShortRepr):
         tolerance: float | None = None,
         outputs: Names = None,
     ) -> Trajectory:
-        """Full-order solution; where None, the model's first start, output times and defaults."""
+        """Full-order solution; where None, the model's first start, output times and defaults.
+
+        Parameters
+        ----------
+        maneuver
+            Its inputs are the model's.
+        start
+            Named initial condition, or a state (n,) of a model of motion.
+        times
+            Increasing times (samples,) in s; of a structure some of the maneuver's output times.
+        solver
+            Of kinematic models `newton`: fresh Jacobians, generated elimination, started at the
+            previous sample; `newton_lanes`: started at a quadratic extrapolation, the samples in
+            vector lanes, and `newton` where that fails.  Of structures `generalised_alpha`.  Of
+            others one of the integrators: `dopri5`, Dormand-Prince 5(4); `rodas4`, Rosenbrock
+            method of order 4, a fresh Jacobian in every step; `ros34pw2`, W-method of order 3 with
+            one Jacobian, that of straight running, for all steps and runs; with the same `etdrk4`,
+            exponential Runge-Kutta method of order 4, and `exponential_adams`, exponential Adams
+            method of order up to 6.  By default that, or `dopri5` through samples on straight
+            lines.
+        tolerance
+            Largest component of the last step of an iteration (rad or m), 1e-12 by default; of
+            structures largest error of an output by the step size, as part of the output's range;
+            else largest local error of a state relative to its typical size plus its own.
+        outputs
+            Names of outputs, coordinates or speeds to keep, see `Trajectory.chosen`.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or an input isn't finite or leaves the range of validity.
+        UnreachableError
+            If a mechanism can't reach a height; the reachable range is named.
+        ConvergenceError
+            If the solution fails, or leaves the model's range of validity.
+        """
 
     def outputs_at(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, number of outputs) along a path of states and inputs."""
@@ -184,18 +209,22 @@ class Model(ShortRepr):
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
         return at_samples(self.kernels, function, self.constants, (states, inputs), sizes, finite)
 
-    @abstractmethod
     def jacobian(self, state: Any, u: Any, with_respect_to: By = "state") -> np.ndarray:
-        """Analytic derivatives (results, columns) at a state and inputs.
-
-        Of a function with a kink, as where a wheel lifts off, it is the derivative on one side.
+        """Analytic derivatives (results, columns) at a state and inputs; at a kink on one side.
 
         Parameters
         ----------
         with_respect_to
             `state`, `inputs`, or names of parameters: a column for each component of each, in
             order, of models made anew with it.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong, or the derivatives aren't finite.
         """
+        del state, u, with_respect_to
+        raise InputError(f"{self.name} has no named states; reduce it for Jacobians")
 
     def require(self, *functions: str) -> None:
         """Raise `InputError` if the model's equations lack one of these functions."""
@@ -213,13 +242,7 @@ class Model(ShortRepr):
         return result
 
     def bare(self, function: str) -> BareKernel:
-        """A function of the equations for integrators of others, see `BareKernel`.
-
-        Parameters
-        ----------
-        function
-            `rhs`, `outputs`, or another of the equations.
-        """
+        """`rhs`, `outputs` or another function for integrators of others, see `BareKernel`."""
         function = "derivative" if function == "rhs" else function
         self.require(function)
         return self.kernels.bare(function, self.constants)

@@ -61,7 +61,7 @@ def watched(
     places: Matrix,
     outputs: Outputs,
     results: Matrix,
-    first: IntVector,
+    result: IntVector,
 ) -> Int:
     """The first sample at which each of some outputs is outside of its range; else their number.
 
@@ -70,8 +70,8 @@ def watched(
     space.
     """
     samples = len(places) if len(places) else len(states)
-    for k in range(len(first)):
-        first[k] = samples
+    for k in range(len(result)):
+        result[k] = samples
     evaluate(states, inputs, outputs, results)
     known, within = -1, False
     for sample in range(samples):
@@ -82,7 +82,7 @@ def watched(
             within = cubics_within(states, results, row, outputs)
         known = row
         if not within:
-            note_outside(states, results, (row, z), outputs, sample, samples, first)
+            note_outside(states, results, (row, z), outputs, sample, samples, result)
     return 0
 
 
@@ -92,18 +92,18 @@ def chosen(
     places: Matrix,
     outputs: Outputs,
     results: Matrix,
-    histories: Matrix,
+    result: Matrix,
 ) -> Int:
     """Histories (outputs, samples) of some outputs, see `watched`."""
     evaluate(states, inputs, outputs, results)
-    samples = histories.shape[1]
+    samples = result.shape[1]
     for k in range(len(outputs.columns)):
         column, sample = outputs.columns[k], 0
         table, own = (states, column) if column >= 0 else (results, -1 - column)
         while sample < samples:
             row, z = point_of(places, sample)
             if row < 0 or z < 0.0:
-                histories[k, sample] = value_at(table, row, z, own)
+                result[k, sample] = value_at(table, row, z, own)
                 sample += 1
                 continue
             even, even_slope, odd, odd_slope = cubic_of(table, row, own)
@@ -113,7 +113,7 @@ def chosen(
             for i in range(sample, end):
                 y = places[i, 1] - 0.5
                 w = y * y - INNER_SQUARE
-                histories[k, i] = (even + w * even_slope) + y * (odd + w * odd_slope)
+                result[k, i] = (even + w * even_slope) + y * (odd + w * odd_slope)
             sample = end
     return 0
 

@@ -54,18 +54,13 @@ class Recorder:
             arrays = np.empty((len(states), results)), np.empty((len(names), len(run.times)))
             loop = path_loops()["chosen"]
             call = loop.prepared(states, inputs, run.places, outputs, *arrays)
-            words = call.address("states") + 1, call.address("histories")
+            words = call.address("states") + 1, call.address("result")
             held = run.kept["chosen"] = states, names, call, words
         *_, call, (rows, address) = held
         result = np.empty((len(names), len(run.times)))
         call.words[rows], call.words[address] = run.rows, address_of_array(result)
         call()
         return result.T
-
-    @cached_property
-    def _copied(self) -> tuple[int, ...]:
-        """By output the number of the state that it is, -1 where it is another quantity."""
-        return self.model.kernels.sources["outputs"].copies
 
     def packed(
         self, names: tuple[str, ...], rows: int, ranges: np.ndarray = NO_RANGES
@@ -77,7 +72,7 @@ class Recorder:
         lanes = LANES if rows >= LANES else 1
         if (names, lanes) not in self._packed:
             model = self.model
-            states, copied = model.definition.states, self._copied
+            states, copied = model.definition.states, model.kernels.sources["outputs"].copies
             kernel, columns = [], []
             for name in names:
                 choice("output", name, (*model.outputs, *states))
@@ -154,6 +149,6 @@ class Recording:
         """A table at the points, its rows whole vectors, at the samples."""
         if not len(self.places):
             return table
-        histories, _ = cache_lines(len(self.places), table.shape[1])
+        histories = cache_lines(len(self.places), table.shape[1])
         path_loops()["sampled"](table, self.places, histories)
         return histories

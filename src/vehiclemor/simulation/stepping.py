@@ -40,9 +40,8 @@ class Sensitivity(NamedTuple):
 class StepSpace(NamedTuple):
     """A workspace of one step at a time, and what is overwritten for each.
 
-    These are arrays of times that end with the length of the step, the index (1,) of the window,
-    coefficients (1, inputs, 6) of the inputs, origins (windows, n) of the subspaces, and the word
-    of the first step to try.
+    Times are arrays that end with the length of the step; window is an index (1,), coefficients
+    (1, inputs, 6) are of the inputs, means (windows, n) of the subspaces, first is the first step.
     """
 
     space: Workspace
@@ -160,7 +159,7 @@ class SteppedSystem:
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """Time derivative (n,) of a state; of a projected one where its subspace is nearest."""
         if self.spaces.formulation == "full":
-            return _Kernels(self.system, inputs).value("derivative", state, len(state))
+            return self.system.values_at("derivative", state[None], inputs[None], len(state))[0]
         return self._projected_rates(_Kernels(self.system, inputs), state, time)[0]
 
     def rate_sensitivities(
@@ -250,10 +249,6 @@ class _Kernels(NamedTuple):
         constants = self.by.argument == CONSTANTS
         return np.zeros((n, len(self.by.directions if constants else self.inputs)))
 
-    def value(self, name: str, x: np.ndarray, size: int) -> np.ndarray:
-        """Result (size,) of a kernel."""
-        return self.system.values_at(name, x[None], self.inputs[None], size)[0]
-
     def own(self, name: str, x: np.ndarray, size: int) -> np.ndarray:
         """Sensitivities (size, columns) at a state that doesn't vary but by itself."""
         assert self.by is not None
@@ -264,7 +259,7 @@ class _Kernels(NamedTuple):
 
     def of(self, name: str, x: np.ndarray, dx: np.ndarray, size: int) -> Varied:
         """Result of a kernel with its sensitivities, at a state with its own (n, columns)."""
-        value = self.value(name, x, size)
+        value = self.system.values_at(name, x[None], self.inputs[None], size)[0]
         if self.by is None:
             return value, np.zeros((size, 0))
         arrays, seeds = (x, self.inputs, self.system.constants), np.ascontiguousarray(dx.T)

@@ -47,35 +47,20 @@ REASONS = {
 
 @dataclass(frozen=True, eq=False)
 class System(ShortRepr):
-    """A first-order system whose right-hand side is machine code.
+    """A first-order system whose right-hand side is machine code."""
 
-    Attributes
-    ----------
-    kernels
-        `derivative` and, where the system has them, `outputs`, `second_order`, `speeds`.
-    constants
-        Hoisted constants of the kernels.
-    inputs
-        Number of inputs.
-    reference
-        State (dim,) at which the Jacobian is frozen, all inputs zero.
-    error_scale
-        Magnitude of each state (dim,) below which errors are measured absolutely.
-    active
-        Numbers of the states that the right-hand side depends on.
-    rotating
-        Numbers of the heading and of the pairs of states that turn with it; may be empty.
-    partners
-        Number of the state that each becomes in the mirror image; empty where there is none.
-    """
-
+    # `derivative` and, where the system has them, `outputs`, `second_order`, `speeds`; their
+    # hoisted constants; number of inputs.
     kernels: Kernels
     constants: np.ndarray
     inputs: int
-    reference: np.ndarray
+    reference: np.ndarray  # State (dim,) at which the Jacobian is frozen, all inputs zero.
+    # Magnitude of each state (dim,) below which errors are measured absolutely.
     error_scale: np.ndarray
-    active: np.ndarray
+    active: np.ndarray  # Numbers of the states that the right-hand side depends on.
+    # Numbers of the heading and of the pairs of states that turn with it; may be empty.
     rotating: np.ndarray
+    # Number of the state that each becomes in the mirror image; empty where there is none.
     partners: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
@@ -87,13 +72,6 @@ class System(ShortRepr):
                 given = (dim, self.inputs, n)
                 source.check(*given, *([results[name]] if name in results else ()))
 
-    def equations(self, *names: str, step: int = 0) -> Equations:
-        """Kernels of these names as loops take them, and the address of one of whole steps."""
-        places = ("derivative", "outputs", "second_order", "speeds")
-        found = [address_of(self.kernels, name) if name in names else 0 for name in places]
-        kernels = np.array([*found, step], dtype=np.int64)
-        return Equations(kernels, self.constants, self.error_scale, self.turning)
-
     @cached_property
     def turning(self) -> np.ndarray:
         """Numbers of the heading and of those pairs that turn with it which the rates depend on."""
@@ -103,11 +81,6 @@ class System(ShortRepr):
 
     def jacobian(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """df/dx (dim, dim) by central differences; columns of inactive states are zero."""
-        if (np.shape(x), np.shape(u)) != ((len(self.reference),), (self.inputs,)):
-            raise InputError(
-                f"x and u have shapes {np.shape(x)} and {np.shape(u)}, not "
-                f"({len(self.reference)},) and ({self.inputs},)"
-            )
         result = np.empty((len(x), len(x)))
         loop = path_loops()["jacobian_at"]
         equations, work = self.called("full"), np.empty((3, len(x)))
@@ -163,27 +136,18 @@ class System(ShortRepr):
         )
         return Frame(blocks, columns, tuple(self.rotating.tolist()))
 
-    def whole_steps(self, solver: str) -> bool:
-        """Whether a kernel takes whole steps of a run that is not projected."""
-        few = len(self.reference) <= catalogue.MOST_STATES
-        return few and catalogue.integrator(solver).stepped is not None
-
     def method(self, solver: str, active: np.ndarray) -> Ready:
         """What an integrator needs beside its code; kept for further runs."""
         key = solver, active.tobytes()
         if key not in self._ready:
             chosen = catalogue.integrator(solver)
-            grid, stored = catalogue.STEP_GRID, catalogue.Stored(catalogue.NOTHING)
-            if chosen.stepped and self.whole_steps(solver):
+            stored: catalogue.Stored = catalogue.Stored(np.zeros((1, 1, 1)))
+            if chosen.step_kernel and chosen.tables:
                 blocks = self.frame.diagonal(self.frozen_jacobian)
-                stored = catalogue.Stored(
-                    self.frame.packed([chosen.stepped.tables(block) for block in blocks])
-                )
-            elif chosen.operators is not None:
-                own = chosen.formulation == "vehicle_frame"
-                jacobian = self.turning_jacobian if own else self.frozen_jacobian
-                stored = chosen.operators(jacobian, active)
-            method = Method(chosen.tableau, grid, *stored, active, self.rotating)
+                stored = catalogue.Stored(self.frame.packed([chosen.tables(b) for b in blocks]))
+            elif chosen.tables:
+                stored = chosen.tables(self.turning_jacobian)
+            method = Method(chosen.tableau, catalogue.STEP_GRID, *stored, active)
             self._ready[key] = ready(method)
         return self._ready[key]
 
@@ -192,10 +156,15 @@ class System(ShortRepr):
         key = formulation, solver
         if key not in self._ready:
             step = 0
-            if solver and (stepped := catalogue.integrator(solver).stepped):
-                kernel = stepped.kernel(self.frame, self.inputs)
+            if solver and (step_kernel := catalogue.integrator(solver).step_kernel):
+                kernel = step_kernel(self.frame, self.inputs)
                 step = address_of(Kernels([kernel]), kernel.name)
-            self._ready[key] = ready(self.equations(*FORMULATIONS[formulation], step=step))
+            names, places = FORMULATIONS[formulation], ("derivative", "second_order", "speeds")
+            found = [address_of(self.kernels, name) if name in names else 0 for name in places]
+            kernels = np.array([*found, step], dtype=np.int64)
+            self._ready[key] = ready(
+                Equations(kernels, self.constants, self.error_scale, self.turning)
+            )
         return self._ready[key]
 
     def run(
@@ -278,15 +247,14 @@ class System(ShortRepr):
         full = windows.formulation == "full"
         if catalogue.frozen(name) and not full:
             raise InputError(f"{name} freezes the full model's Jacobian: not for a reduced model")
-        whole_steps = full and self.whole_steps(name)
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = chosen.formulation if full else windows.formulation
         longest = float(solver.longest_step or np.inf)
         start = np.empty(n)
-        buffer = np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, whole_steps))
-        call = catalogue.time_loop(chosen, formulation, whole_steps).prepared(
+        buffer = np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs))
+        call = catalogue.time_loop(chosen, formulation).prepared(
             start,
-            self.called(formulation, name if whole_steps else ""),
+            self.called(formulation, name if full else ""),
             drive.signal,
             drive.spans,
             windows.subspaces,

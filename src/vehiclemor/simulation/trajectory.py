@@ -62,14 +62,9 @@ EVALUATIONS["structural"] = "port_evaluations"
 class Trust:
     """What a reduced model tells of its own run.
 
-    Attributes
-    ----------
-    indicator
-        Largest value in the run of what tells how far it goes: 1 is the edge of what it knows.
-    until
-        Time in s at which the indicator has first passed 1; infinite if it never has.
-    reason
-        By what it leaves, empty if it does not.
+    The indicator is the largest value in the run of what tells how far it goes: 1 is the edge of
+    what it knows.  `until` is the time in s at which it has first passed 1, infinite if it never
+    has; the reason is by what the run leaves, empty if it does not.
     """
 
     indicator: float
@@ -159,13 +154,7 @@ class Trajectory(ShortRepr):
         return fields[name]
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """History (samples,) of an output, a coordinate or a speed, without the others.
-
-        Raises
-        ------
-        InputError
-            If there is no such quantity.
-        """
+        """History (samples,) of an output, a coordinate or a speed, without the others."""
         return self._columns((name,))[:, 0]
 
     def _columns(self, names: tuple[str, ...]) -> np.ndarray:
@@ -194,12 +183,7 @@ class Trajectory(ShortRepr):
             Name or names of outputs, coordinates or speeds, which become the outputs of the run:
             it has no coordinates and speeds then.  All outputs by default.
         times
-            In s, increasing; all output times by default.
-
-        Raises
-        ------
-        InputError
-            If there is no such quantity, or a time is no output time.
+            Output times in s, increasing; all by default.
         """
         fields = dict(self.__dict__)
         if outputs is not None:

@@ -48,21 +48,7 @@ class Pool(Generic[Kept]):
 
 
 class Solver(NamedTuple):
-    """How a run is integrated.
-
-    Attributes
-    ----------
-    name
-        One of `catalogue.INTEGRATORS`.
-    tolerance
-        Largest local error of a state relative to its scale plus its own size.
-    times
-        Output times (samples,) in s, the maneuver's by default.
-    longest_step
-        In s; unlimited by default.
-    begin
-        Time in s at which the run begins with its state, in mid-maneuver if it isn't 0.
-    """
+    """How a run is integrated: one of `catalogue.INTEGRATORS`, and as `DynamicModel.simulate`."""
 
     name: str
     tolerance: float
@@ -83,20 +69,10 @@ class DrivenBy(NamedTuple):
 class Workspace:
     """Arrays of one run at a time and, packed once, the loop that uses them.
 
-    Attributes
-    ----------
-    call
-        The time loop with its arguments.
-    start
-        Where the run begins (n,).
-    output, buffer
-        Of the loop, see `integrators/loop.integrate`.
-    windows
-        Kept alive: a workspace is found by the object.
-    signal
-        Of the last run.
-    kept
-        What other loops have made of the run; their arrays last as long.
+    The call is the time loop with its arguments, the start where a run begins (n,); output and
+    buffer are as of `integrators/loop.integrate`.  Windows are kept alive: a workspace is found by
+    the object.  The signal is that of the last run.  Kept is what other loops have made of the run;
+    their arrays last as long.
     """
 
     call: Prepared
@@ -117,36 +93,18 @@ class Workspace:
 
 @dataclass(eq=False, slots=True)
 class Run:
-    """What a compiled run leaves behind.
+    """What a compiled run leaves behind."""
 
-    Attributes
-    ----------
-    times
-        Output times (samples,) in s.
-    whole
-        States where it is recorded (rows or more, dim), NaN from a failure on.
-    counts
-        Numbers in the order of `DYNAMIC_COUNTS`.
-    seconds
-        Time spent in the compiled loop.
-    failure
-        Why the run has ended early, empty if it has not.
-    space
-        Where its arrays are from; none of a path that is given.
-    left
-        Called with the space once nothing reads its arrays any more.
-    rows
-        How many of its rows tell something.
-    """
-
-    times: np.ndarray
-    whole: np.ndarray
+    times: np.ndarray  # Output times (samples,) in s.
+    whole: np.ndarray  # States where it is recorded (rows or more, dim), NaN from a failure on.
+    # Numbers in the order of `DYNAMIC_COUNTS`; time in the compiled loop; why it has ended early.
     counts: np.ndarray
     seconds: float
     failure: str
+    # Where its arrays are from; called with it once nothing reads them any more.
     space: Workspace | None = None
     left: Callable[[Workspace], None] | None = None
-    rows: int = field(init=False)
+    rows: int = field(init=False)  # How many of its rows tell something.
 
     def __post_init__(self) -> None:
         """Find how far it is recorded."""
@@ -176,9 +134,9 @@ class Run:
         if self.space is None or self.left is None:
             return self.times, inputs
         output = self.space.output
-        return (
-            (output.point_times, output.inputs) if len(self.places) else (self.times, output.given)
-        )
+        if len(self.places):
+            return output.point_times, output.inputs
+        return self.times, output.given
 
     @property
     def kept(self) -> dict[str, Any]:

@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from vehiclemor.arguments import file_path
 from vehiclemor.exceptions import FileError
 from vehiclemor.failure import Failure, attempt
-from vehiclemor.files import write_folder
+from vehiclemor.files import write_whole
 from vehiclemor.multibody.definition import Quantity
 from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.progress import tell
@@ -31,9 +32,6 @@ from vehiclemor.study.plans.results import described
 from vehiclemor.study.plans.study_file import PARAMETER, SETS
 from vehiclemor.study.result import variables
 from vehiclemor.study.scenario import Scenario
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 NOTE = "Train on training, choose settings by validation; never train or tune on test."
 
@@ -66,7 +64,15 @@ def dataset(model: str | Path, out: str | Path | None = None) -> Path:
         raise FileError(f"{path}: exists already; move it away")
     protocol = load_protocol(protocol_names().get(name, name))
     with one_thread():
-        return write_folder(path, partial(_write, protocol))
+        return write_whole(path, partial(_write, protocol))
+
+
+def digest_of(protocol: Protocol) -> str:
+    """Identity of a test set: its model, parameters, bounds and runs."""
+    runs = sampled_sets(protocol).get("drawn") or protocol.sets["test"]
+    same = protocol.definition.model_dump_json(include={"model", "parameters", "bounds"})
+    text = "\n".join([same, *(run.label for run in runs)])
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _write(protocol: Protocol, folder: Path) -> None:
@@ -77,8 +83,7 @@ def _write(protocol: Protocol, folder: Path) -> None:
     # Its references are kept: those of the test are simulated once.
     model = model_of(second)
     labels = [run.label for run in sets["test"]]
-    same = definition.model_dump_json(include={"model", "parameters", "bounds"})
-    digest = hashlib.sha256("\n".join([same, *labels]).encode()).hexdigest()[:16]
+    digest = digest_of(protocol)
     for name in ("training", "validation", "test"):
         found = _runs(model, sets[name], f"{name} of {protocol.study}")
         for output, bound in definition.bounds.items():
@@ -103,8 +108,6 @@ def _write(protocol: Protocol, folder: Path) -> None:
 
 def _runs(model: Model, scenarios: Sequence[Scenario], work: str) -> xr.Dataset:
     """Full-order runs, one behind the other (contiguous ragged arrays of the CF conventions)."""
-    import xarray as xr
-
     definition = model.definition
     states = (*definition.coordinates, *definition.speeds)
     rates = [

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 
 from vehiclemor.arguments import file_path, quoted
 from vehiclemor.exceptions import FileError, InputError, printable
@@ -16,10 +18,6 @@ from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.results import judged_part
 from vehiclemor.study.plans.study_file import Bound, StudyFile
 from vehiclemor.study.store import combined_path
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 Bounds = Mapping[str, Bound]
 
@@ -50,8 +48,6 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
     VehiclemorError
         If a file can't be read, is of another test set, or lacks values.
     """
-    import pandas as pd
-
     path, folder = file_path("file", file), file_path("dataset", dataset)
     known = folder / "test.nc"
     if not known.exists():
@@ -81,7 +77,6 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
 
 
 def _read(path: Path, kind: str) -> xr.Dataset:
-    import xarray as xr
     from xarray.backends import NetCDF4DataStore
 
     with opened(path, kind) as file:
@@ -105,8 +100,6 @@ def _check(path: Path, found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> 
 
 def _measured(found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> xr.Dataset:
     """Errors and ends of all runs, as a protocol has them of a method."""
-    import xarray as xr
-
     names, ends = truth.attrs["outputs"].split(), np.cumsum(truth["row_size"].values)[:-1]
     full = np.transpose([truth[name].values for name in names])
     places = [names.index(name) for name in bounds]

@@ -9,7 +9,8 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from vehiclemor.arguments import MOST_JOBS, count
 from vehiclemor.exceptions import FileError, InputError
@@ -24,9 +25,6 @@ from vehiclemor.study.plans.size import run_size
 from vehiclemor.study.plans.study_file import MOST_SEED, StudyFile
 from vehiclemor.study.store import combined_path, read_run, result_path, run_path, stored
 from vehiclemor.study.workers import Workers, cluster
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Grids of so many points are announced before they are expanded.
 LARGE = 10_000

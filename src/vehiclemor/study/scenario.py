@@ -167,9 +167,11 @@ def model_of_run(model: Model, scenario: Scenario) -> Model:
     return with_parameters(model, scenario.parameters)
 
 
+# More than the runs of a protocol, over which all rows go.
+@lru_cache(maxsize=1024)
 def with_parameters(model: Model, parameters: Overrides) -> Model:
     """The model with some of its parameters changed; kept, since many runs are of one sample."""
-    return _reparametrised(model, parameters) if parameters else model
+    return reparametrised(model, dict(parameters)) if parameters else model
 
 
 def start_of(model: Model, scenario: Scenario) -> Start:
@@ -177,12 +179,6 @@ def start_of(model: Model, scenario: Scenario) -> Start:
     if scenario.speed is None or scenario.speed == own_speed(model_of_run(model, scenario)):
         return scenario.start
     return _state_at(model, (*scenario.parameters, (SPEED, scenario.speed)), scenario.start)
-
-
-# More than the runs of a protocol, over which all rows go.
-@lru_cache(maxsize=1024)
-def _reparametrised(model: Model, parameters: Overrides) -> Model:
-    return reparametrised(model, dict(parameters))
 
 
 @lru_cache(maxsize=4096)

@@ -17,17 +17,15 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
 from vehiclemor.files import make_folder, not_written, probe_folder, remove_leftovers, write_whole
 from vehiclemor.netcdf_file import global_attributes, read_dataset, write_dataset
 from vehiclemor.short_repr import shortened
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 QUARANTINE = "quarantine"
 ENDING, SCHEMA = ".safetensors", "vehiclemor run 4"
@@ -59,8 +57,6 @@ class StoredRun(NamedTuple):
 
     def dataset(self) -> xr.Dataset:
         """As it was stored."""
-        import xarray as xr
-
         return xr.Dataset(self.variables, attrs=self.attributes).set_coords(self.coordinates)
 
 

@@ -16,9 +16,9 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from vehiclemor.codegen.cache import compiler_identity
 from vehiclemor.failure import Failure, attempt
@@ -33,9 +33,6 @@ from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.result import variables
 from vehiclemor.study.scenario import model_of_run, start_of
 from vehiclemor.study.store import stored
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Rounds of a cost table, and of the test set of a protocol, which has many runs; and those of them
 # in which long runs stand, which scatter less.
@@ -60,8 +57,6 @@ def timed_starts(experiments: Mapping[str, Mapping[str, Experiment]], path: Path
     """Stored timing of initial condition -> name of a case -> experiment, as of `timed_cases`."""
 
     def every_start() -> xr.Dataset:
-        import xarray as xr
-
         parts = [timed_cases(cases).assign_coords(start=s) for s, cases in experiments.items()]
         return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
 
@@ -79,15 +74,13 @@ def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -
     return stored(path, "timing", key, make)
 
 
-def timed_cases(experiments: Mapping[str, Experiment], rounds: int | None = None) -> xr.Dataset:
+def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
     """Time experiments on the one run that all are tested on.
 
     The case `baseline` is the paper's kind of full-order run and `strongest` the best full-order
     solver, for every model.  Beside what `timed_tests` has there are seconds for a time point,
     speed-ups against these two, counts, rank and status; errors on `output` too.
     """
-    import xarray as xr
-
     first = next(iter(experiments.values()))
     samples, start = first.test[0].maneuver.samples, first.test[0].start
     kept = ["effective_rank", "offline_evaluations", "rms_error", "status"]
@@ -95,8 +88,8 @@ def timed_cases(experiments: Mapping[str, Experiment], rounds: int | None = None
     results = [evaluate(experiment)[kept] for experiment in experiments.values()]
     dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop_conflicts")
     dataset = dataset.drop_vars("output_unit").assign_coords(case=list(experiments))
-    every, what = rounds or CASE_ROUNDS, f"from {start}"
-    seconds, offline = _rounds(list(experiments.values()), (every, every), what)
+    rounds, what = (CASE_ROUNDS, CASE_ROUNDS), f"from {start}"
+    seconds, offline = _rounds(list(experiments.values()), rounds, what)
     times = _dataset(experiments, seconds, offline, f"{samples} time points")
     dataset = dataset.merge(times.isel(scenario=0, drop=True))
     columns: dict[str, object] = {
@@ -115,7 +108,6 @@ def timed_cases(experiments: Mapping[str, Experiment], rounds: int | None = None
 def timed_tests(
     experiments: Mapping[str, Experiment],
     finished: np.ndarray | None = None,
-    rounds: int | None = None,
     what: str = "test set",
 ) -> xr.Dataset:
     """Time experiments on their test scenarios, which are the same for all.
@@ -133,8 +125,8 @@ def timed_tests(
         `seconds` with quartiles and `loop_seconds` on `case` and `scenario`, missing where a run is
         not timed; `offline_seconds` on `case`.
     """
-    every = rounds or PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG
-    seconds, offline = _rounds(list(experiments.values()), every, what, finished)
+    rounds = PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG
+    seconds, offline = _rounds(list(experiments.values()), rounds, what, finished)
     return _dataset(experiments, seconds, offline, what)
 
 
@@ -142,8 +134,6 @@ def _dataset(
     experiments: Mapping[str, Experiment], seconds: np.ndarray, offline: list[float], what: str
 ) -> xr.Dataset:
     """Median and quartiles of rounds (rounds, cases, scenarios, whole call and loop)."""
-    import xarray as xr
-
     whole, loop = seconds[..., WHOLE], seconds[..., LOOP]
     with warnings.catch_warnings():
         # What was never timed has none.

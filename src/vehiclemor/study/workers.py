@@ -17,11 +17,13 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+import xarray as xr
 
 from vehiclemor.codegen.cache import cache_folder, once
 from vehiclemor.exceptions import InputError, MachineError, machine_reason, one_line
@@ -32,9 +34,7 @@ from vehiclemor.study.evaluate import evaluate, model_of
 from vehiclemor.study.experiment import Experiment
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future
-
-    import xarray as xr
+    from concurrent.futures import Executor
 
 Groups = Sequence[Sequence[Experiment]]
 # How often what the machine has broken is tried; and seconds between two looks at the driver.
@@ -156,28 +156,20 @@ def in_batches(
     work: Callable[[list[Experiment]], Done],
     groups: Groups,
     size: int,
-    at_once: int | None = None,
     killed: type[Exception] | tuple[()] = (),
 ) -> Generator[Done, None, None]:
-    """What some work gives for each batch of so many groups, of which some are `at_once` in a pool.
+    """What some work gives for each batch of so many groups in a pool.
 
     `killed` is raised of a batch whose worker was killed, while the pool lives on.
     """
-    from concurrent.futures import FIRST_COMPLETED, wait
+    from concurrent.futures import as_completed
 
-    batches = iter([[*chain(*groups[at : at + size])] for at in range(0, len(groups), size)])
-    waiting: set[Future[Done]] = set()
-    while True:
-        further = islice(batches, None if at_once is None else at_once - len(waiting))
-        waiting |= {pool.submit(work, batch) for batch in further}
-        if not waiting:
-            return
-        done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-        for future in done:
-            try:
-                yield future.result()
-            except killed:
-                yield Done([], KILLED)
+    batches = [[*chain(*groups[at : at + size])] for at in range(0, len(groups), size)]
+    for future in as_completed([pool.submit(work, batch) for batch in batches]):
+        try:
+            yield future.result()
+        except killed:
+            yield Done([], KILLED)
 
 
 def batch_size(groups: Groups, places: int) -> int:
@@ -202,7 +194,8 @@ def in_processes(groups: Groups, folder: Path, jobs: int) -> Generator[Done, Non
     )
     try:
         work = partial(evaluate_and_store, folder=folder)
-        yield from in_batches(pool, work, groups, batch_size(groups, jobs), 2 * jobs)
+        size = batch_size(groups, jobs)
+        yield from in_batches(pool, work, groups, size)
     except BrokenProcessPool:
         yield Done([], KILLED)
     except BaseException:
@@ -233,18 +226,16 @@ def cluster(scheduler: str) -> Iterator[Engine]:
         raise InputError("scheduler: needs dask: pip install 'vehiclemor[cluster]'") from None
     # What matters is said in one line; dask would add a traceback for each lost connection.
     with silence_logging_cmgr(logging.CRITICAL):
-        client: Any = None
-        reason = ""
         try:
             # Its types are those of awaited calls too.
-            client = Client(scheduler, timeout=REACH, set_as_default=False)
+            client: Any = Client(scheduler, timeout=REACH, set_as_default=False)
         except (OSError, TypeError, ValueError) as error:
             reason = " ".join(str(error).split())
-        if client is None:
             # What is half made closes itself when it is collected: now, as within the next call
             # of dask it would wait for a lock that this call holds.
+            error.__traceback__ = None
             gc.collect()
-            raise InputError(f"scheduler {scheduler}: can't be reached ({reason})")
+            raise InputError(f"scheduler {scheduler}: can't be reached ({reason})") from None
         with client:
             number = sum(client.nthreads().values())
             work = f"{number} places for runs" if number else "no worker yet, runs wait"
@@ -264,7 +255,7 @@ def on_cluster(groups: Groups, alone: bool = False, *, client: Any) -> Generator
     pool = client.get_executor(pure=False)
     size = 1 if alone else batch_size(groups, sum(client.nthreads().values()))
     try:
-        yield from in_batches(pool, on_worker, groups, size, killed=KilledWorker)
+        yield from in_batches(pool, on_worker, groups, size, KilledWorker)
     except CancelledError:
         raise MachineError(
             "the scheduler is lost; what is finished is stored: run again to resume"

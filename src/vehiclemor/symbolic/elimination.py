@@ -21,13 +21,7 @@ def eliminate(
     right_sides: Sequence[Sequence[sp.Expr]],
     pivots: Pivots,
 ) -> list[list[sp.Expr]]:
-    """Solve matrix x = right_side for several right sides by elimination with the given pivots.
-
-    Returns
-    -------
-    list of list
-        The n unknowns of each right side, all intermediate results named on the tape.
-    """
+    """Solve matrix x = right_side for several right sides by elimination with the given pivots."""
     a = [[sp.sympify(e) for e in row] for row in matrix]
     b = [[sp.sympify(e) for e in right_side] for right_side in right_sides]
     rows, columns = list(range(len(a))), list(range(len(a)))
@@ -64,21 +58,9 @@ def eliminate_symmetric(
 ) -> list[sp.Expr]:
     """Solve matrix x = right_side for a symmetric positive definite matrix by sparse L D L^T.
 
-    Parameters
-    ----------
-    order
-        Order of elimination.  Unknowns that couple to few others come first: eliminating them
-        leaves the Schur complement of the rest.
-
-    Returns
-    -------
-    list of sympy.Expr
-        The n unknowns, all intermediate results named on the tape.
-
-    Notes
-    -----
-    No pivot can vanish, whatever the order: Golub and Van Loan, *Matrix Computations* (4th ed.,
-    Johns Hopkins 2013), section 4.2.
+    In the order of elimination unknowns that couple to few others come first: eliminating them
+    leaves the Schur complement of the rest.  No pivot can vanish, whatever the order: Golub and Van
+    Loan, *Matrix Computations* (4th ed., Johns Hopkins 2013), section 4.2.
     """
     a = {
         (j, k): sp.sympify(matrix[j][k])

@@ -13,21 +13,12 @@ from vehiclemor.symbolic.tape import Tape
 
 @dataclass(frozen=True)
 class Rate:
-    """Rate of a joint coordinate, and its derivative as a linear function of others.
+    """Rate of a joint coordinate, and its derivative as a linear function of others."""
 
-    Attributes
-    ----------
-    value
-        The rate.
-    columns
-        Number of a speed -> factor of its derivative in the derivative of this rate.
-    bias
-        Derivative of this rate where those of all speeds are zero.
-    """
-
-    value: sp.Expr
+    value: sp.Expr  # The rate.
+    # Number of a speed -> factor of its derivative in the derivative of this rate.
     columns: Mapping[int, sp.Expr]
-    bias: sp.Expr
+    bias: sp.Expr  # Derivative of this rate where those of all speeds are zero.
 
 
 def free_rate(number: int, speed: sp.Expr) -> Rate:
@@ -44,10 +35,7 @@ def along(rate: Rate, direction: Vector) -> Motion:
 def successive(tape: Tape, rates: Sequence[Rate], axes: Sequence[Vector]) -> Motion:
     """Rotation about several axes, each carried by those before it, such as Euler angles.
 
-    Parameters
-    ----------
-    axes
-        Unit axes in their present directions, components in the frame.
+    Unit axes stand in their present directions, as components in the frame.
     """
     value, bias = ZERO, ZERO
     columns: dict[int, Vector] = {}
@@ -64,10 +52,7 @@ def successive(tape: Tape, rates: Sequence[Rate], axes: Sequence[Vector]) -> Mot
 def carried(tape: Tape, base: Motion, rotation: Motion, lever: Vector) -> Motion:
     """Motion of a point of a body, from that of another of its points and from its rotation.
 
-    Parameters
-    ----------
-    lever
-        From the other point to this one.
+    The lever leads from the other point to this one.
     """
     turn = rotation.value
     swept = g.named(tape, turn.cross(lever))

@@ -25,100 +25,56 @@ UNIT = g.vector((1, 0, 0)), g.vector((0, 1, 0)), g.vector((0, 0, 1))
 
 @dataclass(frozen=True)
 class Motion:
-    """A velocity that is linear in the speeds.
+    """A velocity that is linear in the speeds."""
 
-    Attributes
-    ----------
-    value
-        The velocity.
-    columns
-        Number of a speed -> partial velocity; speeds without influence are left out.
-    bias
-        Its rate of change in the inertial frame where the derivatives of all speeds are zero.
-    """
-
-    value: Vector
+    value: Vector  # The velocity.
+    # Number of a speed -> partial velocity; speeds without influence are left out.
     columns: Mapping[int, Vector]
+    # Its rate of change in the inertial frame where the derivatives of all speeds are zero.
     bias: Vector
 
 
 @dataclass(frozen=True)
 class Rotor:
-    """A body of revolution that spins in another body, to which its mass and tensor are counted.
+    """A body of revolution that spins in another body, to which its mass and tensor are counted."""
 
-    Attributes
-    ----------
-    number, speed
-        Number of its speed, and the speed: the spin relative to the body in rad/s.
-    axis
-        Unit axis, fixed in the body.
-    inertia
-        Moment of inertia about the axis in kg m^2.
-    moment
-        Applied moment about the axis in N m.
-    """
-
+    # Number of its speed, and the speed: the spin relative to the body in rad/s.
     number: int
     speed: sp.Expr
-    axis: Vector
-    inertia: sp.Expr
-    moment: sp.Expr
+    axis: Vector  # Unit axis, fixed in the body.
+    inertia: sp.Expr  # Moment of inertia about the axis in kg m^2.
+    moment: sp.Expr  # Applied moment about the axis in N m.
 
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body or point mass with its resultant loads.
+    """A rigid body or point mass with its resultant loads."""
 
-    Attributes
-    ----------
-    mass
-        Mass in kg.
-    centre
-        Motion of the centre of mass.
-    force
-        Resultant applied force, gravity included, in N.
-    rotation
-        Angular velocity; its `bias` is the rate of the angular momentum about the centre of mass
-        where the derivatives of all speeds are zero.  None for a point mass.
-    inertia
-        Tensor about the centre of mass (three rows) in kg m^2.
-    moment
-        Resultant applied moment about the centre of mass in N m; that on a rotor included.
-    rotor
-        What spins in it.
-    acceleration
-        Angular acceleration where the derivatives of all speeds are zero; a rotor needs it.
-    """
-
-    mass: sp.Expr
-    centre: Motion
-    force: Vector
+    mass: sp.Expr  # Mass in kg.
+    centre: Motion  # Motion of the centre of mass.
+    force: Vector  # Resultant applied force, gravity included, in N.
+    # Angular velocity; its `bias` is the rate of the angular momentum about the centre of mass
+    # where the derivatives of all speeds are zero.  None for a point mass.
     rotation: Motion | None = None
-    inertia: Tensor | None = None
+    inertia: Tensor | None = None  # Tensor about the centre of mass (three rows) in kg m^2.
+    # Resultant applied moment about the centre of mass in N m; that on a rotor included.
     moment: Vector = ZERO
-    rotor: Rotor | None = None
+    rotor: Rotor | None = None  # What spins in it.
+    # Angular acceleration where the derivatives of all speeds are zero; a rotor needs it.
     acceleration: Vector | None = None
 
 
 @dataclass(frozen=True)
 class MovingFrame:
-    """A body-fixed frame; its origin's velocity and its angular velocity are speeds themselves.
+    """A body-fixed frame; its origin's velocity and its angular velocity are speeds themselves."""
 
-    Attributes
-    ----------
-    velocity, angular_velocity
-        Components in the frame.
-    first
-        Number of the first of its six speeds.
-    acceleration
-        Acceleration of the origin where the derivatives of all speeds are zero; None where the
-        first three speeds are the components of its velocity in this frame.  Gravity can be
-        counted here, as an acceleration upwards.
-    """
-
+    # Components in the frame.
     velocity: Vector
     angular_velocity: Vector
-    first: int
+    first: int  # Number of the first of its six speeds.
+    # Acceleration of the origin where the derivatives of all speeds are zero; None where the first
+    # three speeds are the components of its velocity in this frame.  Gravity can be counted here,
+    # as an acceleration upwards.
     acceleration: Vector | None = None
 
     def origin(self, tape: Tape) -> Motion:
@@ -129,13 +85,7 @@ class MovingFrame:
         return Motion(self.velocity, {self.first + i: UNIT[i] for i in range(3)}, bias)
 
     def point(self, tape: Tape, place: Vector, relative: Motion | None = None) -> Motion:
-        """Motion of a point at a place in the frame.
-
-        Parameters
-        ----------
-        relative
-            Motion of the point relative to the frame; its bias is the relative acceleration.
-        """
+        """Motion of a point at a place in the frame, and of its motion relative to the frame."""
         origin, turn = self.origin(tape), self.angular_velocity
         velocity = self.velocity + turn.cross(place)
         columns = dict(origin.columns)
@@ -150,13 +100,7 @@ class MovingFrame:
         return Motion(g.named(tape, velocity), columns, g.named(tape, bias))
 
     def turning(self, tape: Tape, relative: Motion) -> Motion:
-        """Angular velocity of a body that turns relative to the frame.
-
-        Parameters
-        ----------
-        relative
-            Relative angular velocity; its bias, as that of the result, is the angular acceleration.
-        """
+        """Angular velocity of a body that turns relative to the frame; biases are accelerations."""
         turn = self.angular_velocity
         columns = {self.first + 3 + i: UNIT[i] for i in range(3)} | dict(relative.columns)
         bias = turn.cross(relative.value) + relative.bias
@@ -167,13 +111,7 @@ class MovingFrame:
     ) -> Motion:
         """Rotation of a body whose inertia tensor is constant in the frame.
 
-        Parameters
-        ----------
-        inertia
-            Tensor about the centre of mass.
-        spin
-            (number of the speed, the speed, axis) of a rotation relative to the frame about an axis
-            of symmetry.
+        It may spin about an axis of symmetry: (number of the speed, the speed, axis).
         """
         turn = self.angular_velocity
         value, columns = turn, {self.first + 3 + i: UNIT[i] for i in range(3)}
@@ -188,10 +126,7 @@ class MovingFrame:
 def with_inertia(tape: Tape, inertia: Tensor, turning: Motion) -> Motion:
     """Rotation of a `Body` from its angular velocity and acceleration, see `MovingFrame.turning`.
 
-    Parameters
-    ----------
-    inertia
-        Tensor about the centre of mass, components in the frame at this moment.
+    The tensor is about the centre of mass, in components of the frame at this moment.
     """
     momentum = g.named(tape, product(inertia, turning.value))
     bias = product(inertia, turning.bias) + turning.value.cross(momentum)

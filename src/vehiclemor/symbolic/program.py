@@ -70,10 +70,6 @@ def assemble(
     results
         Function name -> (expressions, shape of the result in row-major order).
 
-    Returns
-    -------
-    Program
-
     Raises
     ------
     ValueError

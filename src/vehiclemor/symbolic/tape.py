@@ -14,9 +14,7 @@ import sympy as sp
 class Tape:
     """Ordered single-assignment list of intermediate results.
 
-    Notes
-    -----
-    Forward accumulation of derivatives: Griewank and Walther, *Evaluating Derivatives* (2nd ed.,
+    Derivatives are accumulated forwards: Griewank and Walther, *Evaluating Derivatives* (2nd ed.,
     SIAM 2008), chapter 3.
     """
 
@@ -30,18 +28,9 @@ class Tape:
         return dict(self._definitions)
 
     def let(self, expression: sp.Expr | float) -> sp.Expr:
-        """Name an intermediate result.
+        """The symbol that stands for an expression in earlier symbols and free ones.
 
-        Parameters
-        ----------
-        expression
-            Any SymPy expression in earlier symbols of the tape and free symbols.
-
-        Returns
-        -------
-        sympy.Expr
-            The symbol that stands for the expression.  Numbers, symbols and negated symbols are
-            returned as they are: a name for them would only cost a line.
+        Numbers, symbols and negated symbols stay as they are: a name would only cost a line.
         """
         expression = sp.sympify(expression)
         if expression.is_Atom:
@@ -63,20 +52,7 @@ class Tape:
     def jacobian(
         self, expressions: Sequence[sp.Expr], variables: Sequence[sp.Symbol]
     ) -> list[list[sp.Expr]]:
-        """Analytic derivatives of expressions with respect to free symbols.
-
-        Parameters
-        ----------
-        expressions
-            Expressions in symbols of the tape and free symbols, m of them.
-        variables
-            Free symbols, n of them.
-
-        Returns
-        -------
-        list of list
-            m x n derivatives, their intermediate results added to the tape.
-        """
+        """Analytic derivatives (m x n) of m expressions with respect to n free symbols."""
         derivatives: dict[sp.Symbol, dict[int, sp.Expr]] = {
             variable: {column: sp.Integer(1)} for column, variable in enumerate(variables)
         }

@@ -1,7 +1,6 @@
 """Files of the cache are checked by content, name and owner; nothing unchecked is executed."""
 
 import ast
-import errno
 import logging
 import os
 import stat
@@ -14,13 +13,10 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tests.unit import standard_problems
-from vehiclemor.codegen import cache, compiler, derivation, kernels, llvm_kernels, loops
+from vehiclemor.codegen import cache
 from vehiclemor.codegen.cache import cache_folder, fetched, once
-from vehiclemor.simulation.paths import PATH_LOOPS
 
 PACKAGE = Path(cache.__file__).parents[1]
 NAME = "kernels/some-0123.o"
@@ -176,32 +172,13 @@ def test_where_nothing_can_be_written_every_process_compiles(folder, fetch, made
     assert all("is not kept" in m for m in caplog.messages if "made again" not in m)
 
 
-def test_without_space_a_temporary_folder_keeps_what_is_made(
-    folder, fetch, made, monkeypatch, tmp_path, caplog
-):
-    written = Path.write_bytes
-
-    def full(path: Path, content: bytes) -> int:
-        if folder in path.parents:
-            raise OSError(errno.ENOSPC, "No space left on device")
-        return written(path, content)
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    for _ in range(2):
-        assert fetch() == fetch("kernels/other-0.o") == CONTENT
-    assert len(made) == 2
-    assert len(caplog.messages) == 1
-    assert len(list(tmp_path.glob("vehiclemor-*/kernels/*.o"))) == 2
-
-
 def test_the_environment_chooses_the_folder(tmp_path, monkeypatch, fetch, made):
     import platformdirs
 
     monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / "own" / name)
     monkeypatch.chdir(tmp_path)
     for chosen, expected in (("", "own/vehiclemor"), (tmp_path / "a", "a"), ("b", "b")):
-        cache._folders.cache_clear()
+        cache._folder.cache_clear()
         monkeypatch.setenv("VEHICLEMOR_CACHE", str(chosen))
         assert cache_folder() == tmp_path / expected
     # A process that goes elsewhere keeps its cache.
@@ -222,39 +199,6 @@ def test_the_cache_of_one_process_is_removed_at_its_end(tmp_path):
     )
     assert Path(ran.stdout.strip()).parent == tmp_path
     assert not Path(ran.stdout.strip()).exists()
-
-
-def test_whatever_the_package_keeps_is_checked(folder, monkeypatch, rng, caplog):
-    """Machine code of a kernel and of a loop, a derivation, digests of source."""
-    x, u = rng.uniform(size=(2, 4)), rng.uniform(size=(2, 3))
-
-    def results() -> list:
-        """What is computed by files that are loaded anew, as in another process."""
-        found = derivation.derivation("standard_problems", standard_problems.derive)
-        constants, path = np.ones(found.constants), np.full((2, 4), np.nan)
-        address, _, owner = kernels._machine.__wrapped__(found.sources["derivative"])
-        (loop,) = loops._loops.__wrapped__(PATH_LOOPS, ("kernel_path",), (), ()).values()
-        loop(x, u, np.array([address]), constants, path)
-        del owner
-        return [found, path.tolist()]
-
-    expected = results()
-    contents = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    assert {path.parent.name for path in contents} == {
-        "derivations", "kernels", "loops", "sources",
-    }  # fmt: skip
-    # What is made again takes no time here: it is what the compiler has made before.
-    again = {p.name.partition("-")[0]: whole.split(b"\n", 1)[1] for p, whole in contents.items()}
-    monkeypatch.setattr(llvm_kernels, "kernel_module", lambda kernels, _: kernels[0].name)
-    monkeypatch.setattr(compiler, "compiled_module", lambda name: again[name])
-    monkeypatch.setattr(compiler, "compiled_loops", lambda *_: again["path_loops"])
-    caplog.clear()
-    for path in 5 * list(contents):
-        path.write_bytes(flipped(contents[path], int(rng.integers(8 * len(contents[path])))))
-        assert results() == expected
-        assert [str(path) in message for message in caplog.messages] == [True]
-        assert path.read_bytes() == contents[path]
-        caplog.clear()
 
 
 def test_nothing_is_read_that_could_run_code():

@@ -3,8 +3,6 @@
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from tests.unit.kernels import batch, kernel, sincos
 from vehiclemor.codegen.elementary import TAN_3_PI_8
@@ -69,17 +67,6 @@ def test_small_angles_keep_their_relative_accuracy():
     angles = np.array([0.0, 1e-300, -1e-20, 1e-12, -3e-9, 1e-5])
     expected = np.column_stack([np.sin(angles), np.cos(angles), np.arctan(angles)])
     np.testing.assert_allclose(in_batches(angles), expected, rtol=3e-16, atol=0.0)
-
-
-@given(angle=st.floats(-1e4, 1e4))
-def test_identities_of_sine_and_cosine_hold(angle):
-    (sine, cosine), opposite, turned = one_by_one(np.array([angle, -angle, angle + np.pi / 2.0]))[
-        :, :2
-    ]
-    assert sine * sine + cosine * cosine == pytest.approx(1.0, abs=5e-16)
-    assert opposite.tolist() == pytest.approx((-sine, cosine), abs=2 * ACCURACY)
-    rounding = np.spacing(abs(angle) + 2.0)
-    assert turned.tolist() == pytest.approx((cosine, -sine), abs=rounding + 2 * ACCURACY)
 
 
 def test_lanes_do_not_disturb_each_other_and_infinite_angles_give_no_number():

@@ -1,20 +1,16 @@
 """Machine code written from a kernel's operations computes what they say."""
 
-import ctypes
 from functools import reduce
 
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from tests.oracles import complex_step
-from tests.unit.kernels import kernel, sincos
+from tests.unit.kernels import kernel
 from tests.unit.programs import precise, run
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.lowering import kernels_of
-from vehiclemor.codegen.operations import Kernel, Listing, function
+from vehiclemor.codegen.operations import Kernel, Listing
 from vehiclemor.codegen.weighted_sums import padded
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
@@ -35,41 +31,6 @@ def result_of(program: Program, values: dict[sp.Symbol, float]) -> np.ndarray:
     result = np.full(program.functions["f"].shape, np.nan)
     kernels.call("f", *arguments, constants, result)
     return result
-
-
-OPERATIONS = (
-    lambda a, b, c: a * b - c,
-    lambda a, b, _: -a + 0.5 * b,
-    lambda a, b, _: a / (2.0 + abs(b)),
-    lambda a, *_: function("sqrt", 1.0 + a * a),
-    lambda a, *_: function("exp", -abs(a)),
-    lambda a, *_: function("atan", a),
-    lambda a, b, _: function("atan2", a, 3.0 + b * b),
-    lambda a, *_: sincos(a)[1],
-    lambda a, b, c: function("select", function("<", a, b), c, b),
-)
-
-
-def random_kernel(seed: int, length: int = 60) -> Kernel:
-    rng = np.random.default_rng(seed)
-
-    def random(x, result):
-        values = [x[k] for k in range(3)]
-        for place in range(length):
-            given = (values[int(k)] for k in rng.integers(len(values), size=3))
-            values.append(OPERATIONS[int(rng.integers(len(OPERATIONS)))](*given))
-            result[place] = values[-1]
-
-    return kernel(random)
-
-
-@settings(max_examples=3, deadline=None, derandomize=True)
-@given(st.integers(0, 2**32 - 1), st.lists(st.floats(-2, 2), min_size=3, max_size=3))
-def test_random_kernels_equal_numpy(seed, numbers):
-    made, found = random_kernel(seed), np.full(60, np.nan)
-    compiled(made)(np.array(numbers), found)
-    expected = complex_step.value(made, np.array(numbers))
-    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13)
 
 
 def test_operations_as_deep_as_files_may_have_them():
@@ -158,21 +119,6 @@ def stepped(statement, size: int, x: np.ndarray, u: np.ndarray) -> np.ndarray:
 TO = ("_result", 0)
 
 
-@pytest.mark.parametrize("n", [1, 4, 7])
-def test_vectors_are_combined_and_magnitudes_added(n, rng):
-    x, u = rng.normal(size=3 * n), rng.normal(size=1)
-    (a, b, c), places = x.reshape(3, n), [("_x", k * n) for k in range(3)]
-
-    def combine(listing):
-        listing.new("combine", 2.0, listing.entry("_u", 0), -0.5, detail=(TO, n, *places))
-
-    def magnitudes(listing):
-        listing.new("magnitudes", detail=(TO, n, *places[:2]))
-
-    np.testing.assert_allclose(stepped(combine, n, x, u), 2.0 * a + u * b - 0.5 * c, rtol=1e-14)
-    np.testing.assert_array_equal(stepped(magnitudes, n, x, x), np.abs(a) + np.abs(b))
-
-
 @pytest.mark.parametrize(
     ("n", "columns"), [(4, ()), (8, (5,)), (8, (0, 2, 7)), (28, range(0, 28, 2))]
 )
@@ -184,21 +130,3 @@ def test_a_product_takes_some_columns_and_keeps_other_places(n, columns, rng):
     expected[list(kept)] += 0.25 * x[list(kept)]
     found = stepped(lambda listing: listing.new("product", detail=detail), n, x, np.append(rows, 0))
     np.testing.assert_allclose(found, expected, atol=1e-13)
-
-
-def test_a_kernel_executes_another_by_its_address():
-    signature = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 4)
-
-    def body(x, u, constants, result):
-        result[0] = x[0] + 10.0 * u[0] + 100.0 * constants[0]
-
-    inner, listing = signature(body), Listing()
-    given = ("_x", 1), ("_u", 2), ("_constants", 0), ("_result", 1)
-    listing.new("execute", detail=(("_kernels", 0), *given))
-    names = ("_x", "_u", "_constants", "_result", "_kernels")
-    address = Kernels([listing.kernel("outer", names)]).address("outer")
-    outer = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5)(address)
-    x, result = np.array([1.0, 2.0, 3.0]), np.zeros(3)
-    addresses = np.array([ctypes.cast(inner, ctypes.c_void_p).value], dtype=np.int64)
-    outer(*(array.ctypes.data for array in (x, x, x, result, addresses)))
-    assert result.tolist() == [0.0, 2.0 + 30.0 + 100.0, 0.0]

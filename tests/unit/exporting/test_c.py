@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,6 @@ from tests.unit.exporting.programs import (
     runge_kutta,
     steering,
 )
-from vehiclemor.resources import handbook_folder
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 STEP = 1e-3
@@ -98,9 +98,9 @@ def test_the_suspension_needs_no_states(drivers, kind):
     assert np.abs(rows[at, :-1] - wanted[at]).max() < 1e-12
 
 
-def test_the_program_of_the_handbook(drivers, tmp_path):
+def test_the_program_of_the_page_runs(drivers, tmp_path):
     model, driver = drivers("independent_suspension_vehicle", "reduced")
-    page = handbook_folder() / "export.md"
+    page = Path(__file__).parents[3] / "docs" / "reduced-models.md"
     (text,) = re.findall(r"```c\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     (tmp_path / "main.c").write_text(text)
     sources = [driver.parent / f"vehiclemor_{part}.c" for part in ("model", "step")]

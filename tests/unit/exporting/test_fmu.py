@@ -14,8 +14,7 @@ from tests.unit.exporting.programs import in_use, relative, runge_kutta, steerin
 from vehiclemor.exporting import fmu
 from vehiclemor.exporting.c import START_ALONE, c_files
 from vehiclemor.exporting.export import system_of
-from vehiclemor.exporting.model_description import variables
-from vehiclemor.inputs.columns import base_units
+from vehiclemor.exporting.model_description import base_units, variables
 from vehiclemor.simulation.constants import hoisted_constants
 
 fmpy = pytest.importorskip("fmpy")
@@ -139,6 +138,9 @@ def test_quantities_have_the_units_of_the_model_in_base_units(units):
     model, path = units(*CASES[0])
     described = fmpy.read_model_description(str(path))
     declared = {v.name: v.unit or "1" for v in described.modelVariables}
+    rates = [v for v in described.modelVariables if v.derivative]
+    assert [v.name for v in rates] == [f"der({v.derivative.name})" for v in rates]
+    assert len(rates) == len(model.states)
     definition = model.model.definition
     for q in (*definition.coordinates, *definition.speeds):
         assert declared[f"state.{q.name}"] == q.unit

@@ -58,18 +58,13 @@ def test_a_full_model_tells_the_parameters_of_its_function(name):
     np.testing.assert_allclose(rates, model.rhs(x, u), rtol=1e-10, atol=1e-9)
 
 
-def test_jax_over_a_batch(rng):
+def test_jax_over_a_batch_and_by_tables(rng):
     jax = pytest.importorskip("jax")
     jax.config.update("jax_enable_x64", True)
     model = in_use("independent_suspension_vehicle", "reduced")
     states, inputs = around(model, rng)
     found = jax.jit(jax.vmap(vm.export(model, "jax")))(states, inputs)
     agree([np.asarray(part) for part in found], states, model, inputs)
-
-
-def test_jax_reads_tables():
-    jax = pytest.importorskip("jax")
-    jax.config.update("jax_enable_x64", True)
     model = vm.rom("double_wishbone")
     inputs = np.array([[0.05, 0.0], [-0.02, 0.0]])
     run = model.simulate(vm.Signal.from_samples([0.0, 1.0], inputs))

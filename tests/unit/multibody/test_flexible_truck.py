@@ -10,7 +10,6 @@ import scipy.linalg
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import eigsh, splu
 
-from vehiclemor.api import describe
 from vehiclemor.exceptions import GeometryError, InputError
 from vehiclemor.multibody.flexible_truck import beams, frame, shells
 from vehiclemor.multibody.flexible_truck.definition import DEFINITION
@@ -358,10 +357,3 @@ def test_shells_without_pyfe3d_name_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyfe3d", None)
     with pytest.raises(InputError, match=r'pip install "vehiclemor\[shells\]"'):
         truck(shell_size=0.31)
-
-
-def test_the_truck_is_described():
-    shown = describe("flexible_truck")
-    assert shown["kind"].startswith("structural: ")
-    assert shown["starts"] == ["equilibrium"]
-    assert len(shown["ports"]) == 12

@@ -106,42 +106,6 @@ def test_the_design_position_is_at_rest_for_any_vehicle(given_values, factors, s
     assert max(abs(found[f"slip_ratio_{wheel}"]) for wheel in WHEELS) < 1e-14
 
 
-def test_the_equilibrium_is_where_the_vehicle_comes_to_rest():
-    """Not only at rest: pushed out of it, weight and springs bring it back."""
-    model = built()
-    x = model.start()
-    for place, push in ((2, 1e-4), (4, 1e-4), (20, 1e-4), (21, 1e-4)):
-        for sign in (1.0, -1.0):
-            pushed = x.copy()
-            pushed[place] += sign * push
-            assert sign * model.rhs(pushed, REST)[N + place] < 0.0
-
-
-def test_a_stiffer_spring_has_the_same_preload(given_values):
-    """Statics alone sets what it carries; beyond that it resists in proportion to its stiffness."""
-    for end, arm in (("front", 10), ("rear", 20)):
-        stands, bent = [], []
-        for factor in (0.5, 1.0, 2.0):
-            model = built(**{f"{end}_stiffness": factor * float(given_values[f"{end}_stiffness"])})
-            x = model.start()
-            stands.append(model.descriptor(x, REST)[1])
-            x[arm] += 0.05
-            bent.append(model.descriptor(x, REST)[1][arm])
-        assert np.ptp(stands, axis=0).max() < 1e-9 * np.abs(stands[0]).max()
-        assert bent[2] - bent[1] == pytest.approx(2.0 * (bent[1] - bent[0]), rel=1e-9)
-        assert bent[2] < bent[1] - 100.0
-
-
-def test_a_vehicle_that_is_dropped_from_above_the_road_falls_freely(given_values):
-    model = built(drop_height=0.2, drop_pitch=0.0)
-    lifted = model.start("dropped")
-    found = outputs(model, lifted)
-    assert [found[f"Fz_{wheel}"] for wheel in WHEELS] == [0.0] * 4
-    mass, accelerations = model.descriptor(lifted, REST)[0], model.rhs(lifted, REST)[N:]
-    weight = statics(given_values)[0] * given_values["gravity"]
-    assert mass[2] @ accelerations == pytest.approx(-weight, rel=1e-12)
-
-
 # Vehicles that can't stand
 
 

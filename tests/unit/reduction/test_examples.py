@@ -23,10 +23,10 @@ def cars(request):
 
 
 def test_one_driver_drives_the_full_and_the_reduced_car(cars):
-    change, speed = example("double_lane_change"), 80.0 / 3.6
+    change = example("double_lane_change")
     _, full = cars
-    start = vm.model(full.model.name, parameters={"initial_speed": speed}).start()
-    (found, known), (expected, _) = (change.drive(car, start, speed) for car in cars)
+    start = vm.model(full.model.name, parameters={"initial_speed": change.SPEED}).start()
+    (found, known), (expected, _) = (change.drive(car, start) for car in cars)
     x, y, yaw = (full.output_names.index(name) for name in change.SEEN)
     lanes = np.array([change.lane(place) for place in expected[:, x]])
     # The driver follows: in the lanes to half a meter, from one to the other and back.
@@ -39,23 +39,20 @@ def test_one_driver_drives_the_full_and_the_reduced_car(cars):
     assert known < 1.0
 
 
-def test_a_coupling_has_order_two():
-    coupled = example("steering_cosimulation")
-    reduced = vm.rom(CARS[0])
-    full = vm.reduce(reduced.model, "full_order")
-    steps, y = (0.04, 0.02, 0.01), full.output_names.index("lateral_position")
-    coarse, middle, fine = (coupled.drive(full, step, 2.0) for step in steps)
-    first = np.abs(coarse - middle[::2]).max(axis=0)[[y, -1]]
-    second = np.abs(middle - fine[::2]).max(axis=0)[[y, -1]]
-    assert np.all(first / second > 3.0)
-    off = np.abs(coupled.drive(reduced, 0.01, 2.0) - fine).max(axis=0)
-    assert off[y] < 5e-3
-    assert off[-1] < 5e-4
+def test_hard_points_are_an_optimum_within_bounds_that_the_path_map_finds():
+    design = example("hard_points")
+    place, found = (design.hard_points(method) for method in ("full_order", "path_map"))
+    np.testing.assert_allclose(found, place, atol=1e-7)
+    slope = design.off(place, "full_order") @ design.slopes(place, "full_order")
+    at = np.sign(place) * (np.abs(place) > design.LARGEST * (1.0 - 1e-4))
+    assert 0 < np.count_nonzero(at) < len(at)
+    assert np.abs(slope[at == 0]).max() < 1e-4 * np.abs(slope).max()
+    assert (slope[at != 0] * at[at != 0] < 0.0).all()
 
 
 @pytest.fixture(scope="module")
 def control():
-    return SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / "predictive_control.py")))
+    return example("predictive_control")
 
 
 @pytest.fixture(scope="module")

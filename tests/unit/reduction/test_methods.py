@@ -14,9 +14,6 @@ from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 
-# Masoudi et al. (2015): RMS errors of spindle y (m) and second Euler angle (rad), r = 3.
-PUBLISHED = np.array([7.57e-5, 2.4e-5])
-
 
 def test_least_squares_is_near_the_projection_floor_and_falls_with_the_rank(model, nominal, full):
     errors = []
@@ -54,40 +51,12 @@ def test_full_rank_equals_full_order(model, rng, galerkin):
     )
 
 
-def test_bases_of_the_nominal_run_fail_at_another_frequency(model, nominal):
-    faster = nominal.perturbed(frequency=2.0)
-    reference = model.simulate(faster)
-
-    def errors(policy, rank):
-        reduced = fitted(model, faster, "pod", policy, rank=rank)
-        return figure_errors(model, reduced.simulate(faster, model.starts[0]).outputs, reference)
-
-    # Figure 14: three coordinates fail, as many as the snapshots have directions follow.
-    assert np.all(errors("nominal", 3) > [1.0, 10.0] * PUBLISHED)
-    assert np.all(errors("nominal", 4) < PUBLISHED)
-    # It is the training that fails, not the number of coordinates.
-    assert np.all(errors("matched", 3) < 0.1 * errors("nominal", 3))
-
-
 def test_fixed_basis_is_pod_with_one_control_period(model, nominal):
     one = fitted(model, nominal, "fixed_basis", snapshots=20, rank=3)
     same = fitted(model, nominal, "pod", snapshots=20, rank=3, control_period=10.0)
     assert len(one.bases) == len(same.bases) == 1
     runs = [reduced.simulate(nominal, model.starts[0]) for reduced in (one, same)]
     np.testing.assert_array_equal(runs[0].coordinates, runs[1].coordinates)
-
-
-def test_replay_returns_its_training_run(model, nominal, full):
-    replay = fitted(model, nominal, "replay", "nominal")
-    for maneuver in (nominal, nominal.perturbed(2.0, 0.5), component("maneuver", "chirp_travel")):
-        run = replay.simulate(maneuver, model.starts[0])
-        np.testing.assert_array_equal(run.coordinates, full.coordinates)
-        np.testing.assert_array_equal(run.outputs, full.outputs)
-        assert set(run.counts.values()) == {0}
-        assert run.seconds == 0.0
-        np.testing.assert_array_equal(run.inputs, maneuver.at(maneuver.times))
-    assert replay.order == 0
-    assert replay.best_approximation(full.states) is None
 
 
 def test_offline_cost_counts_the_training_simulations(model, nominal):
@@ -123,13 +92,6 @@ def test_iteration_that_fails_is_a_result(model, nominal):
     assert "singular at t = 0 s" in run.message
     assert np.isnan(run.coordinates).all()
     assert np.isnan(run.outputs[:, 0]).all()
-
-
-def test_run_is_exact_at_any_times(model, nominal, full):
-    [run] = training_runs(model, nominal)
-    some = np.array([3, 250, 250, 700, 1000])
-    history = run.at(nominal.times[some])
-    np.testing.assert_allclose(history.coordinates, full.coordinates[some], rtol=0, atol=1e-13)
 
 
 def test_a_run_has_the_histories_of_its_trajectory(model, nominal):

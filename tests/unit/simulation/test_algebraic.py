@@ -25,34 +25,6 @@ def test_height_out_of_reach_names_both_limits(model, height):
     assert f"{height:.5g} m" in str(error.value)
 
 
-def test_reach_depends_on_the_rack(model):
-    # At the lower limit it is the tie rod that stops the wheel.
-    (straight, _), (steered, _) = model.reach(0.0), model.reach(-0.05)
-    assert steered > straight + 1e-3
-    low = (steered + straight) / 2.0
-    model.solve([low, 0.0])
-    for beyond, named in (([low, -0.05], r"rack at -0\.05 m"), ([0.0, 0.5], "reach")):
-        with pytest.raises(UnreachableError, match=named):
-            model.solve(beyond)
-    # Each height of a path is compared with the limits at its own rack.
-    times = np.linspace(0.0, 1.0, 201)
-    heights = low * np.sin(np.pi * np.minimum(2.0 * times, 1.0))
-    racks = -0.05 * np.maximum(2.0 * times - 1.0, 0.0)
-    assert model.solve_path(times, np.column_stack([heights, racks])).status == "ok"
-
-
-@pytest.mark.parametrize("solver", ["newton", "newton_lanes"])
-def test_sudden_jumps_of_the_input_stay_on_the_branch(model, solver):
-    low, high = model.reach()
-    stops = 0.99 * np.array([high, low, high, 0.0])
-    inputs = np.column_stack([stops, np.zeros(4)])
-    jumps = model.solve_path(np.arange(4.0), inputs, solver).coordinates
-    for stop, q in zip(stops, jumps, strict=True):
-        way = np.column_stack([np.linspace(0.0, stop, 2001), np.zeros(2001)])
-        slow = model.solve_path(np.arange(2001.0), way).coordinates[-1]
-        np.testing.assert_allclose(q, slow, rtol=0, atol=1e-9)
-
-
 def test_newton_converges_quadratically(full):
     counts = full.counts
     # Three iterations a sample, the last of which only confirms.
@@ -165,11 +137,3 @@ def test_wrong_arguments_are_named(model, call, arguments, named):
 def test_what_is_of_no_mechanism_is_refused(model, nominal, wrong, named):
     with pytest.raises(InputError, match=named):
         model.simulate(**({"maneuver": nominal} | wrong))
-
-
-def test_strided_arguments_are_read_rightly(model, rng):
-    table, u = rng.uniform(-0.5, 0.5, (8, 3)), [0.05, 0.0]
-    column = table[:, 1]
-    assert not column.flags.c_contiguous
-    for given in (column, list(column)):
-        np.testing.assert_array_equal(model.residual(given, u), model.residual(column.copy(), u))

@@ -166,14 +166,6 @@ def test_points_are_parameters_by_run():
     np.testing.assert_array_equal(found["values"][1], other.outputs)
 
 
-def test_a_car_that_there_is_not_is_rejected_alone(full):
-    signals = vm.many_signals(TIMES, steering(2))
-    cars = [{}, {"roll_inertia": 9e3}]
-    found = vm.simulate_many(full, signals, parameters=cars, **KEPT)
-    assert found.status.values.tolist() == ["ok", "rejected"]
-    assert "moments of inertia" in found.message.item(1)
-
-
 STATE = [0.0] * 27
 
 

@@ -46,8 +46,7 @@ def test_all_models_run_in_the_same_loop_and_need_two_kernels(standard, vehicle,
     for model, given in ((standard(), QUIET), (vehicle, STRAIGHT)):
         compiled.clear()
         model.simulate(given, times=np.array([0.1]), solver=solver, tolerance=1e-3)
-        whole_steps = model.system.whole_steps(solver)
-        found.append(catalogue.time_loop(INTEGRATORS[solver], "full", whole_steps))
+        found.append(catalogue.time_loop(INTEGRATORS[solver], "full"))
     assert found[0] is found[1]
     # Neither the mass matrix nor the equations before elimination.
     needed = {"derivative", "outputs"}
@@ -93,6 +92,14 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
         function(model.start())
 
 
+def test_equations_that_lack_a_function_make_no_model(standard):
+    model = standard()
+    sources = {k: v for k, v in model.equations.sources.items() if k != "outputs"}
+    lacking = replace(model, equations=replace(model.equations, sources=sources))
+    with pytest.raises(InputError, match="its equations have no outputs"):
+        build.reparametrised(lacking, {})
+
+
 # Borders
 
 
@@ -107,13 +114,6 @@ def test_a_run_that_ends_at_once_is_its_start(vehicle, solver, end):
 def test_a_start_with_rates_that_are_not_finite_says_so(vehicle, solver):
     with pytest.raises(ConvergenceError, match=r"a state is not finite at t = 0 s"):
         vehicle.simulate(STRAIGHT, np.full(52, 1e200), solver=solver)
-
-
-def test_the_system_refuses_what_its_machine_code_would_read_beyond(standard):
-    system = standard().system
-    for x, u in ((np.zeros(3), np.zeros(3)), (np.zeros(4), np.zeros(1)), (np.zeros(4), 0.0)):
-        with pytest.raises(InputError, match="x and u have shapes"):
-            system.jacobian(x, u)
 
 
 def test_a_kernel_that_is_not_there_is_never_called(standard):

@@ -1,7 +1,5 @@
 """What is handed to compiled loops along a path is checked, for every model and every method."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -73,15 +71,6 @@ def test_times_and_starts_that_are_none_are_refused(each_model, argument, wrong,
     maneuver = component("maneuver", each_model.definition.maneuver)
     with pytest.raises(InputError, match=named):
         each_model.simulate(maneuver, **{argument: wrong})
-
-
-@pytest.mark.parametrize("method", ["pod", "path_map", "full_order"])
-def test_reduced_mechanisms_check_their_inputs(model, nominal, method):
-    reduced = fitted(model, nominal, method)
-    steering = component("maneuver", "lane_change")
-    for maneuver in (steering, replace(nominal, signal=lambda t, *_: np.zeros((len(t), 1)))):
-        with pytest.raises(InputError, match=r"delta|shape"):
-            reduced.simulate(maneuver, "equilibrium")
 
 
 def test_a_reduced_mechanism_that_diverges_tells_its_counts(model, nominal):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.exceptions import ConvergenceError, InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 
 DYNAMIC = ("independent_suspension_vehicle", "high_fidelity_vehicle")
@@ -44,15 +44,6 @@ def test_one_output_is_that_of_all(name, solver):
     np.testing.assert_array_equal(one["yaw"], one.outputs[:, one.names.index("yaw")])
 
 
-def test_what_is_read_late_is_of_its_own_run():
-    name, sizes = "independent_suspension_vehicle", (1.0, 0.5)
-    known = [run(name, amplitude=size).outputs for size in sizes]
-    assert not np.array_equal(*known)
-    late = [run(name, amplitude=size) for size in sizes]
-    for found, expected in zip(late, known, strict=True):
-        np.testing.assert_array_equal(found.outputs, expected)
-
-
 def test_copies_hold_the_same_histories():
     kept = run("independent_suspension_vehicle")
     for copy in (pickle.loads(pickle.dumps(kept)), replace(kept, remark="seen")):  # noqa: S301
@@ -69,18 +60,3 @@ def test_an_unknown_output_is_refused():
 def test_a_run_is_no_sequence():
     with pytest.raises(TypeError):
         list(run("independent_suspension_vehicle"))
-
-
-def test_from_where_a_run_has_left_the_model_on_there_are_no_numbers():
-    model = vm.model("independent_suspension_vehicle")
-    wild = component("maneuver", "lane_change").perturbed(1.0, 8.0)
-    with pytest.raises(ConvergenceError) as caught:
-        model.simulate(wild, solver="ros34pw2", tolerance=1e-4)
-    found = caught.value.trajectory
-    finite = np.isfinite(found.states).all(axis=1)
-    left = int(finite.argmin())
-    assert 0 < left < len(finite)
-    assert f"{found.times[left]:.6g} s" in found.message
-    assert not finite[left:].any()
-    assert np.isnan(found["yaw"][left:]).all()
-    assert np.isfinite(found["yaw"][:left]).all()

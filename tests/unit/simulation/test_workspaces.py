@@ -119,7 +119,7 @@ def test_limits_are_watched_between_the_points_of_a_step(rng):
         # The state itself, and what the kernel makes of it.
         outputs_of = Outputs(address, np.zeros(1), np.array([0, -2]), ranges)
         run = states, np.zeros((6, 1)), places, outputs_of, np.empty((6, 2))
-        first, result = np.empty(2, dtype=np.int64), cache_lines(43, 8)[0]
+        first, result = np.empty(2, dtype=np.int64), cache_lines(43, 8)
         path_loops()["watched"](*run, first)
         table = np.zeros((6, 8))
         table[:, :3] = states * [1.0, 1.0, -1.0]

@@ -98,20 +98,14 @@ def in_coordinates(
     tape: Tape,
     chassis: Attitude,
     nu: Sequence[sp.Expr],
+    # M and F of M d(nu)/dt = F, the chassis speeds first; the others are rates of coordinates.
     mass: Sequence[Sequence[sp.Expr]],
     force: Sequence[sp.Expr],
+    # What d(nu)/dt has in its first three entries where X, Y, Z have no second derivatives; by
+    # default that of chassis components, which turn with the chassis.
     velocity_bias: Vector | None = None,
 ) -> list[sp.Expr]:
-    """Second-order form M_q q'' = F_q, row by row: n entries of M_q, then F_q.
-
-    Parameters
-    ----------
-    mass, force
-        M and F of M d(nu)/dt = F, the chassis speeds first; the others are rates of coordinates.
-    velocity_bias
-        What d(nu)/dt has in its first three entries where X, Y, Z have no second derivatives;
-        by default that of chassis components, which turn with the chassis.
-    """
+    """Second-order form M_q q'' = F_q, row by row: n entries of M_q, then F_q."""
     linear, angular = _speeds_per_rates(chassis)
     # nu = P q', so that d(nu)/dt = P q'' + bias and P^T (M P q'' + M bias - F) = 0.
     turning = g.vector(nu[3:6])
@@ -144,22 +138,15 @@ def in_coordinates(
 
 @dataclass(frozen=True)
 class Contact:
-    """Wheel on the road, chassis components.
+    """Wheel on the road, chassis components."""
 
-    Attributes
-    ----------
-    height, rise
-        Height of the wheel centre above the road in m and its rate in m/s.
-    heading, leftward
-        Unit vectors along and across the wheel in the road plane.
-    slip_ratio, slip_angle, cos_slip_angle
-        kappa, alpha in rad (sliding to the left is positive), cos alpha.
-    """
-
+    # Height of the wheel centre above the road in m and its rate in m/s.
     height: sp.Expr
     rise: sp.Expr
+    # Unit vectors along and across the wheel in the road plane.
     heading: Vector
     leftward: Vector
+    # kappa, alpha in rad (sliding to the left is positive), cos alpha.
     slip_ratio: sp.Expr
     slip_angle: sp.Expr
     cos_slip_angle: sp.Expr
@@ -168,26 +155,16 @@ class Contact:
 def contact(
     tape: Tape,
     chassis: Attitude,
-    height: sp.Expr,
+    height: sp.Expr,  # Height of the chassis origin above the road.
+    # Wheel centre and spin axis in the chassis frame.
     place: Vector,
     axle: Vector,
+    # Velocity of the wheel centre and complete angular velocity of the wheel.
     velocity: Vector,
     rotation: Vector,
-    slip_speed: sp.Expr,
+    slip_speed: sp.Expr,  # Speed (m/s) below which slip is regularised.
 ) -> Contact:
-    """Contact of a rigid wheel whose effective radius is the height of its centre.
-
-    Parameters
-    ----------
-    height
-        Height of the chassis origin above the road.
-    place, axle
-        Wheel centre and spin axis in the chassis frame.
-    velocity, rotation
-        Velocity of the wheel centre and complete angular velocity of the wheel.
-    slip_speed
-        Speed (m/s) below which slip is regularised.
-    """
+    """Contact of a rigid wheel whose effective radius is the height of its centre."""
     up = chassis.road_normal
     above = tape.let(height + tape.let(up @ place))
     along = g.named(tape, axle.cross(up))

@@ -17,25 +17,15 @@ from vehiclemor.symbolic.tape import Tape
 
 @dataclass(frozen=True)
 class TiltedContact:
-    """Wheel on the road, chassis components.
+    """Wheel on the road, chassis components."""
 
-    Attributes
-    ----------
-    arm
-        From the wheel centre to the contact point in m.
-    heading, leftward, up
-        Unit vectors along and across the wheel in the road's plane, and its normal.
-    load
-        Vertical force in N, not negative.
-    slip_ratio, tan_slip
-        kappa and the tangent of the slip angle (sliding to the left is positive).
-    """
-
-    arm: Vector
+    arm: Vector  # From the wheel centre to the contact point in m.
+    # Unit vectors along and across the wheel in the road's plane, and its normal.
     heading: Vector
     leftward: Vector
     up: Vector
-    load: sp.Expr
+    load: sp.Expr  # Vertical force in N, not negative.
+    # kappa and the tangent of the slip angle (sliding to the left is positive).
     slip_ratio: sp.Expr
     tan_slip: sp.Expr
 
@@ -49,31 +39,16 @@ class TiltedContact:
 
 def tilted_contact(
     tape: Tape,
-    up: Vector,
-    height: sp.Expr,
-    axle: Vector,
+    up: Vector,  # Road normal.
+    height: sp.Expr,  # Height of the wheel centre above the road.
+    axle: Vector,  # Unit spin axis.
+    # Velocity of the wheel centre, angular velocity of the carrier without the spin.
     velocity: Vector,
     turning: Vector,
-    spin: sp.Expr,
-    p: Mapping[str, sp.Expr],
+    spin: sp.Expr,  # Spin of the wheel on its carrier in rad/s.
+    p: Mapping[str, sp.Expr],  # `tire_radius`, `tire_stiffness`, `tire_damping`, `slip_speed`.
 ) -> TiltedContact:
-    """Contact of a wheel with camber.
-
-    Parameters
-    ----------
-    up
-        Road normal.
-    height
-        Height of the wheel centre above the road.
-    axle
-        Unit spin axis.
-    velocity, turning
-        Velocity of the wheel centre, angular velocity of the carrier without the spin.
-    spin
-        Spin of the wheel on its carrier in rad/s.
-    p
-        `tire_radius`, `tire_stiffness`, `tire_damping`, `slip_speed`.
-    """
+    """Contact of a wheel with camber."""
     let = tape.let
     across = g.named(tape, axle.cross(up))
     # The length of axle x up is the cosine of the camber angle.
@@ -102,13 +77,7 @@ def tilted_contact(
 
 
 def vertical_load(tape: Tape, radius: sp.Expr, rate: sp.Expr, p: Mapping[str, sp.Expr]) -> sp.Expr:
-    """Vertical force of a wheel that pushes and never pulls, from its loaded radius and the rate.
-
-    Parameters
-    ----------
-    p
-        `tire_radius`, `tire_stiffness`, `tire_damping`.
-    """
+    """Vertical force of a wheel that pushes and never pulls, from its loaded radius and rate."""
     let = tape.let
     pressed = let(p["tire_radius"] - radius)
     elastic = let(let(p["tire_stiffness"] / 2) * (pressed + sp.Abs(pressed)))

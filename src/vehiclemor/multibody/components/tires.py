@@ -48,27 +48,17 @@ def tire_outputs(
 
 def magic_formula(
     tape: Tape,
-    coefficients: Mapping[str, sp.Expr],
+    coefficients: Mapping[str, sp.Expr],  # `MAGIC_FORMULA` name -> value.
+    # Vertical force and F_z0 in N.
     load: sp.Expr,
     reference_load: sp.Expr,
-    radius: sp.Expr,
+    radius: sp.Expr,  # Unloaded radius in m.
+    # kappa, alpha in rad, and cos alpha.
     slip_ratio: sp.Expr,
     slip_angle: sp.Expr,
     cos_slip_angle: sp.Expr,
 ) -> TireForces:
-    """Forces at combined slip; zero where the load is zero.
-
-    Parameters
-    ----------
-    coefficients
-        `MAGIC_FORMULA` name -> value.
-    load, reference_load
-        Vertical force and F_z0 in N.
-    radius
-        Unloaded radius in m.
-    slip_ratio, slip_angle, cos_slip_angle
-        kappa, alpha in rad, and cos alpha.
-    """
+    """Forces at combined slip; zero where the load is zero."""
     c, let = coefficients, tape.let
     d = let((load - reference_load) / reference_load)
     kappa, alpha = slip_ratio, slip_angle
@@ -116,8 +106,9 @@ def _arc(tape: Tape, x: sp.Expr, curvature: sp.Expr) -> sp.Expr:
 
 def fiala(
     tape: Tape,
-    coefficients: Mapping[str, sp.Expr],
-    load: sp.Expr,
+    coefficients: Mapping[str, sp.Expr],  # `FIALA` name -> value.
+    load: sp.Expr,  # Vertical force in N.
+    # kappa, and the tangent of the slip angle.
     slip_ratio: sp.Expr,
     tan_slip: sp.Expr,
 ) -> TireForces:
@@ -125,15 +116,6 @@ def fiala(
 
     Each force grows with its own slip until the contact slides; the slips act on each other through
     the friction coefficient alone.
-
-    Parameters
-    ----------
-    coefficients
-        `FIALA` name -> value.
-    load
-        Vertical force in N.
-    slip_ratio, tan_slip
-        kappa, and the tangent of the slip angle.
     """
     c, let = coefficients, tape.let
     combined = let(sp.sqrt(let(slip_ratio**2 + tan_slip**2)))

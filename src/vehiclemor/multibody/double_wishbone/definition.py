@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.double_wishbone import quantities
-from vehiclemor.multibody.double_wishbone.points import POINTS, design_coordinates
+from vehiclemor.multibody.double_wishbone.points import JOINTS, design_coordinates
+from vehiclemor.multibody.quantities import declared
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -30,12 +30,8 @@ DEFINITION = ModelDefinition(
     kind="ae",
     summary="double-wishbone suspension, kinematics, 8 joint coordinates (algebraic equations)",
     maneuver="sine_travel",
-    coordinates=quantities.COORDINATES,
-    inputs=quantities.INPUTS,
-    outputs=quantities.OUTPUTS,
-    equations=quantities.EQUATIONS,
-    joints=quantities.JOINTS,
-    parameters=POINTS,
+    **declared("double_wishbone"),
+    joints=JOINTS,
     derive=derive,
     design_coordinates=design_coordinates,
     # Beyond what a steering does (wheels turn by 0.7 rad, racks move by 0.08 m), and before the

@@ -4,8 +4,9 @@ from typing import cast
 
 import sympy as sp
 
-from vehiclemor.multibody.double_wishbone import linkage, quantities
-from vehiclemor.multibody.double_wishbone.points import POINTS
+from vehiclemor.multibody.double_wishbone import linkage
+from vehiclemor.multibody.double_wishbone.points import JOINTS
+from vehiclemor.multibody.quantities import declared
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.elimination import eliminate
 from vehiclemor.symbolic.program import Program, assemble
@@ -14,15 +15,17 @@ from vehiclemor.symbolic.tape import Tape
 # Pivots (equation, coordinate) of the Newton step, by Markowitz' rule at the design position.
 PIVOTS = ((7, 7), (3, 5), (5, 6), (2, 4), (6, 3), (1, 2), (0, 1), (4, 0))
 
+DECLARED = declared("double_wishbone")
+
 
 def derive() -> Program:
     """Derive residual, analytic Jacobian and outputs; the hard points stay symbols."""
     tape = Tape()
-    q = sp.symbols([c.name for c in quantities.COORDINATES], real=True)
-    u = sp.symbols([i.name for i in quantities.INPUTS], real=True)
+    q = sp.symbols([c.name for c in DECLARED["coordinates"]], real=True)
+    u = sp.symbols([i.name for i in DECLARED["inputs"]], real=True)
     points = {
         name: g.vector(sp.symbols([f"{name}_{axis}" for axis in "xyz"], real=True))
-        for name in POINTS
+        for name in DECLARED["parameters"]
     }
     position = _positions(tape, q, points)
 
@@ -37,7 +40,7 @@ def derive() -> Program:
     outputs = [centre[0], centre[1], q[1], sp.atan2(-axle[0], axle[1]), sp.asin(axle[2]), q[7]]
     (step,) = eliminate(tape, jacobian, [residual], PIVOTS)
     augmented = [e for row, phi in zip(jacobian, residual, strict=True) for e in [*row, phi]]
-    n = len(quantities.COORDINATES)
+    n = len(DECLARED["coordinates"])
     return assemble(
         tape,
         {"q": q, "u": u},
@@ -46,10 +49,10 @@ def derive() -> Program:
             "residual": (residual, (n,)),
             "residual_jacobian": (augmented, (n, n + 1)),
             "newton_step": (step, (n,)),
-            "outputs": (outputs, (len(quantities.OUTPUTS),)),
+            "outputs": (outputs, (len(DECLARED["outputs"]),)),
             "joints": (
-                [c for name in quantities.JOINTS for c in position[name]],
-                (len(quantities.JOINTS), 3),
+                [c for name in JOINTS for c in position[name]],
+                (len(JOINTS), 3),
             ),
         },
     )

@@ -16,19 +16,12 @@ from vehiclemor.symbolic.tape import Tape
 
 @dataclass(frozen=True)
 class Arm:
-    """Control arm that turns about the axis from its rear to its front pivot.
+    """Control arm that turns about the axis from its rear to its front pivot."""
 
-    Attributes
-    ----------
-    rear, front
-        Pivots on the chassis.
-    angle
-        Rotation from the design position.
-    """
-
+    # Pivots on the chassis.
     rear: g.Vector
     front: g.Vector
-    angle: g.Angle
+    angle: g.Angle  # Rotation from the design position.
 
     def axis(self, tape: Tape) -> g.Vector:
         """Unit axis."""
@@ -44,33 +37,17 @@ class Arm:
 
 @dataclass(frozen=True)
 class Linkage:
-    """Bodies of a corner in their present position, components in the chassis frame.
+    """Bodies of a corner in their present position, components in the chassis frame."""
 
-    Attributes
-    ----------
-    upper, lower
-        Control arms.
-    upper_ball_joint
-        On the upper arm; the wheel carrier's reference point.
-    carrier
-        Orientation of the wheel carrier.
-    design_ball_joint
-        The upper ball joint at the design position.
-    rack_end
-        Inner end of the tie rod.
-    rod
-        Vector from the inner to the outer end of the tie rod.
-    rod_direction
-        Unit vector along the tie rod: outwards on the left side, inwards on the right.
-    """
-
+    # Control arms.
     upper: Arm
     lower: Arm
-    upper_ball_joint: g.Vector
-    carrier: g.Rotation
-    design_ball_joint: g.Vector
-    rack_end: g.Vector
-    rod: g.Vector
+    upper_ball_joint: g.Vector  # On the upper arm; the wheel carrier's reference point.
+    carrier: g.Rotation  # Orientation of the wheel carrier.
+    design_ball_joint: g.Vector  # The upper ball joint at the design position.
+    rack_end: g.Vector  # Inner end of the tie rod.
+    rod: g.Vector  # Vector from the inner to the outer end of the tie rod.
+    # Unit vector along the tie rod: outwards on the left side, inwards on the right.
     rod_direction: g.Vector
 
     def carrier_lever(self, tape: Tape, place: g.Vector) -> g.Vector:
@@ -94,25 +71,14 @@ class Linkage:
 
 def assembled(
     tape: Tape,
+    # zeta, eta, xi (3-2-1 Euler angles of the carrier), theta_u, theta_l (arms), alpha, beta
+    # (universal joint of the tie rod), rad.
     q: Sequence[sp.Symbol],
-    rack: sp.Symbol,
-    points: Mapping[str, g.Vector],
-    side: int = 1,
+    rack: sp.Symbol,  # Displacement of the rack, positive to the left, in m.
+    points: Mapping[str, g.Vector],  # `points.POINTS` of this side.
+    side: int = 1,  # 1 for the left, -1 for the right side.
 ) -> Linkage:
-    """Bodies of a corner.
-
-    Parameters
-    ----------
-    q
-        zeta, eta, xi (3-2-1 Euler angles of the carrier), theta_u, theta_l (arms), alpha, beta
-        (universal joint of the tie rod), rad.
-    rack
-        Displacement of the rack, positive to the left, in m.
-    points
-        `points.POINTS` of this side.
-    side
-        1 for the left, -1 for the right side.
-    """
+    """Bodies of a corner."""
     zeta, eta, xi, theta_u, theta_l, alpha, beta = q
 
     def arm(name: str, angle: sp.Symbol) -> Arm:

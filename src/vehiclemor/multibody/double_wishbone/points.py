@@ -5,16 +5,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from vehiclemor.exceptions import GeometryError
-from vehiclemor.parameters import Declared, point
 
 # Hard points at the design position, left side.
-POINTS: dict[str, Declared] = dict.fromkeys(
-    (
-        *("upper_arm_front_pivot", "upper_arm_rear_pivot", "upper_ball_joint"),
-        *("lower_arm_front_pivot", "lower_arm_rear_pivot", "lower_ball_joint"),
-        *("tie_rod_inner", "tie_rod_outer", "wheel_centre"),
-    ),
-    point(),
+POINTS = (
+    *("upper_arm_front_pivot", "upper_arm_rear_pivot", "upper_ball_joint"),
+    *("lower_arm_front_pivot", "lower_arm_rear_pivot", "lower_ball_joint"),
+    *("tie_rod_inner", "tie_rod_outer", "wheel_centre"),
+)
+# What a drawing of the mechanism needs that moves, beside the fixed pivots.
+JOINTS = (
+    *("upper_ball_joint", "lower_ball_joint", "tie_rod_inner", "tie_rod_outer"),
+    *("wheel_centre", "axle_direction"),
 )
 
 
@@ -50,10 +51,7 @@ def check_linkage(points: Mapping[str, np.ndarray]) -> None:
 def design_coordinates(points: Mapping[str, np.ndarray]) -> np.ndarray:
     """Coordinates (8,) at the design position: zero, but for the tie rod's universal joint.
 
-    Raises
-    ------
-    GeometryError
-        If two joints of one body coincide, so that the mechanism can't be assembled.
+    `GeometryError` if two joints of one body coincide.
     """
     check_linkage(points)
     design = np.zeros(8)

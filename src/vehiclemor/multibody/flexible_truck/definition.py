@@ -11,8 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.flexible_truck import quantities
-from vehiclemor.multibody.flexible_truck.vehicle import check, structure
+from vehiclemor.multibody.flexible_truck.vehicle import DECLARED, check, structure
 from vehiclemor.multibody.quantities import TIRE_LOADS, WHEELS
 
 if TYPE_CHECKING:
@@ -38,12 +37,9 @@ DEFINITION = ModelDefinition(
     summary="truck on a flexible ladder frame, beams or shells, ride over rough roads (structural)",
     maneuver="road",
     coordinates=(),
-    inputs=quantities.INPUTS,
-    outputs=quantities.OUTPUTS,
-    ports=quantities.PORTS,
+    **DECLARED,
     structure=structure,
     online=("payload",),
-    parameters=quantities.PARAMETERS,
     derive=derive,
     check=check,
     validity={

@@ -8,23 +8,25 @@ the opposite of its force.  A tire lifts its axle.  Springs, dampers and stops a
 import sympy as sp
 
 from vehiclemor.multibody.components import body
-from vehiclemor.multibody.flexible_truck import quantities
+from vehiclemor.multibody.flexible_truck.vehicle import DECLARED, ENDS
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 Parameters = dict[str, sp.Symbol]
+# Excess beyond shortest or longest length, in mm, at which the stops' force is a parameter.
+STOP_TABLE = (10, 20, 30, 40, 50)
 
 
 def derive() -> Program:
     """Derive the forces (12, 3) of the ports with their derivatives; parameters stay symbols."""
     tape = Tape()
-    w = body.symbols(quantities.PORTS)
+    w = body.symbols(DECLARED["ports"])
     rates = [sp.Symbol(f"{symbol.name}_rate", real=True) for symbol in w]
-    u = body.symbols(quantities.INPUTS)
-    p = {name: sp.Symbol(f"p_{name}", real=True) for name in quantities.PARAMETERS}
+    u = body.symbols(DECLARED["inputs"])
+    p = {name: sp.Symbol(f"p_{name}", real=True) for name in DECLARED["parameters"]}
     driver = [sp.Symbol(f"p_driver_{axis}", real=True) for axis in "xyz"]
     parameters = [s for name in p for s in (driver if name == "driver" else [p[name]])]
-    forces = [-_spring(tape, p, quantities.ENDS[k // 2], w[k]) for k in range(4)]
+    forces = [-_spring(tape, p, ENDS[k // 2], w[k]) for k in range(4)]
     forces += [-_damper(tape, p, rates[4 + k]) for k in range(4)]
     forces += [_tire(tape, p, u[k] - w[8 + k], u[4 + k] - rates[8 + k]) for k in range(4)]
     slopes = tape.jacobian(forces, [*w, *rates])
@@ -52,7 +54,7 @@ def _spring(tape: Tape, p: Parameters, end: str, w: sp.Symbol) -> sp.Expr:
 def _stop(tape: Tape, p: Parameters, excess: sp.Expr) -> sp.Expr:
     """Force of a stop: linear between the table's points, and beyond."""
     force = slope = place = reached = sp.Integer(0)
-    for point in quantities.STOP_TABLE:
+    for point in STOP_TABLE:
         here, level = sp.Rational(point, 1000), p[f"stop_force_{point}_mm"]
         steeper = tape.let((level - reached) / (here - place) - slope)
         force += steeper * _step(tape, excess > place) * (excess - place)

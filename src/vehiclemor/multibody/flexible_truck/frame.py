@@ -22,28 +22,19 @@ class Section:
 
     Formulas: Young and Budynas, *Roark's Formulas for Stress and Strain* (7th ed.), tables A.1,
     9.2 and 10.2.
-
-    Attributes
-    ----------
-    height, width, thickness
-        Height of the webs, width of the two flanges, thickness of all.
-    area, shear_areas
-        In m2; the latter carry shear along the webs and along the flanges.
-    centroid, shear_centre
-        Their distances from the (first) web, toward the flanges positive.
-    upright, sideways
-        Second moments of area in m4 that resist bending along the webs and along the flanges.
-    torsion
-        Torsion constant in m4: St. Venant's of a C, Bredt's of a box.
     """
 
     def __init__(self, h: float, b: float, t: float, webs: int) -> None:
+        # Of the webs, of the two flanges, of all.
         self.height, self.width, self.thickness = h, b, t
         self.area = t * (webs * h + 2.0 * b)
+        # Distances from the (first) web, toward the flanges positive: this and the shear centre.
         self.centroid = t * (b**2 + (webs - 1) * h * b) / self.area
+        # Second moments of area in m4 that resist bending along the webs and along the flanges.
         self.upright = t * h**2 * (webs * h / 12.0 + b / 2.0)
         about_web = t * (2.0 * b**3 / 3.0 + (webs - 1) * h * b**2)
         self.sideways = about_web - self.area * self.centroid**2
+        # Shear areas in m2, along webs and flanges; torsion in m4, St. Venant's or Bredt's.
         if webs == 1:
             self.shear_centre = -3.0 * b**2 / (6.0 * b + h)
             self.shear_areas = t * h, 5.0 / 3.0 * t * b
@@ -55,64 +46,43 @@ class Section:
 
 
 class Layout:
-    """Geometry and material of the ladder: two rails, a cross member in every plane but one.
-
-    Attributes
-    ----------
-    stations
-        x (stations,) in m, from front to rear.
-    planes
-        Numbers of the stations of axles, cab mounts, gearbox and ends.
-    crossings
-        Numbers of the stations with a cross member.
-    gauged
-        Numbers of five bays with strains: next to axles and gearbox, and between.
-    sides, height
-        y (2,) of the left and the right rail's web, and z of its middle; in m.
-    rail, cross
-        Sections; all are as high as the rails, so that their middle lines meet.
-    material
-        Modulus in N/m2, Poisson's ratio, density in kg/m3.
-    """
+    """Geometry and material of the ladder: two rails, a cross member in every plane but one."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         places = planes(values)
         parts = np.ceil(-np.diff(list(places.values())) / BAY - 1e-9).astype(int)
+        # x in m, from front to rear, and numbers of those of axles, cab mounts, gearbox and ends.
         self.stations = divided(list(places.values()), parts)
         self.planes = dict(zip(places, [0, *np.cumsum(parts).tolist()], strict=True))
+        # Numbers of the stations with a cross member.
         self.crossings = [n for name, n in self.planes.items() if name != "front cab mounts"]
         front, gearbox, rear = (self.planes[n] for n in ("front axle", "gearbox", "rear axle"))
+        # Numbers of five bays with strains: next to axles and gearbox, and between.
         self.gauged = [front, gearbox - 1, (gearbox + rear - 1) // 2, rear - 1, rear]
+        # y of the left and the right rail's web, and z of its middle; in m.
         self.sides = np.array([0.5, -0.5]) * values["rail_spacing"]
         self.height = values["frame_height"]
         thick, depth = values["rail_thickness"], values["rail_depth"] - values["rail_thickness"]
+        # All are as high as the rails, so that their middle lines meet.
         self.rail = Section(depth, values["rail_flange"] - thick / 2.0, thick, webs=1)
         self.cross = Section(depth, values["cross_width"], values["cross_thickness"], webs=2)
+        # Modulus in N/m2, Poisson's ratio, density in kg/m3.
         self.material = values["modulus"], values["poisson_ratio"], values["density"]
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Matrices of a meshed frame with n coordinates, 6 a node.
+    """Matrices of a meshed frame with n coordinates, 6 a node."""
 
-    Attributes
-    ----------
-    mass, stiffness
-        (n, n), of the frame alone, free.
-    nodes
-        Places (nodes, 3) in m.
-    sections
-        (stations * 2 * 6, n): three displacements and three rotations of the rails at every
-        station, left and right, at the middle of the web.
-    strains
-        (20, n): axial strains at the corners of web and flange, by place, left and right, upper
-        and lower; from the displacements along x at the ends of the elements around the place.
-    """
-
+    # (n, n), of the frame alone, free.
     mass: csc_array
     stiffness: csc_array
-    nodes: np.ndarray
+    nodes: np.ndarray  # Places (nodes, 3) in m.
+    # (stations * 2 * 6, n): three displacements and three rotations of the rails at every station,
+    # left and right, at the middle of the web.
     sections: csc_array
+    # (20, n): axial strains at the corners of web and flange, by place, left and right, upper and
+    # lower; from the displacements along x at the ends of the elements around the place.
     strains: csc_array
 
 

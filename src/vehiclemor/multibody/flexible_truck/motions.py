@@ -17,35 +17,25 @@ OTHERS = 7
 
 
 class Motions:
-    """Rows over s (N,).
-
-    Attributes
-    ----------
-    rails
-        Motion (stations, 2, 6, N) of the left and the right rail.
-    cab
-        Heave, pitch and roll (3, N).
-    axles
-        Heave and roll (2, N) of the front and of the rear axle by name.
-    middles
-        Displacements along, across and upward and roll (stations, 4, N) of both rails together.
-    pitch, roll, twist, yaw
-        Angles (N,) of the frame between the axles; roll is the mean, twist front less rear.
-    """
+    """Rows over s (N,)."""
 
     def __init__(self, ladder: Layout) -> None:
         self.ladder = ladder
         size = 12 * len(ladder.stations) + OTHERS
         rows = np.eye(size)
+        # Motion (stations, 2, 6, N) of the left and the right rail.
         self.rails = rows[:-OTHERS].reshape(-1, 2, 6, size)
+        # Heave, pitch and roll (3, N); heave and roll (2, N) of each axle.
         self.cab, self.axles = rows[-OTHERS:-4], {"front": rows[-4:-2], "rear": rows[-2:]}
         left, right = self.rails[:, 0], self.rails[:, 1]
+        # Displacements along, across and upward and roll (stations, 4, N) of both rails together.
         self.middles = (left + right)[:, :4] / 2.0
         self.middles[:, 3] = (left[:, 2] - right[:, 2]) / (ladder.sides[0] - ladder.sides[1])
         at = [ladder.planes["front axle"], ladder.planes["rear axle"]]
         self.front, self.rear = self.middles[at]
         self.ahead, self.behind = ladder.stations[at]
         change, length = self.front - self.rear, self.ahead - self.behind
+        # Angles (N,) of the frame between the axles; roll is the mean, twist front less rear.
         self.pitch, self.yaw = -change[2] / length, change[1] / length
         self.roll, self.twist = (self.front[3] + self.rear[3]) / 2.0, change[3]
 

@@ -23,7 +23,7 @@ from vehiclemor.exceptions import GeometryError, InputError
 from vehiclemor.multibody.flexible_truck import beams, shells
 from vehiclemor.multibody.flexible_truck.frame import Layout, levers, planes
 from vehiclemor.multibody.flexible_truck.motions import OTHERS, Motions, block
-from vehiclemor.multibody.flexible_truck.quantities import ENDS, OUTPUTS, STRAINS
+from vehiclemor.multibody.quantities import declared
 from vehiclemor.multibody.structure import Structure
 
 if TYPE_CHECKING:
@@ -34,6 +34,10 @@ FINEST = 0.02
 AXES = ("roll", "pitch", "yaw")
 # Left and right.
 SIDES = (1.0, -1.0)
+ENDS = ("front", "rear")
+# Two rails, two flanges, five bays.
+STRAINS = 20
+DECLARED = declared("flexible_truck")
 
 
 def check(values: Mapping[str, Any]) -> None:
@@ -185,10 +189,10 @@ def _heights(moving: Motions, v: Mapping[str, Any]) -> list[np.ndarray]:
 def _outputs(
     heights: csc_array, angles: csc_array, ports: csc_array, strains: csc_array
 ) -> tuple[csc_array, csc_array, csc_array, csc_array]:
-    """Cq, Cv, Ca and Cf in the order of `OUTPUTS`."""
+    """Cq, Cv, Ca and Cf in the order of the outputs."""
     from scipy.sparse import csc_array, eye_array
 
-    names = [quantity.name for quantity in OUTPUTS]
+    names = [quantity.name for quantity in DECLARED["outputs"]]
 
     def placed(rows: Any, first: str) -> csc_array:
         """Rows of some outputs, from the first of them on, among those of all."""

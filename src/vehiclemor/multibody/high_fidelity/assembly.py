@@ -64,15 +64,9 @@ def outputs(
     v: Vehicle,
     parts: Sequence[Corner],
     speeds: Sequence[sp.Expr],
-    carriers: Sequence[g.Rotation],
+    carriers: Sequence[g.Rotation],  # Orientations of the front wheel carriers.
 ) -> list[sp.Expr]:
-    """The model's outputs but for the last two, which measure the constraints.
-
-    Parameters
-    ----------
-    carriers
-        Orientations of the front wheel carriers.
-    """
+    """The model's outputs but for the last two, which measure the constraints."""
     q = v.q
     contacts = [corner.contact for corner in parts]
     return [

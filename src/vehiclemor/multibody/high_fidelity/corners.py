@@ -29,44 +29,29 @@ ENDS = ("front", "front", "rear", "rear")
 
 
 class _WheelCarrier(NamedTuple):
-    """A carrier or arm together with its wheel.
+    """A carrier or arm together with its wheel."""
 
-    Attributes
-    ----------
-    mass, tensor
-        Of both, in their present position.
-    base, motion, turn
-        A point of the body, its motion and the body's rotation relative to the chassis.
-    to_centre, to_wheel
-        From the point to the centre of mass of both and to the wheel centre.
-    axle
-        Spin axis of the wheel.
-    """
-
+    # Of both, in their present position.
     mass: sp.Expr
     tensor: Tensor
+    # A point of the body, its motion and the body's rotation relative to the chassis.
     base: Vector
     motion: Motion
     turn: Motion
+    # From the point to the centre of mass of both and to the wheel centre.
     to_centre: Vector
     to_wheel: Vector
-    axle: Vector
+    axle: Vector  # Spin axis of the wheel.
 
 
 @dataclass(frozen=True)
 class Corner:
-    """Bodies of a corner with what acts on them.
-
-    Attributes
-    ----------
-    spring_moment
-        Generalised force of the spring-damper on the arm that carries it in N m.
-    contact, tire
-        Wheel on the road.
-    """
+    """Bodies of a corner with what acts on them."""
 
     bodies: tuple[Body, ...]
+    # Generalised force of the spring-damper on the arm that carries it in N m.
     spring_moment: sp.Expr
+    # Wheel on the road.
     contact: tilted_wheel.TiltedContact
     tire: TireForces
 
@@ -217,14 +202,9 @@ def _wheeled_body(
 
 
 def _spring(tape: Tape, gap: Vector, motion: Motion, v: Vehicle, k: int) -> sp.Expr:
-    """Generalised force of a spring-damper that ends on a moving point of an arm.
+    """Generalised force of a spring-damper from the chassis to a moving point of an arm.
 
-    Parameters
-    ----------
-    gap
-        From the end on the chassis to the end on the arm.
-    motion
-        Of the end on the arm, relative to the chassis.
+    The gap leads from the chassis to the arm, the motion is of the end on the arm.
     """
     p, end = v.p, ENDS[k]
     gap = g.named(tape, gap)

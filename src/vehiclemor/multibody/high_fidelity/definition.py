@@ -9,8 +9,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.high_fidelity import quantities
-from vehiclemor.multibody.high_fidelity.equilibrium import check, solve_equilibrium, starts
+from vehiclemor.multibody.high_fidelity.equilibrium import (
+    DECLARED,
+    SOLVED,
+    check,
+    solve_equilibrium,
+    starts,
+)
 from vehiclemor.multibody.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
 
 if TYPE_CHECKING:
@@ -24,34 +29,29 @@ def derive() -> Program:
     return equations.derive()
 
 
+STATES = [q.name for q in (*DECLARED["coordinates"], *DECLARED["speeds"])]
 DEFINITION = ModelDefinition(
     name="high_fidelity_vehicle",
     kind="dae",
     summary="vehicle with 26 coordinates and 12 constraints, double wishbones, Fiala tires (DAE)",
     maneuver="rack_lane_change",
-    coordinates=quantities.COORDINATES,
-    speeds=quantities.SPEEDS,
-    inputs=quantities.INPUTS,
-    outputs=quantities.OUTPUTS,
-    constraints=quantities.CONSTRAINTS,
-    parameters=quantities.PARAMETERS,
+    **DECLARED,
     derive=derive,
     check=check,
     starts=starts,
-    solved=quantities.SOLVED,
+    solved=SOLVED,
     solve_equilibrium=solve_equilibrium,
     cyclic=("x", "y", *(f"gamma_{wheel}" for wheel in WHEELS)),
     planar=("x", "y", "psi"),
     heading_pairs=(("x", "y"), ("x_dot", "y_dot")),
     # A heading that is off integrates to a lateral position that is off: no other error matters
     # as much.
-    error_scale=dict.fromkeys([q.name for q in (*quantities.COORDINATES, *quantities.SPEEDS)], 10.0)
-    | {"psi": 1.0, "psi_dot": 1.0},
+    error_scale=dict.fromkeys(STATES, 10.0) | {"psi": 1.0, "psi_dot": 1.0},
     # Slips need forward motion.  At 1.3 rad of steering the linkage locks; another branch lies
     # beyond.
     validity={
         "longitudinal_speed": FORWARD,
-        **{f"steer_{wheel}": (-1.1, 1.1) for wheel in quantities.FRONT},
+        **{f"steer_{wheel}": (-1.1, 1.1) for wheel in WHEELS[:2]},
         **UPRIGHT,
     },
     loads=TIRE_LOADS,

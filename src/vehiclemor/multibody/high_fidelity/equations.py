@@ -13,7 +13,8 @@ import sympy as sp
 
 from vehiclemor.multibody.components import body
 from vehiclemor.multibody.double_wishbone import linkage
-from vehiclemor.multibody.high_fidelity import assembly, corners, linkage_motions, parts, quantities
+from vehiclemor.multibody.high_fidelity import assembly, corners, linkage_motions, parts
+from vehiclemor.multibody.high_fidelity.equilibrium import DECLARED
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate
@@ -24,7 +25,7 @@ from vehiclemor.symbolic.tape import Tape
 # Places of the front corners' coordinates, and of the arms that carry the springs.
 CORNER = (range(6, 13), range(13, 20))
 LOWER_ARMS = (10, 17)
-NUMBERS = parts.Numbers(len(quantities.COORDINATES), (*LOWER_ARMS, 20, 21), (22, 23, 24, 25))
+NUMBERS = parts.Numbers(len(DECLARED["coordinates"]), (*LOWER_ARMS, 20, 21), (22, 23, 24, 25))
 # Pivots (closure, coordinate of the six without the lower arm's) at the design position.
 PIVOTS = ((3, 4), (5, 5), (0, 1), (1, 2), (2, 3), (4, 0))
 
@@ -41,8 +42,8 @@ class _Mechanism:
 def derive() -> Program:
     """Derive accelerations, outputs, and the unsolved descriptor form; parameters stay symbols."""
     tape = Tape()
-    q, rates = body.symbols(quantities.COORDINATES), body.symbols(quantities.SPEEDS)
-    rack = body.symbols(quantities.INPUTS)
+    q, rates = body.symbols(DECLARED["coordinates"]), body.symbols(DECLARED["speeds"])
+    rack = body.symbols(DECLARED["inputs"])
     p, flat = parts.parameters()
     vehicle, attitude, speeds = parts.vehicle(tape, q, rates, p, NUMBERS)
     mechanism = _Mechanism(
@@ -74,7 +75,7 @@ def derive() -> Program:
     mass, force = assembly.kane(tape, vehicle, _corners(tape, mechanism, free))
     zero = g.vector((0, 0, 0))
     open_form = body.in_coordinates(tape, attitude, speeds, mass, force, velocity_bias=zero)
-    n = len(quantities.COORDINATES)
+    n = len(DECLARED["coordinates"])
     rows = [open_form[j * (n + 1) : (j + 1) * (n + 1)] for j in range(n)]
     second_order = [
         e
@@ -92,14 +93,14 @@ def derive() -> Program:
             "derivative": ([*rates, *accelerations], (2 * n,)),
             "outputs": (
                 _outputs(tape, mechanism, closed, speeds, gaps, gap_rates),
-                (len(quantities.OUTPUTS),),
+                (len(DECLARED["outputs"]),),
             ),
             "second_order": (second_order, (n, n + 1)),
             "speeds": (list(rates), (n,)),
-            "descriptor": (descriptor, (n + len(quantities.CONSTRAINTS), n + 1)),
+            "descriptor": (descriptor, (n + len(DECLARED["constraints"]), n + 1)),
             "violations": (
                 [e for pair in zip(gaps, gap_rates, strict=True) for e in pair],
-                (len(quantities.CONSTRAINTS), 2),
+                (len(DECLARED["constraints"]), 2),
             ),
         },
     )

@@ -12,6 +12,7 @@ import numpy as np
 from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.definition import Derivative
 from vehiclemor.multibody.double_wishbone.points import POINTS, check_linkage, tie_rod_angles
+from vehiclemor.multibody.quantities import declared
 from vehiclemor.multibody.vehicle_parameters import check_moments
 
 # Places of z, theta, the left lower arm and the left rear arm among the coordinates.
@@ -21,6 +22,9 @@ SPINS = slice(48, 52)
 # Accelerations (m/s^2, rad/s^2) below which nothing moves; rounding alone gives a tenth of it.
 AT_REST = 1e-9
 MOST_ITERATIONS = 30
+# Free lengths of the springs (m), with which the design position is the equilibrium.
+SOLVED = ("front_free_length", "rear_free_length")
+DECLARED = declared("high_fidelity_vehicle")
 
 
 def check(p: Mapping[str, Any]) -> None:
@@ -119,12 +123,7 @@ def solve_equilibrium(p: Mapping[str, Any], derivative: Derivative) -> dict[str,
     """Free lengths of the springs, height and pitch at which nothing accelerates.
 
     Newton's method on the accelerations of height, pitch, lower arm and rear arm, which are linear
-    in the free lengths.
-
-    Raises
-    ------
-    GeometryError
-        If there is no such position with the wheels on the ground.
+    in the free lengths.  `GeometryError` if that leaves the wheels off the ground.
     """
     front, _ = wheel_places(p)
     mass, _ = _mass_and_centre(p)
@@ -161,18 +160,13 @@ def solve_equilibrium(p: Mapping[str, Any], derivative: Derivative) -> dict[str,
             "the vehicle can't stand: no free lengths of its springs hold it at its design "
             f"position (accelerations up to {np.abs(residual).max():.2g} are left)"
         )
-    names = ("height", "pitch", "front_free_length", "rear_free_length")
+    names = ("height", "pitch", *SOLVED)
     return dict(zip(names, map(float, unknown), strict=True))
 
 
+# Parameters, and what `solve_equilibrium` has found.
 def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Initial states (52,) by name: straight running, and the same dropped onto the road.
-
-    Parameters
-    ----------
-    p
-        Parameters, and what `solve_equilibrium` has found.
-    """
+    """Initial states (52,) by name: straight running, and the same dropped onto the road."""
     equilibrium = design_state(p, p["height"], p["pitch"])
     equilibrium[COORDINATES] = p["initial_speed"]
     up = np.array([-np.sin(p["pitch"]), 0.0, np.cos(p["pitch"])])

@@ -16,20 +16,14 @@ from vehiclemor.symbolic.tape import Tape
 
 @dataclass(frozen=True)
 class LinkageMotions:
-    """Motions of a double-wishbone corner's bodies relative to the chassis.
+    """Motions of a double-wishbone corner's bodies relative to the chassis."""
 
-    Attributes
-    ----------
-    upper, lower, carrier, rod
-        Rotations of control arms, wheel carrier and tie rod.
-    ball_joint, rack_end
-        Motions of the upper ball joint and of the tie rod's inner end.
-    """
-
+    # Rotations of control arms, wheel carrier and tie rod.
     upper: Motion
     lower: Motion
     carrier: Motion
     rod: Motion
+    # Motions of the upper ball joint and of the tie rod's inner end.
     ball_joint: Motion
     rack_end: Motion
 
@@ -39,15 +33,9 @@ def linkage_motions(
     linkage: Linkage,
     q: Sequence[sp.Symbol],
     rates: Sequence[Rate],
-    rack: tuple[sp.Expr, sp.Expr],
+    rack: tuple[sp.Expr, sp.Expr],  # Velocity and acceleration of the rack.
 ) -> LinkageMotions:
-    """Relative motions for rates of the seven joint coordinates q.
-
-    Parameters
-    ----------
-    rack
-        Velocity and acceleration of the rack.
-    """
+    """Relative motions for rates of the seven joint coordinates q."""
     zeta, alpha = q[0], q[5]
     turned_y = g.vector((-tape.let(sp.sin(zeta)), tape.let(sp.cos(zeta)), 0))
     turned_x = g.vector((tape.let(sp.cos(alpha)), tape.let(sp.sin(alpha)), 0))

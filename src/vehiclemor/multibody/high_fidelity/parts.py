@@ -7,7 +7,7 @@ import sympy as sp
 
 from vehiclemor.multibody.components import body
 from vehiclemor.multibody.double_wishbone.points import POINTS
-from vehiclemor.multibody.high_fidelity.quantities import PARAMETERS, SOLVED
+from vehiclemor.multibody.high_fidelity.equilibrium import DECLARED, SOLVED
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.tape import Tape
@@ -32,19 +32,12 @@ REAR_POINTS = (
 
 @dataclass(frozen=True)
 class Numbers:
-    """Numbers of the speeds; the first six are the chassis'.
-
-    Attributes
-    ----------
-    arms
-        Of the arms that carry the springs: lower arms in front, trailing arms behind.
-    spins
-        Of the wheels.
-    """
+    """Numbers of the speeds; the first six are the chassis'."""
 
     total: int
+    # Of the arms that carry the springs: lower arms in front, trailing arms behind.
     arms: tuple[int, ...]
-    spins: tuple[int, ...]
+    spins: tuple[int, ...]  # Of the wheels.
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -54,29 +47,17 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Vehicle:
-    """What all forms of the equations begin with.
+    """What all forms of the equations begin with."""
 
-    Attributes
-    ----------
-    frame
-        Moving frame of the chassis, its origin the centre of mass; gravity is counted as an
-        acceleration of it upwards.
-    up
-        Road normal, chassis components.
-    points
-        Design points of the four corners, chassis frame.
-    q, rates
-        Coordinates and their rates.
-    p
-        Symbols of the parameters.
-    """
-
+    # Moving frame of the chassis, its origin the centre of mass; gravity is counted as an
+    # acceleration of it upwards.
     frame: mechanics.MovingFrame
-    up: g.Vector
-    points: tuple[dict[str, g.Vector], ...]
+    up: g.Vector  # Road normal, chassis components.
+    points: tuple[dict[str, g.Vector], ...]  # Design points of the four corners, chassis frame.
+    # Coordinates and their rates.
     q: Sequence[sp.Symbol]
     rates: Sequence[sp.Symbol]
-    p: Mapping[str, sp.Expr]
+    p: Mapping[str, sp.Expr]  # Symbols of the parameters.
     numbers: Numbers
 
 
@@ -105,7 +86,7 @@ def vehicle(
 def parameters() -> tuple[dict[str, sp.Expr], list[sp.Symbol]]:
     """Symbols of the parameters by name, components of points apart, and in order."""
     flat = []
-    for name, declared in PARAMETERS.items():
+    for name, declared in DECLARED["parameters"].items():
         flat += [name] if declared.size == 1 else [f"{name}_{axis}" for axis in "xyz"]
     flat += SOLVED
     symbols = {name: sp.Symbol(f"p_{name}", real=True) for name in flat}

@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.independent_suspension import quantities
 from vehiclemor.multibody.independent_suspension.equilibrium import check, starts
-from vehiclemor.multibody.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS
+from vehiclemor.multibody.quantities import FORWARD, TIRE_LOADS, UPRIGHT, WHEELS, declared
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -31,11 +30,7 @@ DEFINITION = ModelDefinition(
     kind="ode",
     summary="vehicle with independent suspension, 14 degrees of freedom, Magic Formula tires (ODE)",
     maneuver="lane_change",
-    coordinates=quantities.COORDINATES,
-    speeds=quantities.SPEEDS,
-    inputs=quantities.INPUTS,
-    outputs=quantities.OUTPUTS,
-    parameters=quantities.PARAMETERS,
+    **declared("independent_suspension_vehicle"),
     derive=derive,
     check=check,
     starts=starts,

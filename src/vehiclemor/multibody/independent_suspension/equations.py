@@ -8,28 +8,30 @@ import sympy as sp
 from vehiclemor.multibody.components import body
 from vehiclemor.multibody.components.tire_coefficients import MAGIC_FORMULA
 from vehiclemor.multibody.components.tires import TireForces, magic_formula, tire_outputs
-from vehiclemor.multibody.independent_suspension import quantities
 from vehiclemor.multibody.independent_suspension.equilibrium import Derived, derived
+from vehiclemor.multibody.quantities import declared
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import joints, mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
+DECLARED = declared("independent_suspension_vehicle")
+
 
 def derive() -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
     tape = Tape()
-    q = body.symbols(quantities.COORDINATES)
-    nu = body.symbols(quantities.SPEEDS)
-    (delta,) = body.symbols(quantities.INPUTS)
-    p = {name: sp.Symbol(f"p_{name}", real=True) for name in quantities.PARAMETERS}
+    q = body.symbols(DECLARED["coordinates"])
+    nu = body.symbols(DECLARED["speeds"])
+    (delta,) = body.symbols(DECLARED["inputs"])
+    p = {name: sp.Symbol(f"p_{name}", real=True) for name in DECLARED["parameters"]}
     attitude = body.attitude(tape, q)
     vehicle = _vehicle(tape, q, nu, delta, p, attitude)
     sprung = _sprung_body(tape, vehicle)
     wheels = [_wheel(tape, vehicle, number) for number in range(4)]
     mass, force = mechanics.kane(
-        tape, len(quantities.SPEEDS), [sprung, *(wheel.rigid for wheel in wheels)]
+        tape, len(DECLARED["speeds"]), [sprung, *(wheel.rigid for wheel in wheels)]
     )
     for number, wheel in enumerate(wheels):
         force[6 + number] = tape.let(force[6 + number] - wheel.spring)
@@ -47,14 +49,14 @@ def derive() -> Program:
             [wheel.contact.slip_angle for wheel in wheels],
         ),
     ]
-    n = len(quantities.COORDINATES)
+    n = len(DECLARED["coordinates"])
     return assemble(
         tape,
         {"x": [*q, *nu], "u": [delta]},
         list(p.values()),
         {
             "derivative": ([*rates, *accelerations], (2 * n,)),
-            "outputs": (outputs, (len(quantities.OUTPUTS),)),
+            "outputs": (outputs, (len(DECLARED["outputs"]),)),
             "second_order": (second_order, (n, n + 1)),
             "speeds": ([*body.speeds(tape, attitude, nu), *nu[6:]], (n,)),
         },
@@ -63,23 +65,16 @@ def derive() -> Program:
 
 @dataclass(frozen=True)
 class _Vehicle:
-    """The sprung body on the road, with what its wheels need of it.
-
-    Attributes
-    ----------
-    weight
-        Acceleration of gravity, chassis components.
-    named
-        What follows from the parameters; distances, depths and preloads stand on the tape.
-    """
+    """The sprung body on the road, with what its wheels need of it."""
 
     frame: mechanics.MovingFrame
     attitude: body.Attitude
-    weight: g.Vector
+    weight: g.Vector  # Acceleration of gravity, chassis components.
     q: list[sp.Symbol]
     nu: list[sp.Symbol]
     delta: sp.Symbol
     p: dict[str, sp.Symbol]
+    # What follows from the parameters; distances, depths and preloads stand on the tape.
     named: Derived
 
 
@@ -130,14 +125,14 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
 
 def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
     """A wheel of number 0 to 3 with its load, tire and spring."""
-    p, d, frame, front = v.p, v.named, v.frame, quantities.FRONT[wheel]
+    p, d, frame, front = v.p, v.named, v.frame, wheel < 2
     end, side = (0, "front") if front else (1, "rear")
     travel, rate, spin = v.q[6 + wheel], v.nu[6 + wheel], v.nu[10 + wheel]
     track = p[f"{side}_track"]
     place = g.vector(
         (
             d.sprung_distance[0] if front else -d.sprung_distance[1],
-            tape.let(track / 2 if quantities.LEFT[wheel] else -track / 2),
+            tape.let(track / 2 if wheel % 2 == 0 else -track / 2),
             tape.let(travel - d.depth[end]),
         )
     )

@@ -7,40 +7,22 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import GeometryError
-from vehiclemor.multibody.independent_suspension.quantities import COORDINATES, FRONT, SPEEDS
 from vehiclemor.multibody.vehicle_parameters import check_moments
 
 
 @dataclass(frozen=True)
 class Derived:
-    """What follows from the parameters, numbers or symbols; front first where there are two.
+    """What follows from the parameters, numbers or symbols; front first where there are two."""
 
-    Attributes
-    ----------
-    total_mass
-        In kg.
-    sprung_distance
-        Sprung centre of mass to the front and rear axle in m.
-    yaw_inertia
-        Of the sprung body in kg m^2.
-    load, preload
-        Static vertical load of a tire, static force of a spring, in N.
-    loaded_radius
-        Static height of a wheel centre above the road in m.
-    depth
-        Sprung centre of mass above the wheel centres at zero travel in m.
-    reference_load
-        F_z0 of the tire in N.
-    """
-
-    total_mass: Any
-    sprung_distance: tuple[Any, Any]
-    yaw_inertia: Any
+    total_mass: Any  # In kg.
+    sprung_distance: tuple[Any, Any]  # Sprung centre of mass to the front and rear axle in m.
+    yaw_inertia: Any  # Of the sprung body in kg m^2.
+    # Static vertical load of a tire, static force of a spring, in N.
     load: tuple[Any, Any]
     preload: tuple[Any, Any]
-    loaded_radius: tuple[Any, Any]
-    depth: tuple[Any, Any]
-    reference_load: Any
+    loaded_radius: tuple[Any, Any]  # Static height of a wheel centre above the road in m.
+    depth: tuple[Any, Any]  # Sprung centre of mass above the wheel centres at zero travel in m.
+    reference_load: Any  # F_z0 of the tire in N.
 
 
 def derived(p: Mapping[str, Any]) -> Derived:
@@ -99,10 +81,10 @@ def check(p: Mapping[str, Any]) -> None:
 def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Initial states (28,) by name: straight running, and the same dropped onto the road."""
     d, speed = derived(p), float(p["initial_speed"])
-    equilibrium = np.zeros(len(COORDINATES) + len(SPEEDS))
+    equilibrium = np.zeros(28)
     equilibrium[2] = p["sprung_height"]
     equilibrium[14] = speed
-    equilibrium[24:] = [speed / d.loaded_radius[0 if front else 1] for front in FRONT]
+    equilibrium[24:] = speed / np.repeat(d.loaded_radius, 2)
     dropped = equilibrium.copy()
     dropped[2] += p["drop_height"]
     dropped[4] += p["drop_pitch"]

@@ -12,24 +12,17 @@ LARGEST = 1e3
 
 
 class Equations(NamedTuple):
-    """What maps arguments v = (1, z, u) to results: the sum of three parts, each may be empty.
+    """What maps arguments v = (1, z, u) to results: the sum of three parts, each may be empty."""
 
-    Attributes
-    ----------
-    terms, coefficients
-        Monomials as numbers of their factors in v (terms, degree), and what they count (terms, m).
-    widths, weights
-        Of a network with tanh in its hidden layers: sizes of all layers, and its matrices, each
-        followed by its offsets.
-    lengths, centres, heights
-        Gaussian kernels exp(-|v / lengths - centre|^2 / 2): (v - 1,), (kernels, v - 1) and
-        (kernels, m).
-    """
-
+    # Monomials as numbers of their factors in v (terms, degree), and what they count (terms, m).
     terms: IntMatrix
     coefficients: Matrix
+    # Of a network with tanh in its hidden layers: sizes of all layers, and its matrices, each
+    # followed by its offsets.
     widths: IntVector
     weights: Vector
+    # Gaussian kernels exp(-|v / lengths - centre|^2 / 2): (v - 1,), (kernels, v - 1) and (kernels,
+    # m).
     lengths: Vector
     centres: Matrix
     heights: Matrix
@@ -130,26 +123,15 @@ def turn(result: Vector, k: int, heading: float) -> None:
 def march(
     equations: Equations,
     coordinates: Int,
-    step: Float,
+    step: Float,  # In s.
+    # Whether results are changes of the coordinates in a step (heading and place follow by the
+    # trapezoidal rule); else they are rates, for the classical Runge-Kutta method.
     mapped: Int,
-    inputs: Matrix,
-    path: Matrix,
+    inputs: Matrix,  # Of all half steps (2 steps + 1, inputs).
+    path: Matrix,  # Coordinates, and heading and place if the equations have them (steps + 1, m).
     buffer: Vector,
 ) -> Int:
-    """A run from the first row of the path; the number of rows that it has reached.
-
-    Parameters
-    ----------
-    step
-        In s.
-    mapped
-        Whether results are changes of the coordinates in a step (heading and place follow by the
-        trapezoidal rule); else they are rates, for the classical Runge-Kutta method.
-    inputs
-        Of all half steps (2 steps + 1, inputs).
-    path
-        Coordinates, and heading and place if the equations have them (steps + 1, m).
-    """
+    """A run from the first row of the path; the number of rows that it has reached."""
     size, k = path.shape[1], coordinates
     width = 1 + k + (1 + mapped) * inputs.shape[1]
     stages = vector(buffer, 0, 4 * size)

@@ -112,22 +112,13 @@ class Regression(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Learning:
-    """Samples as a learner sees them, and the model of what it has fitted.
+    """Samples as a learner sees them, and the model of what it has fitted."""
 
-    Attributes
-    ----------
-    samples, components
-        Of the training runs.
-    mapped
-        Whether changes in one step are learned; else rates.
-    began
-        `time.process_time()` at the beginning of the fit.
-    """
-
+    # Of the training runs.
     samples: Samples
     components: Components
-    mapped: bool
-    began: float
+    mapped: bool  # Whether changes in one step are learned; else rates.
+    began: float  # `time.process_time()` at the beginning of the fit.
 
     @classmethod
     def of(
@@ -229,35 +220,21 @@ def _ranges(values: np.ndarray) -> list[np.ndarray]:
 
 @dataclass(frozen=True, eq=False)
 class LearnedModel(ShortRepr):
-    """Equations that a general learner has fitted to training runs.
+    """Equations that a general learner has fitted to training runs."""
 
-    Attributes
-    ----------
-    states, components
-        Which states are meant, and their components.
-    equations
-        Of components and standardised inputs, see `Learning`.
-    time_step, mapped
-        In s; whether the equations give what changes in a step, or rates.
-    input_scale
-        Magnitudes of the inputs (inputs,).
-    lifted
-        Monomials (coordinates, degree) of the components that are coordinates; none: components.
-    outputs
-        Coefficients (components + inputs + 1, outputs) of a structure's outputs.
-    known
-        Least and largest value in training of each component and online parameter; a run beyond
-        is not trusted.
-    """
-
+    # Which states are meant, and their components.
     states: States
     components: Components
-    equations: Equations
+    equations: Equations  # Of components and standardised inputs, see `Learning`.
+    # In s; whether the equations give what changes in a step, or rates.
     time_step: float
     mapped: bool
-    input_scale: np.ndarray
+    input_scale: np.ndarray  # Magnitudes of the inputs (inputs,).
+    # Monomials (coordinates, degree) of the components that are coordinates; none: components.
     lifted: np.ndarray
-    outputs: np.ndarray
+    outputs: np.ndarray  # Coefficients (components + inputs + 1, outputs) of a structure's outputs.
+    # Least and largest value in training of each component and online parameter; a run beyond is
+    # not trusted.
     known: np.ndarray
     offline: OfflineCost
 

@@ -37,18 +37,10 @@ def online_inputs(model: Model, inputs: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """States of a model as a learner sees them.
+    """States of a model as a learner sees them."""
 
-    Attributes
-    ----------
-    model
-        The full one.
-    shape
-        Of a vehicle.
-    """
-
-    model: Any
-    shape: VehicleShape | None
+    model: Any  # The full one.
+    shape: VehicleShape | None  # Of a vehicle.
 
     @classmethod
     def of_model(cls, model: Any) -> "States":
@@ -86,35 +78,21 @@ class States:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of training runs, evenly taken, each with the one that follows it.
+    """Samples of training runs, evenly taken, each with the one that follows it."""
 
-    Attributes
-    ----------
-    states
-        What the columns of `deviations` are.
-    spacing
-        Time in s to the sample that follows.
-    inputs, next_inputs
-        (samples, inputs).
-    deviations, next_deviations, rates
-        (samples, n).
-    motion
-        psi', U, V (samples, 3) of a vehicle, less those of straight running; else (samples, 0).
-    outputs
-        (samples, outputs) of a structure, else (samples, 0).
-    evaluations, seconds
-        Of the full model's equations; CPU time of the process.
-    """
-
-    states: States
-    spacing: float
+    states: States  # What the columns of `deviations` are.
+    spacing: float  # Time in s to the sample that follows.
+    # (samples, inputs).
     inputs: np.ndarray
     next_inputs: np.ndarray
+    # (samples, n).
     deviations: np.ndarray
     next_deviations: np.ndarray
     rates: np.ndarray
+    # psi', U, V (samples, 3) of a vehicle, less those of straight running; else (samples, 0).
     motion: np.ndarray
-    outputs: np.ndarray
+    outputs: np.ndarray  # (samples, outputs) of a structure, else (samples, 0).
+    # Of the full model's equations; CPU time of the process.
     evaluations: int
     seconds: float
 
@@ -203,14 +181,9 @@ def _of_run(
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """Principal components of deviations, each of mean square 1.
+    """Principal components of deviations, each of mean square 1."""
 
-    Attributes
-    ----------
-    forward, back
-        Components per deviation (r, n) and back (n, r).
-    """
-
+    # Components per deviation (r, n) and back (n, r).
     forward: np.ndarray
     back: np.ndarray
 

@@ -3,22 +3,19 @@
 A cheaper model of a structure is had by larger elements, too.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost
-from vehiclemor.reduction.projection.structural import StructuralSettings
+from vehiclemor.reduction.projection.structural import StructuralRuns, StructuralSettings
 from vehiclemor.reduction.settings import inline_table
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.structures.model import StructuralModel
-from vehiclemor.simulation.trajectory import Start, Trajectory
 
 
 class CoarseMeshSettings(StructuralSettings):
@@ -30,7 +27,7 @@ class CoarseMeshSettings(StructuralSettings):
 
 
 @dataclass(frozen=True, eq=False)
-class CoarseMesh:
+class CoarseMesh(StructuralRuns):
     """The full model on a coarse mesh in the place of a reduced one."""
 
     model: StructuralModel
@@ -52,20 +49,10 @@ class CoarseMesh:
         """The model on the coarse mesh."""
         return reparametrised(self.model, parameters(self.mesh))
 
-    def for_model(self, model: StructuralModel) -> "CoarseMesh":
-        """The same mesh for a model whose other parameters differ."""
-        return replace(self, model=model)
-
-    def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
-    ) -> Trajectory:
-        """A run at the maneuver's output times."""
-        self.model.start(start)
-        return self.coarse.run(maneuver, None, self.tolerance, outputs, step=self.step_size)
-
-    def best_approximation(self, states: np.ndarray) -> None:
-        """There is no subspace."""
-        del states
+    @property
+    def solved(self) -> tuple[StructuralModel, None]:
+        """The coarse model."""
+        return self.coarse, None
 
 
 def parameters(mesh: str) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """The full-order model itself: the baseline of every comparison."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
@@ -11,7 +11,7 @@ from pydantic import Field
 from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost, Presets
-from vehiclemor.reduction.projection.structural import StructuralSettings
+from vehiclemor.reduction.projection.structural import StructuralRuns, StructuralSettings
 from vehiclemor.reduction.reduced_system import ReducedMechanism, ReducedSystem
 from vehiclemor.reduction.settings import (
     AnyIntegrator,
@@ -138,7 +138,7 @@ class FullOrderMechanism(FullOrder, ReducedMechanism):
 
 
 @dataclass(frozen=True, eq=False)
-class FullOrderStructure(FullOrder):
+class FullOrderStructure(StructuralRuns, FullOrder):
     """A structural model; it gives whole runs alone."""
 
     model: StructuralModel
@@ -149,16 +149,9 @@ class FullOrderStructure(FullOrder):
         """Number of coordinates."""
         return self.model.size
 
-    def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
-    ) -> Trajectory:
-        """A run at the output times; it may have diverged."""
-        self.model.start(start)
-        return self.model.run(maneuver, None, self.tolerance, outputs, step=self.step_size)
-
-    def for_model(self, model: StructuralModel) -> "FullOrderStructure":
-        """The same for another model."""
-        return replace(self, model=model)
+    def best_approximation(self, states: np.ndarray) -> np.ndarray:
+        """The states themselves."""
+        return states
 
 
 def fit(

@@ -99,25 +99,17 @@ class PathMapSettings(Settings):
 
 @dataclass(frozen=True)
 class PathMapModel(ReducedMechanism):
-    """Coordinates and outputs as polynomials, of that total degree, of the inputs that move.
-
-    Attributes
-    ----------
-    ranges
-        Lowest and highest value (inputs, 2) of each input in training, with the margins.
-    columns
-        Column of the coefficients for each coordinate and output; equal ones share one.
-    stops
-        Whether a run ends where it leaves the ranges.
-    """
+    """Coordinates and outputs as polynomials, of that total degree, of the inputs that move."""
 
     model: AlgebraicModel
+    # Lowest and highest value (inputs, 2) of each input in training, with the margins.
     ranges: np.ndarray
     moving: tuple[int, ...]
     degree: int
     cells: Cells
+    # Column of the coefficients for each coordinate and output; equal ones share one.
     columns: tuple[int, ...]
-    stops: bool
+    stops: bool  # Whether a run ends where it leaves the ranges.
     offline: OfflineCost
 
     def check_sizes(self) -> None:

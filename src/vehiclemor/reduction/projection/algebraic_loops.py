@@ -9,6 +9,7 @@ sizes.
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
+from vehiclemor.simulation.integrators.dense_solves import small_solve
 from vehiclemor.simulation.newton.newton_loops import (
     CONVERGED,
     INPUTS,
@@ -19,7 +20,6 @@ from vehiclemor.simulation.newton.newton_loops import (
     Solution,
     all_below,
     failure,
-    small_solve,
     stopped,
 )
 
@@ -29,25 +29,14 @@ INLINED = ("weighted", "decode", "tangent_product", "enter_window")
 
 
 class Windows(NamedTuple):
-    """Subspaces by window.
+    """Subspaces by window."""
 
-    Attributes
-    ----------
-    first_samples
-        Window k holds the samples from entry k up to entry k + 1.
-    means
-        Means (windows, N).
-    bases, tests
-        Basis and test basis by rows (windows, N, N).
-    ranks
-        Rows that are used (windows,).
-    """
-
-    first_samples: IntVector
-    means: Matrix
+    first_samples: IntVector  # Window k holds the samples from entry k up to entry k + 1.
+    means: Matrix  # Means (windows, N).
+    # Basis and test basis by rows (windows, N, N).
     bases: Cube
     tests: Cube
-    ranks: IntVector
+    ranks: IntVector  # Rows that are used (windows,).
 
 
 def tangent_parts(q: Vector, u: Vector, constants: Vector, result: Vector) -> None:

@@ -94,14 +94,6 @@ class DynamicProjection(ReducedSystem):
     projected onto the subspace of the training run (step 6) that state becomes one of that run
     again, wherever the vehicle is: where it is the origin of the subspace, only the change within
     the window is in the span of the training's.
-
-    Attributes
-    ----------
-    bases
-        Basis of each window, orthonormal in its inner product: of the states for `state`, else of
-        the coordinates; `spaces` are the same for the compiled loops.
-    restart
-        Where a window starts, as in the settings of `pod`.
     """
 
     model: DynamicModel
@@ -109,8 +101,10 @@ class DynamicProjection(ReducedSystem):
     offline: OfflineCost
     solver: str
     tolerance: float
+    # Basis of each window, orthonormal in its inner product: of the states for `state`, else of the
+    # coordinates; `spaces` are the same for the compiled loops.
     bases: tuple[Basis, ...] = ()
-    restart: str = "own"
+    restart: str = "own"  # Where a window starts, as in the settings of `pod`.
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if the subspaces are of other states than the model's."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import Field
@@ -82,30 +82,47 @@ def projected(structure: Structure, basis: np.ndarray) -> tuple[Structure, np.nd
     return made, vectors
 
 
+class StructuralRuns(ShortRepr):
+    """Base of what gives whole runs of a structure: dataclasses with the fields below."""
+
+    if TYPE_CHECKING:
+        model: StructuralModel
+        tolerance: float
+        step_size: float  # In s, in the place of the tolerance; 0: by that.
+
+    @property
+    def solved(self) -> tuple[StructuralModel, Periods | None]:
+        """The model that is solved, and in which bases."""
+        return self.model, None
+
+    def for_model(self, model: StructuralModel) -> Any:
+        """The same for a model whose online parameters are others."""
+        return replace(self, model=model)  # type: ignore[type-var]
+
+    def simulate(
+        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
+        """A run at the maneuver's output times; it may have diverged."""
+        self.model.start(start)
+        model, periods = self.solved
+        return model.run(maneuver, periods, self.tolerance, outputs, step=self.step_size)
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """Runs have no coordinates to project."""
+        del states
+
+
 @dataclass(frozen=True, eq=False)
-class ReducedStructure(ShortRepr):
-    """A structure in one basis, or in another one in each control period.
+class ReducedStructure(StructuralRuns):
+    """A structure in one basis, or in another one in each control period."""
 
-    Attributes
-    ----------
-    model
-        The full one.
-    bases
-        Vectors (n, r) of each period.
-    edges
-        Times in s at which the next period begins.
-    offline, tolerance
-        Cost of making it; error by the step size, as of the full model.
-    step_size
-        In s, in the place of the tolerance; 0: by that.
-    """
-
-    model: StructuralModel
-    bases: tuple[np.ndarray, ...]
-    edges: tuple[float, ...]
+    model: StructuralModel  # The full one.
+    bases: tuple[np.ndarray, ...]  # Vectors (n, r) of each period.
+    edges: tuple[float, ...]  # Times in s at which the next period begins.
+    # Cost of making it; error by the step size, as of the full model.
     offline: OfflineCost
     tolerance: float
-    step_size: float = 0.0
+    step_size: float = 0.0  # In s, in the place of the tolerance; 0: by that.
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if there is no basis of the model's coordinates for each period."""
@@ -132,20 +149,10 @@ class ReducedStructure(ShortRepr):
         passed = tuple(after.T @ (mass @ before) for before, after in pairs)
         return Periods(systems, self.edges, passed)
 
-    def for_model(self, model: StructuralModel) -> "ReducedStructure":
-        """The same bases for a model whose online parameters are others."""
-        return replace(self, model=model)
-
-    def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
-    ) -> Trajectory:
-        """A run at the maneuver's output times."""
-        self.model.start(start)
-        return self.model.run(maneuver, self.periods, self.tolerance, outputs, step=self.step_size)
-
-    def best_approximation(self, states: np.ndarray) -> None:
-        """Runs have no coordinates to project."""
-        del states
+    @property
+    def solved(self) -> tuple[StructuralModel, Periods | None]:
+        """The model in its bases."""
+        return self.model, self.periods
 
 
 @dataclass(frozen=True, eq=False)

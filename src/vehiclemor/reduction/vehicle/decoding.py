@@ -36,16 +36,10 @@ class Transient:
 
     Linear, in closed form: the sum over modes of right w^T d exp(rate t), with d the deviation of
     the start's shape.
-
-    Attributes
-    ----------
-    rates
-        Eigenvalues (m,) in 1/s, one of each conjugate pair.
-    left, right
-        Eigenvectors (m, n), scaled so that real parts of the sum are the motion.
     """
 
-    rates: np.ndarray
+    rates: np.ndarray  # Eigenvalues (m,) in 1/s, one of each conjugate pair.
+    # Eigenvectors (m, n), scaled so that real parts of the sum are the motion.
     left: np.ndarray
     right: np.ndarray
 

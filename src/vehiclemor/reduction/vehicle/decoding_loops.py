@@ -54,26 +54,16 @@ def with_decay(
 
 
 class Known(NamedTuple):
-    """What is known of durations and of a run's start, see `training_reach`.
+    """What is known of durations and of a run's start, see `training_reach`."""
 
-    Attributes
-    ----------
-    times
-        Of the samples, s.
-    lasted, spent
-        Times (2 columns, levels) that are known, and scratch space alike.
-    start
-        When (s) what it excites has settled, how unlike known starts it is, and 1, all zero where
-        the first sample is no start; how far the inputs go, and when (s) they are beyond.
-    sideways
-        How far known starts use the ranges of lateral motion.
-    """
-
-    times: Vector
+    times: Vector  # Of the samples, s.
+    # Times (2 columns, levels) that are known, and scratch space alike.
     lasted: Matrix
     spent: Matrix
+    # When (s) what it excites has settled, how unlike known starts it is, and 1, all zero where the
+    # first sample is no start; how far the inputs go, and when (s) they are beyond.
     start: Vector
-    sideways: Float
+    sideways: Float  # How far known starts use the ranges of lateral motion.
 
 
 def decoded(

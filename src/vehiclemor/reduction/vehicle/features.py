@@ -49,33 +49,21 @@ Factor = TypeVar("Factor")
 
 @dataclass(frozen=True)
 class Features:
-    """Features of so many reduced coordinates z and inputs u, and of parameters p.
-
-    Attributes
-    ----------
-    operations
-        All that they are computed by, from entries of `_x` (z), `_u` and `_constants` (p).
-    named
-        Numbers of the operations with names, see `operations`.
-    terms
-        Number of the operation that gives each feature.
-    groups
-        (numbers of features, columns of C) of each block of C that is not zero; all if empty.
-    watched
-        (operation, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
-        what the features were made for.
-    lateral
-        How many of these, the first ones, move when the vehicle is steered: how long they do
-        counts too.
-    """
+    """Features of so many reduced coordinates z and inputs u, and of parameters p."""
 
     states: int
     inputs: int
+    # All that they are computed by, from entries of `_x` (z), `_u` and `_constants` (p).
     operations: tuple[Operation, ...]
-    named: tuple[int, ...]
-    terms: tuple[int, ...]
+    named: tuple[int, ...]  # Numbers of the operations with names, see `operations`.
+    terms: tuple[int, ...]  # Number of the operation that gives each feature.
+    # (numbers of features, columns of C) of each block of C that is not zero; all if empty.
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
+    # (operation, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves what
+    # the features were made for.
     watched: tuple[tuple[int, str], ...] = ()
+    # How many of these, the first ones, move when the vehicle is steered: how long they do counts
+    # too.
     lateral: int = 0
 
     def check_sizes(self) -> None:

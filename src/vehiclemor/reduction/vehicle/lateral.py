@@ -97,14 +97,8 @@ def linear_reduction(
 ) -> ReducedVehicle:
     """A vehicle whose lateral dynamics stand in the bases that a reductor of pyMOR finds.
 
-    Its outputs are the yaw rate and the lateral speed; `InputError` if the rank is too high.
-
-    Parameters
-    ----------
-    reductor
-        Its class, of models E x' = A x + B u, y = C x.
-    began
-        `time.process_time()` at the beginning of the fit.
+    Its outputs are the yaw rate and the lateral speed; `InputError` if the rank is too high.  The
+    cost is counted from `began` (`time.process_time()`) on.
     """
     from pymor.core.logger import log_levels
     from pymor.models.iosys import LTIModel

@@ -53,44 +53,29 @@ class KnownStart(NamedTuple):
 class ReducedVehicle(ReducedSystem):
     """A vehicle whose reduced equations are linear in features, see `features`.
 
-    Attributes
-    ----------
-    features, parameters
-        Features of the equations and the parameters in their text.
-    coefficients
-        C (terms, states + 3) of the equations.
-    decoding
-        Coefficients (terms, n) of the deviation of the shape from straight running.
-    encoding
-        Reduced coordinates per deviation of the shape (states, n).
-    feedthrough
-        Reduced coordinates per input (states, inputs), to be subtracted at the start.
-    error_scale
-        Magnitude of each reduced state (states + 3,) below which its error counts absolutely.
-    transient
-        What is added to the decoded shapes.
-    decoded_features
-        Features of the decoding, with the same parameters, if not those of the equations.
-    reach
-        What the training runs have shown of durations and starts.
-
     Integrator and tolerance are by default those of runs that are compared with training runs.
     """
 
     model: DynamicModel
     shape: VehicleShape
+    # Features of the equations and the parameters in their text.
     features: Features
     parameters: np.ndarray
-    coefficients: np.ndarray
+    coefficients: np.ndarray  # C (terms, states + 3) of the equations.
+    # Coefficients (terms, n) of the deviation of the shape from straight running.
     decoding: np.ndarray
-    encoding: np.ndarray
+    encoding: np.ndarray  # Reduced coordinates per deviation of the shape (states, n).
+    # Reduced coordinates per input (states, inputs), to be subtracted at the start.
     feedthrough: np.ndarray
+    # Magnitude of each reduced state (states + 3,) below which its error counts absolutely.
     error_scale: np.ndarray
     offline: OfflineCost = NO_COST
     solver: str = "dopri5"
     tolerance: float = 1e-6
-    transient: Transient = NO_TRANSIENT
+    transient: Transient = NO_TRANSIENT  # What is added to the decoded shapes.
+    # Features of the decoding, with the same parameters, if not those of the equations.
     decoded_features: Features | None = None
+    # What the training runs have shown of durations and starts.
     reach: TrainingReach = NOTHING_KNOWN
 
     def check_sizes(self) -> None:

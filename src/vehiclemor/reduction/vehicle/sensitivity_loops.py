@@ -7,49 +7,26 @@ from vehiclemor.simulation.integrators.dense_solves import factorise, substitute
 
 
 class AlongRun(NamedTuple):
-    """A run and its equations' derivatives, at the times that are stepped on.
+    """A run and its equations' derivatives, at the times that are stepped on."""
 
-    Attributes
-    ----------
-    times
-        In s (samples,).
-    columns
-        Features (samples, terms).
-    slopes
-        Derivatives (samples, k + 3, k) of z', psi', U and V by z.
-    motion
-        cos(psi), sin(psi), and the derivatives of X' and Y' by psi (samples, 4).
-    """
-
-    times: Vector
-    columns: Matrix
-    slopes: Cube
-    motion: Matrix
+    times: Vector  # In s (samples,).
+    columns: Matrix  # Features (samples, terms).
+    slopes: Cube  # Derivatives (samples, k + 3, k) of z', psi', U and V by z.
+    motion: Matrix  # cos(psi), sin(psi), and the derivatives of X' and Y' by psi (samples, 4).
 
 
 def sensitivities(
     run: AlongRun,
+    # Feature, and column of C, of each coefficient (m,).
     terms: IntVector,
     targets: IntVector,
-    every: Int,
-    weights: Matrix,
+    every: Int,  # One of so many samples is compared, the last one among them.
+    weights: Matrix,  # Of the states at these samples (compared, k + 3).
     result: Cube,
-    buffer: Vector,
+    buffer: Vector,  # Scratch space (2 (k + 3) m + 3 m + 3 k^2,), as are the pivots (k,).
     pivots: IntVector,
 ) -> Int:
-    """Derivatives (compared samples, k + 3, m) of z, psi, X and Y by m coefficients, weighted.
-
-    Parameters
-    ----------
-    terms, targets
-        Feature, and column of C, of each coefficient (m,).
-    every
-        One of so many samples is compared, the last one among them.
-    weights
-        Of the states at these samples (compared, k + 3).
-    buffer
-        Scratch space (2 (k + 3) m + 3 m + 3 k^2,), as are the pivots (k,).
-    """
+    """Derivatives (compared samples, k + 3, m) of z, psi, X and Y by m coefficients, weighted."""
     times, columns, slopes, motion = run
     samples, k, m = len(times), slopes.shape[2], len(terms)
     dim = k + 3

@@ -66,30 +66,19 @@ AFTER_LANDING, STEERED = 0.3, 1.2
 
 
 class SlowFeatures(FeatureListing):
-    """Lines of features under construction, by name, with the parameters that they take.
-
-    Attributes
-    ----------
-    lateral, symmetric
-        How many coordinates steering moves, and how many others there are.  After the coordinates
-        comes the speed.
-    values
-        Of the parameters.
-    by_name
-        Name of a line -> its value.
-    watched, besides
-        (value, what it is) of what is watched: lateral motion, then the rest.
-    forces
-        Kinds of lines of an axle, whose index stands behind them.
-    """
+    """Lines of features under construction, by name, with the parameters that they take."""
 
     def __init__(self, lateral: int, symmetric: int, inputs: int) -> None:
         super().__init__(lateral + symmetric + 1, inputs)
+        # How many coordinates steering moves, and how many others there are; then comes the speed.
         self.lateral, self.symmetric = lateral, symmetric
-        self.values: list[float] = []
+        self.values: list[float] = []  # Of the parameters.
+        # Name of a line -> its value.
         self.by_name = {f"z{i}": z for i, z in enumerate(self.z)} | {"1": self.number(1.0)}
+        # (value, what it is) of what is watched: lateral motion, then the rest.
         self.watched: list[tuple[Value, str]] = []
         self.besides: list[tuple[Value, str]] = []
+        # Kinds of lines of an axle, whose index stands behind them.
         self.forces: tuple[str, ...] = ()
 
     @property

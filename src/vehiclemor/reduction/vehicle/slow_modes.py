@@ -22,36 +22,23 @@ STILL = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class SlowModes:
-    """Slow modes in real form: those that steering moves, then the slowest symmetric ones.
+    """Slow modes in real form: those that steering moves, then the slowest symmetric ones."""
 
-    Attributes
-    ----------
-    lateral
-        How many coordinates steering moves.
-    rates, input_matrix
-        Of z' the matrix (k, k), blocks of two for conjugate pairs, and the steering's column (k,).
-    left, right
-        z = left d (k, n), and d = right z for slow motion (n, k).
-    input_shift
-        What of the inputs (k + 1, inputs) is subtracted, so that z' has no derivative of the
-        steering; of the speed, which is last, nothing.
-    static_response
-        Deviation (n,) of the shape that follows the steering without delay.
-    speed_left, speed_right
-        Mode of the speed (n,), scaled so that U grows by one.
-    symmetric
-        The other modes that steering does not move, as the transient of a start.
-    """
-
-    lateral: int
-    rates: np.ndarray
+    lateral: int  # How many coordinates steering moves.
+    rates: np.ndarray  # Of z' the matrix (k, k), blocks of two for conjugate pairs.
+    # z = left d (k, n), and d = right z for slow motion (n, k).
     left: np.ndarray
     right: np.ndarray
-    input_matrix: np.ndarray
+    input_matrix: np.ndarray  # Of z' the steering's column (k,).
+    # What of the inputs (k + 1, inputs) is subtracted, so that z' has no derivative of the
+    # steering; of the speed, which is last, nothing.
     input_shift: np.ndarray
+    # Deviation (n,) of the shape that follows the steering without delay.
     static_response: np.ndarray
+    # Mode of the speed (n,), scaled so that U grows by one.
     speed_left: np.ndarray
     speed_right: np.ndarray
+    # The other modes that steering does not move, as the transient of a start.
     symmetric: Transient
 
     @property

@@ -43,37 +43,24 @@ BEYOND = np.array([STILL, MOVING, *np.arange(1, PARTS) / PARTS])
 
 @dataclass(frozen=True)
 class TrainingReach:
-    """What is known of durations and starts.
+    """What is known of durations and starts."""
 
-    Attributes
-    ----------
-    lasted
-        Seconds (2 columns, levels) that a run may be beyond each level of a range; below them
-        their integrals in s^2.
-    sideways
-        How far the starts use the ranges of these columns.
-    decaying
-        Amplitudes (modes,) that a start's transient may have in a run that is steered.
-    faded, steered
-        When (s) known starts that excite modes were steered first, 0 if none was, and their
-        amplitudes (modes,).
-    left
-        What decoding leaves of the states of the shape (n,).
-    starts, begun
-        Directions (m, n), in parts of `left`, in which known starts leave more, and how far.
-    inputs
-        Sizes (3, inputs) that the inputs may have between output times too, see `Extent`; nothing
-        is told of them where it is empty.
-    """
-
+    # Seconds (2 columns, levels) that a run may be beyond each level of a range; below them their
+    # integrals in s^2.
     lasted: np.ndarray
-    sideways: float
+    sideways: float  # How far the starts use the ranges of these columns.
+    # Amplitudes (modes,) that a start's transient may have in a run that is steered.
     decaying: np.ndarray
+    # When (s) known starts that excite modes were steered first, 0 if none was, and their
+    # amplitudes (modes,).
     faded: float
     steered: np.ndarray
-    left: np.ndarray
+    left: np.ndarray  # What decoding leaves of the states of the shape (n,).
+    # Directions (m, n), in parts of `left`, in which known starts leave more, and how far.
     starts: np.ndarray
     begun: np.ndarray
+    # Sizes (3, inputs) that the inputs may have between output times too, see `Extent`; nothing is
+    # told of them where it is empty.
     inputs: np.ndarray = field(default_factory=lambda: np.zeros((3, 0)))
 
     def check_sizes(self) -> None:

@@ -86,12 +86,9 @@ def improved(
 ) -> ReducedVehicle:
     """The reduced vehicle after so many damped Gauss-Newton steps of its free coefficients.
 
-    Parameters
-    ----------
-    power
-        Of the runs' errors in the sum that is made small.  With 1 the worst runs count no more than
-        the others (iteratively reweighted least squares): of use from a first guess on, where the
-        errors of some are too large to say much.
+    The sum that is made small is of so high a power of the runs' errors.  With 1 the worst runs
+    count no more than the others (iteratively reweighted least squares): of use from a first guess
+    on, where the errors of some are too large to say much.
     """
     paths, error = _compared(reduced, targets, power)
     change, moved, damping = np.zeros(sum(len(terms) for terms, _ in free)), reduced, DAMPING

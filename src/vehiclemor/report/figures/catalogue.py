@@ -14,7 +14,7 @@ from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder, write_text
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
-from vehiclemor.report.figures import errors, paper, result_plot, runs, schematics, size, theme
+from vehiclemor.report.figures import errors, pareto, result_plot, runs, size, theme
 from vehiclemor.report.result_selection import drawn
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import studies_and_files
@@ -34,15 +34,10 @@ def figure_result(results: theme.Results, *, kind: str) -> Figure:
 
 # What `draw` of an entry names.
 DRAWINGS: dict[str, Callable[..., Figure]] = {
-    "schematic": schematics.figure_schematic,
     "histories": runs.figure_histories,
     "paths": runs.figure_paths,
     "errors": errors.figure_errors,
-    "spread": paper.figure_spread,
-    "spectrum": paper.figure_spectrum,
-    "unseen inputs": paper.figure_unseen,
-    "equation order": paper.figure_equation_order,
-    "pareto": paper.figure_pareto,
+    "pareto": pareto.figure_pareto,
     "result": figure_result,
     "size": size.figure_size,
 }
@@ -65,7 +60,7 @@ class Entry(FileSchema):
 
     name: str
     drawing: str = Field(alias="draw")
-    studies: list[str] = Field(default_factory=list)
+    studies: list[str]
     datasets: list[str] = Field(default_factory=list)
     caption: str
     default: bool = True
@@ -79,7 +74,7 @@ class Entry(FileSchema):
     def draw(self, results: theme.Results) -> Figure:
         """Draw it from the combined datasets by study; what it does not show is left out."""
         shown = {name: results[name] for name in self.names}
-        return DRAWINGS[self.drawing](*([shown] if shown else []), **self.options)
+        return DRAWINGS[self.drawing](shown, **self.options)
 
 
 class FigureFile(FileSchema):
@@ -216,7 +211,5 @@ def _draw(entry: Entry, data: theme.Results, files: list[Path]) -> str:
     figure = entry.draw(data)
     for path in files:
         theme.save_figure(figure, path)
-    if not entry.studies:
-        return entry.caption
     hashes = sorted({str(data[name].attrs["kernel_hash"]) for name in entry.names})
     return f"{entry.caption} Studies: {', '.join(entry.names)}; kernels {', '.join(hashes)}."

@@ -235,8 +235,9 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> None:
         axis.semilogy(edges, steps, label=curve.text, drawstyle="steps-post", **curve.style)
         rms = curve.run["rms_error"].sel(output=output).item()
         if str(curve.run["status"].item()) in FINISHED and rms:
-            at = 1.0 + min(0.03, 0.12 / len(runs.curves)) * number
-            edge: Style = {"transform": axis.get_yaxis_transform(), "clip_on": False}
+            # Side by side within the axes.
+            at = 0.985 - min(0.03, 0.12 / len(runs.curves)) * number
+            edge: Style = {"transform": axis.get_yaxis_transform()}
             axis.plot(at, rms, color=curve.style["color"], **edge, **RMS_MARK)
             marked.append(rms)
     axis.plot([], [], color="black", label="RMS error over the run (right edge)", **RMS_MARK)

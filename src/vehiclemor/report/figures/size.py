@@ -16,9 +16,9 @@ LOOKS: tuple[Style, ...] = (
     {"color": "#CC79A7", "marker": "^"},
 )
 # Places of names beside marks, in points.
-OFFSETS = (4, 4), (2, -16), (6, -8)
-VEHICLES = {"double_wishbone": "wishbone", "independent_suspension_vehicle": "14-DOF car"}
-VEHICLES |= {"high_fidelity_vehicle": "high-fidelity car"}
+OFFSETS = (4, 4), (-16, -13), (4, -17)
+VEHICLES = {"double_wishbone": "suspension", "independent_suspension_vehicle": "14-DOF"}
+VEHICLES |= {"high_fidelity_vehicle": "high-fidelity"}
 
 
 def figure_size(results: Results) -> Figure:

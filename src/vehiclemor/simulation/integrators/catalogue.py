@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,93 +29,47 @@ from vehiclemor.simulation.integrators.structures import Control
 STEP_GRID = 2.0 ** (0.125 * np.arange(-128, 25))
 # A run that needs more evaluations of its right-hand side than this is going nowhere.
 MOST_CALLS = 100_000
-# A kernel of whole steps for more states than these would be too long.
-MOST_STATES = 64
-NOTHING = np.zeros((1, 1, 1))
 
 
 class Stored(NamedTuple):
     """What is stored of a frozen Jacobian: matrices by step size, and one for all step sizes."""
 
     operators: np.ndarray
-    shared: np.ndarray = NOTHING[0]
-
-
-class Stepped(NamedTuple):
-    """Whole steps as one kernel.
-
-    It is made from the frame and the number of inputs, its tables are transposed operators (step
-    sizes, tables, n, n) of a diagonal block, and the loop's functions stand in the modules.
-    """
-
-    kernel: Callable[[Frame, int], Kernel]
-    tables: Callable[[np.ndarray], np.ndarray]
-    modules: tuple[str, ...]
+    shared: np.ndarray = np.zeros((1, 1))
 
 
 @dataclass(frozen=True)
 class Integrator:
-    """One integrator, and what the time loop must know of it.
+    """One integrator, and what the time loop must know of it."""
 
-    Attributes
-    ----------
-    summary
-        One line.
-    order
-        Power of the step size with which the error at the end of a run falls.
-    control
-        Its step-size control.
-    modules
-        Modules of its functions, those that it shares first.
-    tableau
-        Its coefficients.
-    operators
-        Makes what is stored of a frozen Jacobian (dim, dim) and the active states; none for a
-        method with fresh Jacobians or without any.
-    formulation
-        Of the full system.
-    rows, squares, numbers
-        Scratch space: vectors and matrices of the system's dimension, and single numbers.
-    stepped
-        How it takes whole steps of a system that is not projected.
-    """
-
-    summary: str
-    order: int
-    control: Control
-    modules: tuple[str, ...]
-    tableau: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))
-    operators: Callable[[np.ndarray, np.ndarray], Stored] | None = None
-    formulation: str = "full"
+    summary: str  # One line.
+    order: int  # Power of the step size with which the error at the end of a run falls.
+    control: Control  # Its step-size control.
+    modules: tuple[str, ...]  # Modules of its functions, those that it shares first.
+    tableau: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))  # Its coefficients.
+    # Makes the kernel of a whole step from the frame and the number of inputs, where it has one.
+    step_kernel: Callable[[Frame, int], Kernel] | None = None
+    # Makes what is stored of a frozen Jacobian: transposed operators (step sizes, tables, n, n) of
+    # a diagonal block for a kernel of whole steps, else `Stored`.  None for a method with fresh
+    # Jacobians or without any.
+    tables: Callable[[np.ndarray], Any] | None = None
+    formulation: str = "full"  # Of the full system.
+    # Scratch space: vectors and matrices of the system's dimension, and single numbers.
     rows: int = 24
     squares: int = 0
     numbers: int = 16
-    stepped: Stepped | None = None
 
 
-def inverses(jacobian: np.ndarray, active: np.ndarray) -> Stored:
-    """Transposed active columns (step sizes, active, dim) of (I - gamma h J)^-1."""
-    return Stored(np.ascontiguousarray(transposed_inverses(jacobian)[:, 0, active]))
-
-
-def transposed_inverses(jacobian: np.ndarray) -> np.ndarray:
+def inverses(jacobian: np.ndarray) -> np.ndarray:
     """Transposed (step sizes, 1, n, n) of (I - gamma h J)^-1."""
     matrices = np.eye(len(jacobian)) - ros34pw2.GAMMA * STEP_GRID[:, None, None] * jacobian
     return np.ascontiguousarray(np.linalg.inv(matrices).swapaxes(1, 2)[:, None])
 
 
-def matrix_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:
-    """Matrix functions (step sizes, 7 dim, dim) of the exponential method."""
-    del active
-    tables = exponential_functions.exponential_tables(jacobian, STEP_GRID)
-    return Stored(np.ascontiguousarray(tables.reshape(len(STEP_GRID), -1, tables.shape[-1])))
-
-
-def modal_functions(jacobian: np.ndarray, active: np.ndarray) -> Stored:
+def modal_functions(jacobian: np.ndarray) -> Stored:
     """Functions of the modes; transposed S and T, and the rest of `exponential_modes.Modes`."""
     from vehiclemor.simulation.integrators.exponential_adams import PHI
 
-    del active
     found, n = exponential_modes.modes(jacobian), len(jacobian)
     parts = [found.rows.T, found.columns.T, found.rates[None], found.forth[None], found.back[None]]
     shared = [np.pad(part, ((0, 0), (0, n - part.shape[1]))) for part in parts]
@@ -144,10 +98,8 @@ INTEGRATORS = {
         Control(1.0 / 3.0, 1.0 / 3.0),
         ("step_grid", "cubic", "ros34pw2"),
         ros34pw2.tableau(),
+        w_step,
         inverses,
-        stepped=Stepped(
-            w_step, transposed_inverses, ("step_grid", "cubic", "ros34pw2", "stepped_ros34pw2")
-        ),
     ),
     "etdrk4": Integrator(
         "exponential method of order 4, with the same",
@@ -162,13 +114,9 @@ INTEGRATORS = {
             shortest_first=float(STEP_GRID[0]),
         ),
         ("step_grid", "cubic", "etdrk4"),
-        operators=matrix_functions,
+        step_kernel=exponential_step,
+        tables=partial(exponential_functions.exponential_tables, grid=STEP_GRID),
         rows=32,
-        stepped=Stepped(
-            exponential_step,
-            partial(exponential_functions.exponential_tables, grid=STEP_GRID),
-            ("step_grid", "cubic", "etdrk4", "stepped_etdrk4"),
-        ),
     ),
     "exponential_adams": Integrator(
         "exponential Adams method of order up to 6, with the same",
@@ -184,7 +132,7 @@ INTEGRATORS = {
             keep_most=1.18,
         ),
         ("step_grid", "adams_weights", "exponential_adams"),
-        operators=modal_functions,
+        tables=modal_functions,
         formulation="vehicle_frame",
         rows=65,
         numbers=64,
@@ -202,7 +150,7 @@ def integrator(name: str) -> Integrator:
 
 def frozen(name: str) -> bool:
     """Whether an integrator stores operators of one Jacobian for all runs."""
-    return integrator(name).operators is not None
+    return integrator(name).tables is not None
 
 
 @lru_cache(maxsize=64)
@@ -228,22 +176,21 @@ def rhs_loop(formulation: str) -> Loop:
     return loops(modules, ("rhs_at",))["rhs_at"]
 
 
-def time_loop(chosen: Integrator, formulation: str, whole_steps: bool = False) -> Loop:
-    """The compiled time loop of an integrator and a formulation; a kernel may take whole steps."""
-    own = chosen.stepped.modules if whole_steps and chosen.stepped else chosen.modules
+def time_loop(chosen: Integrator, formulation: str) -> Loop:
+    """The compiled time loop of an integrator and a formulation."""
     modules = (
         *_problem_modules(formulation),
-        *(f"simulation.integrators.{name}" for name in own),
+        *(f"simulation.integrators.{name}" for name in chosen.modules),
         "simulation.integrators.loop",
     )
-    with first_use(f"the time loop of {own[-1]}"):
+    with first_use(f"the time loop of {chosen.modules[-1]}"):
         return loops(modules, ("integrate",))["integrate"]
 
 
-def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, whole_steps: bool) -> int:
+def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int) -> int:
     """Floats of scratch space for n states, the largest reduced dimension and so many inputs."""
     # Vectors of a kernel of whole steps are padded, block by block.
-    row = dim + 8 if whole_steps else dim
+    row = dim + 8 if chosen.step_kernel else dim
     own = chosen.rows * row + chosen.squares * dim * dim + 3 * inputs + chosen.numbers
     return scratch_end(n, inputs) + own
 
@@ -252,11 +199,7 @@ def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int, whole_steps:
 LOOP_SOURCES = (
     "inputs.polynomial_loops",
     *(f"simulation.formulations.{name}" for name in FORMULATIONS),
-    *(
-        f"simulation.integrators.{name}"
-        for own in INTEGRATORS.values()
-        for name in dict.fromkeys((*own.modules, *(own.stepped.modules if own.stepped else ())))
-    ),
+    *(f"simulation.integrators.{name}" for own in INTEGRATORS.values() for name in own.modules),
     "simulation.integrators.structures",
     "simulation.integrators.loop",
     "simulation.path_loops",

@@ -1,4 +1,42 @@
-"""LU factors with partial pivoting, and their solutions."""
+"""Dense systems of equations: LU factors with partial pivoting, their solutions, small systems."""
+
+import math
+
+INLINED = ("small_solve",)
+
+
+def small_solve(a, r):
+    """Solve the leading r x r block of a for its last column, which the solution replaces.
+
+    Gives the sign of the determinant, zero if a pivot is zero or not finite.
+    """
+    sign, last = 1, a.shape[1] - 1
+    for k in range(r):
+        pivot = k
+        for i in range(k + 1, r):
+            if abs(a[i, k]) > abs(a[pivot, k]):
+                pivot = i
+        if a[pivot, k] == 0.0 or not math.isfinite(a[pivot, k]):
+            return 0
+        if a[pivot, k] < 0.0:
+            sign = -sign
+        if pivot != k:
+            sign = -sign
+            for j in range(k, r):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+            a[k, last], a[pivot, last] = a[pivot, last], a[k, last]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, r):
+            factor = a[i, k] * inverse
+            for j in range(k + 1, r):
+                a[i, j] -= factor * a[k, j]
+            a[i, last] -= factor * a[k, last]
+    for k in range(r - 1, -1, -1):
+        total = a[k, last]
+        for j in range(k + 1, r):
+            total -= a[k, j] * a[j, last]
+        a[k, last] = total / a[k, k]
+    return sign
 
 
 def factorise(matrix, rows):

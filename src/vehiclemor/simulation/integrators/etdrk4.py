@@ -17,52 +17,48 @@ end (in the first step of a span, of order 2 through now and its end).  Linear m
 at the end of a step, however long, but the cubic between has: its defect half-way is added.
 
 Steps are those of a grid; where a break point asks for another step h the functions of the nearest
-one serve, exact for A = J grid[index] / h.  Operators: see `exponential_functions`.
+one serve, exact for A = J grid[index] / h.  Operators: see `exponential_functions`.  A whole step
+is one kernel, see `step_kernels.exponential_step`.
 """
 
-from vehiclemor.codegen.loop_types import matrix, vector
+from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
+from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.formulations.full import rhs
-from vehiclemor.simulation.integrators.step_grid import (
-    add_rows,
-    heading_of,
-    index_below,
-    nearest_index,
-    rotate,
-)
-from vehiclemor.simulation.integrators.structures import RHS_CALLS, Work
+from vehiclemor.simulation.integrators.step_grid import index_below, nearest_index
+from vehiclemor.simulation.integrators.structures import RHS_CALLS, STEP_KERNEL, Work
 
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = (
-    "begin",
-    "accept",
-    "longest_step",
-    "step",
-    "take_stages",
-    "estimate_error",
-    "quadrature_weights",
-)
+INLINED = ("accept", "longest_step", "step", "quadrature_weights", "keep_past")
 # Share of the difference D5 - D4 that is the error, as in RK4(3)T: 1/10 to the weight 1/6.
 ERROR_SHARE = 0.6
-# Rows of scratch space behind those of the four D.
-V, HALF, WHOLE_STEP, PRODUCT, F1, Y_PAST, F_PAST, CHANGE = range(4, 12)
 
 
 def work_space(buffer, first, integers, dim, inputs):
-    """Scratch space from place `first` of the buffer on."""
-    rows, none = matrix(buffer, first, 5, dim), vector(buffer, first, 0)
-    stages = matrix(buffer, first + 5 * dim, 12, dim)
-    curve = matrix(buffer, first + 17 * dim, 3, dim)
-    states = rows[0], rows[1], rows[2], rows[3], rows[4], stages[V]
-    whole, memory = (integers, integers), vector(buffer, first + 20 * dim, 4)
-    return Work(*states, stages, curve, rows, rows, *whole, memory, none, none, none)
+    """Scratch space from place `first` of the buffer on; what the step needs besides is last."""
+    given = vector(buffer, first, 4 * dim + 6 + 2 * inputs)
+    place = first + len(given)
+    rows = matrix(buffer, place, 4, dim)
+    memory = vector(buffer, place + 4 * dim, 4)
+    stride = (dim + 3) // 4 * 4
+    result = vector(buffer, place + 4 * dim + 4, 3 * stride)
+    end, rates, error = result[:dim], result[stride : stride + dim], result[2 * stride :]
+    states = given[:dim], given[dim : 2 * dim], end, rates, error[:dim], rows[0]
+    values, whole = given[4 * dim + 6 :], (integers, integers)
+    return Work(*states, rows, rows[1:], rows, rows, *whole, memory, given, values, result)
 
 
 def begin(problem, t, method, work):
     """Right-hand side at the beginning of a span; there is no step before."""
     rhs(problem, t, work.y, work.f)
     work.places[0], work.memory[0] = len(method.grid) // 2, 0.0
-    for i in range(len(work.y)):
-        work.stages[Y_PAST, i], work.stages[F_PAST, i] = work.y[i], work.f[i]
+    keep_past(work)
+
+
+def keep_past(work):
+    """Copy state and right-hand side to where the kernel looks for those of the step before."""
+    dim = len(work.y)
+    for i in range(2 * dim):
+        work.given[2 * dim + i] = work.given[i]
 
 
 def longest_step(h, method, control, work):
@@ -79,109 +75,28 @@ def quadrature_weights(past, h):
     return 1.0 / (ratio * (ratio + 1.0)), -4.0, (1.0 + 2.0 * ratio) / (1.0 + ratio)
 
 
-def applied(operators, first, b, result):
-    """Product of a matrix with b; its transpose are rows of the operators from `first` on."""
-    for i in range(len(b)):
-        result[i] = 0.0
-    add_rows(operators, first, b, len(b), result)
-
-
 def step(problem, t, h, method, work, counts):
     """Try a step; it is always possible."""
+    given, values, u = work.given, work.values, problem.u
     index = nearest_index(method.grid, work.places[0], h)
     work.places[0] = index
-    stretch = method.grid[index] / h
-    take_stages(problem, t, h, stretch, method, work)
-    estimate_error(h, stretch, method, work)
+    first = 4 * len(work.y)
+    given[first], given[first + 1] = h, method.grid[index] / h
+    at_past, at_half, at_end = quadrature_weights(work.memory[0], h)
+    given[first + 2], given[first + 3], given[first + 4] = at_past, at_half, at_end
+    # The shortest step of the grid is as good as a point in time.
+    given[first + 5] = h if h > 1.0001 * method.grid[0] else 0.0
+    for stage in range(2):
+        input_at(problem, t + 0.5 * (stage + 1) * h, u)
+        for i in range(len(u)):
+            values[stage * len(u) + i] = u[i]
+    equations, tables = problem.equations, method.operators[index]
+    call_kernel(equations.kernels, STEP_KERNEL, given, tables, equations.constants, work.result)
     counts[RHS_CALLS] += 4
     return True
 
 
-def take_stages(problem, t, h, stretch, method, work):
-    """Stages v and their D; the last stage is the new state."""
-    rows, y, mid = work.stages, work.y, work.new
-    v, product, f1 = rows[V], rows[PRODUCT], rows[F1]
-    half, whole_step = rows[HALF], rows[WHOLE_STEP]
-    dim = len(y)
-    operators = method.operators[work.places[0]]
-    turns = len(method.rotating) > 0
-    cosine, sine = heading_of(method.rotating, y)
-    for i in range(dim):
-        f1[i] = work.f[i]
-    if turns:
-        rotate(f1, method.rotating, cosine, -sine)
-    applied(operators, dim, f1, half)
-    applied(operators, 3 * dim, f1, whole_step)
-    for stage in range(4):
-        if stage == 0:
-            for i in range(dim):
-                v[i] = h * half[i]
-        elif stage == 1:
-            applied(operators, 2 * dim, rows[0], product)
-            for i in range(dim):
-                v[i] = h * (half[i] + product[i])
-        elif stage == 2:
-            applied(operators, 4 * dim, rows[1], product)
-            for i in range(dim):
-                v[i] = h * (whole_step[i] + product[i])
-        else:
-            for i in range(dim):
-                mid[i] = rows[0, i] + rows[1, i]
-            applied(operators, 5 * dim, mid, product)
-            applied(operators, 6 * dim, rows[2], work.error)
-            for i in range(dim):
-                v[i] = h * (whole_step[i] + product[i] + work.error[i])
-        applied(operators, 0, v, product)
-        if turns:
-            rotate(v, method.rotating, cosine, sine)
-        for i in range(dim):
-            mid[i] = y[i] + v[i]
-        rhs(problem, t + (0.5 if stage < 2 else 1.0) * h, mid, work.f_new)
-        d = rows[stage]
-        for i in range(dim):
-            d[i] = work.f_new[i]
-        if turns:
-            rotate(d, method.rotating, cosine, -sine)
-        for i in range(dim):
-            d[i] -= f1[i] + stretch * product[i]
-
-
-def estimate_error(h, stretch, method, work):
-    """Estimates of the error of the step and of the cubic between its ends."""
-    rows, y, f = work.stages, work.y, work.f
-    v, product, change_of = rows[V], rows[PRODUCT], rows[CHANGE]
-    half, whole_step = rows[HALF], rows[WHOLE_STEP]
-    dim = len(y)
-    operators = method.operators[work.places[0]]
-    turns = len(method.rotating) > 0
-    cosine, sine = heading_of(method.rotating, y)
-    at_past, at_half, at_end = quadrature_weights(work.memory[0], h)
-    for i in range(dim):
-        v[i] = y[i] - rows[Y_PAST, i]
-        change_of[i] = f[i] - rows[F_PAST, i]
-    if turns:
-        rotate(v, method.rotating, cosine, -sine)
-        rotate(change_of, method.rotating, cosine, -sine)
-    applied(operators, 0, v, product)
-    for i in range(dim):
-        change = ERROR_SHARE * (rows[3, i] - rows[2, i]) + at_half * 0.5 * (rows[0, i] + rows[1, i])
-        change += at_end * rows[3, i] + at_past * (change_of[i] - stretch * product[i])
-        v[i] = h * change
-    applied(operators, 6 * dim, v, work.error)
-    applied(operators, 0, whole_step, product)
-    # The shortest step of the grid is as good as a point in time.
-    share = h if h > 1.0001 * method.grid[0] else 0.0
-    for i in range(dim):
-        v[i] = share * (half[i] - 0.5 * whole_step[i] + 0.125 * stretch * h * product[i])
-    if turns:
-        rotate(work.error, method.rotating, cosine, sine)
-        rotate(v, method.rotating, cosine, sine)
-    for i in range(dim):
-        work.error[i] = abs(work.error[i]) + abs(v[i])
-
-
 def accept(problem, t, h, method, work, counts):
     """Keep the beginning of the step for the next one's estimate of the error."""
-    for i in range(len(work.y)):
-        work.stages[Y_PAST, i], work.stages[F_PAST, i] = work.y[i], work.f[i]
+    keep_past(work)
     work.memory[0] = h

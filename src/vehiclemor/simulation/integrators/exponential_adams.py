@@ -61,25 +61,12 @@ NOW, PREDICTED, NEW, ADDED = range(4)
 
 
 class AdamsWork(NamedTuple):
-    """Scratch space.
+    """Scratch space: what `structures.Work` has, and of the method.
 
-    Attributes
-    ----------
-    y, f, new, f_new, error, middle
-        See `structures.Work`.
-    predictor
-        State (dim,) of the predictor.
-    past
-        Rows f, S f, N of the steps kept, and y from place 3 dim on; the last is the predictor's.
-    modal
-        Modal vectors by row, see above.
-    weights
-        Functions of h B (order + 1, r + 2 pairs): weights of N in the predictor, then in the
-        corrector.
-    sums
-        Sums (2, dim + 2 r) over the rows of the past: in the classical predictor, and at the end.
-    numbers, places
-        See above.
+    The predictor's state (dim,); rows (f, S f, N, y) of the steps kept, the predictor's last; modal
+    vectors by row; weights (order + 1, r + 2 pairs) of N in the predictor, then in the corrector;
+    sums (2, dim + 2 r) over the rows of the past in the classical predictor and at the end; numbers
+    and places as above.
     """
 
     y: Vector

@@ -35,17 +35,9 @@ TERMS = 40
 class Modes(NamedTuple):
     """A = T B S with modes in order: single ones, first and second of each pair.
 
-    B v = rates v, and of a pair moreover (B v)_1 += forth v_2, (B v)_2 += back v_1: forth = -back
-    of complex eigenvalues, forth = 0 of a Jordan block.
-
-    Attributes
-    ----------
-    columns, rows
-        T (n, r) and S (r, n).
-    rates
-        Diagonal of B (r,).
-    forth, back
-        The rest of it (pairs,).
+    Columns are T (n, r), rows S (r, n), rates the diagonal of B (r,), forth and back (pairs,) the
+    rest of it: B v = rates v, and of a pair moreover (B v)_1 += forth v_2, (B v)_2 += back v_1;
+    forth = -back of complex eigenvalues, forth = 0 of a Jordan block.
     """
 
     columns: np.ndarray

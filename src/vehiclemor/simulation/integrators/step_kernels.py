@@ -1,7 +1,7 @@
 """Kernels that take whole steps of a system with a frozen Jacobian.
 
-With two or four dozen states the loops of `ros34pw2` and `etdrk4` take as long as the right-hand
-side.  These kernels do what a step does there in vectors of known length, and execute the
+With two or four dozen states the loops around the stages would take as long as the right-hand side.
+These kernels do a step of `ros34pw2` or `etdrk4` in vectors of known length, and execute the
 right-hand side by its address.  Vectors that stored operators are applied to stand in a frame: the
 heading is turned to zero, and left and right are replaced by sum and difference, in which the
 Jacobian of a vehicle, its own mirror image, has two diagonal blocks.

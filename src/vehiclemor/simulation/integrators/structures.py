@@ -7,7 +7,7 @@ from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, V
 from vehiclemor.inputs.sample_loops import Pieces
 
 # Places of a system's kernels in its list of addresses; see `System`.
-DERIVATIVE, OUTPUTS, SECOND_ORDER, SPEEDS, STEP_KERNEL = range(5)
+DERIVATIVE, SECOND_ORDER, SPEEDS, STEP_KERNEL = range(4)
 # Why a run has ended: all well, too many evaluations, not finite, singular matrix, tiny step.
 FINISHED, TOO_MANY_CALLS, NOT_FINITE, SINGULAR, STEP_TOO_SMALL = range(5)
 # Places of the counts of a run.
@@ -17,16 +17,9 @@ RHS_CALLS, STEPS, REJECTED_STEPS, JACOBIANS, FACTORISATIONS, LINEAR_SOLVES = ran
 class Equations(NamedTuple):
     """Compiled equations dx/dt = f(x, u).
 
-    Attributes
-    ----------
-    kernels
-        Addresses of the kernels by place, zero where there is none.
-    constants
-        Hoisted constants of the parameters.
-    error_scale
-        Magnitude of each state below which errors count absolutely.
-    turning
-        Numbers of the heading and of pairs of velocities that turn with it; may be empty.
+    Addresses of the kernels by place, zero where there is none, and their hoisted constants; the
+    magnitude of each state below which errors count absolutely; numbers of the heading and of pairs
+    of velocities that turn with it, if there are any.
     """
 
     kernels: IntVector
@@ -66,21 +59,9 @@ class Subspaces(NamedTuple):
 class Method(NamedTuple):
     """What an integrator needs beside its code.
 
-    Attributes
-    ----------
-    tableau
-        Coefficients, packed as the integrator wants them.
-    grid
-        Step sizes (s) for which operators are stored.
-    operators
-        Stored operators of each step size.
-    shared
-        What is stored of the frozen Jacobian for all step sizes.
-    active
-        Numbers of the states that the right-hand side depends on.
-    rotating
-        Numbers of the heading and of pairs of states that turn with it: stored operators belong to
-        heading zero.  May be empty.
+    Its coefficients; step sizes (s) for which operators of a frozen Jacobian are stored, these
+    operators, and what is shared by all step sizes; numbers of the states that the right-hand side
+    depends on.
     """
 
     tableau: Matrix
@@ -88,7 +69,6 @@ class Method(NamedTuple):
     operators: Cube
     shared: Matrix
     active: IntVector
-    rotating: IntVector
 
 
 class Control(NamedTuple):
@@ -96,32 +76,24 @@ class Control(NamedTuple):
 
     Attributes
     ----------
-    exponent, rejected_exponent
-        Of the error in the factor of the next step, and after a rejected step.
-    memory_exponent
-        Of the error before.
+    exponent, rejected_exponent, memory_exponent
+        Of the error in the factor of the next step, after a rejected step, and of the error before.
     memory_start, memory_floor
         What counts as the error before the first step, and at least as that before any other.
-    shrink_least, shrink, grow
-        Smallest factor after a rejected and after an accepted step, largest factor.
-    safety
-        Share of the step size that the error asks for.
+    shrink_least, shrink, grow, safety
+        Smallest factor after a rejected and after an accepted step, largest factor; share of the
+        step size that the error asks for.
     keep_least, keep_most
         Factors between which the step size stays.
     halve_last
         Whether two equal steps are taken instead of a long and a tiny one (1) or not (0).
-    shortest_first
-        Shortest first guess of a step in s.
     tolerance
         Largest local error of a state relative to its scale plus its own size.
-    longest
-        Longest step in s.
-    restart
-        Longest first step after a break point of the inputs in s.
+    shortest_first, longest, restart, first
+        In s: shortest first guess of a step, longest step, longest first step after a break point
+        of the inputs, first step to try (0 if it is to be guessed).
     most_calls
         Evaluations of the right-hand side after which a run is given up.
-    first
-        First step to try in s; 0 if it is to be guessed.
     """
 
     exponent: Float
@@ -150,29 +122,14 @@ NODE_1, NODE_2 = 0.03806023374435663, 0.30865828381745514
 
 
 class Output(NamedTuple):
-    """Where a run is recorded.
+    """Where a run is recorded: states (samples, n) at its output times, and counts by place.
 
     A run with `places` is recorded at points instead: at the samples themselves where a step has
-    few, else at `NODES` points of the step, through which cubics give the samples, as dense output
-    of order 3 does.
-
-    Attributes
-    ----------
-    samples
-        Output times in s.
-    path
-        States (samples, n) at these times, or at the points.
-    counts
-        By place, see above.
-    given
-        Inputs (samples, inputs) at the samples.
-    inputs, point_times
-        Inputs (samples, inputs) at the points, and their times (samples,).
-    places
-        By sample (samples, 2): row of its point, or of the first of its step's, and which part of
-        the step has passed then; -1 where there is no row, and no step.
-    direct_until
-        Time up to which the points are the samples.
+    few, and up to the time `direct_until`; else at `NODES` points of the step, through which cubics
+    give the samples, as dense output of order 3 does.  A place (samples, 2) is the row of the
+    sample's point, or of the first of its step's, and which part of the step has passed then; -1
+    where there is no row, and no step.  Inputs are those given at the samples, and those at the
+    points, whose times are kept too.
     """
 
     samples: Vector
@@ -188,16 +145,9 @@ class Output(NamedTuple):
 class Outputs(NamedTuple):
     """Some outputs of a model.
 
-    Attributes
-    ----------
-    kernel
-        Address of their kernel: for `LANES` samples, or for one on shorter paths.
-    constants
-        Of the kernel.
-    columns
-        By output the column of the states, or -1 less the column of the kernel's results.
-    ranges
-        Smallest and largest value (limited, 2) of those that are watched.
+    Address of their kernel, for `LANES` samples or for one on shorter paths, and its constants; by
+    output the column of the states, or -1 less the column of the kernel's results; ranges
+    (limited, 2) of those that are watched.
     """
 
     kernel: IntVector
@@ -230,28 +180,11 @@ class Problem(NamedTuple):
 class Work(NamedTuple):
     """Scratch space of an integrator; what it doesn't use is empty.
 
-    Attributes
-    ----------
-    y, f
-        Reduced state (dim,) and right-hand side at the beginning of the step.
-    new, f_new
-        The same at its end, once the step is accepted.
-    error
-        Estimate of the local error (dim,).
-    middle
-        State of a stage.
-    stages
-        Rows of stages (stages, dim).
-    curve
-        Coefficients (3, dim) of the interpolation, powers 1 to 3 of the part that has passed.
-    jacobian, factors
-        Jacobian and factorised matrix (dim, dim).
-    pivots, places
-        Rows of the factorisation (dim,); the integrator's own integers (4,).
-    memory
-        The integrator's own numbers (4,).
-    given, values, result
-        Arguments and result of a kernel that takes whole steps.
+    Reduced state y (dim,) and right-hand side f at the beginning of the step, the new ones at its
+    end once it is accepted; error (dim,); state in the middle of a step; rows of stages; curve
+    (3, dim), powers 1 to 3 of the part that has passed; Jacobian and factorised matrix (dim, dim)
+    with its pivots; the integrator's own integers (places) and numbers (memory), four each;
+    arguments and result of a kernel that takes whole steps.
     """
 
     y: Vector

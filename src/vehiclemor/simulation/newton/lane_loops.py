@@ -8,6 +8,7 @@ up: the caller solves sample by sample.
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Matrix, Vector, call_lanes, matrix, vector
 from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.simulation.integrators.dense_solves import small_solve
 from vehiclemor.simulation.newton.newton_loops import (
     CERTAIN,
     CONTRACTION,
@@ -22,7 +23,6 @@ from vehiclemor.simulation.newton.newton_loops import (
     all_below,
     largest_of,
     residual_jacobian,
-    small_solve,
     stopped,
     within,
 )

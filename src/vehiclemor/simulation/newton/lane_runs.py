@@ -1,7 +1,6 @@
 """Runs of Newton's method in vector lanes, packed once for all with the same inputs."""
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -10,14 +9,6 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.newton.newton_loops import SAMPLE, Solution
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.workspaces import Pool
-
-
-class LaneRun(NamedTuple):
-    """The loop with its arguments, its counts, and the word of the address of its table."""
-
-    call: Prepared
-    counts: np.ndarray
-    table: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +22,8 @@ class LaneRuns:
     mechanism: Ready
     kernels: np.ndarray
     sizes: tuple[int, int, int]
-    _pool: Pool[LaneRun] = field(default_factory=Pool)
+    # The loop with its arguments, its counts, and the word of the address of its table.
+    _pool: Pool[tuple[Prepared, np.ndarray, int]] = field(default_factory=Pool)
 
     def solved(
         self, samples: Ready, iteration: Ready
@@ -41,16 +33,16 @@ class LaneRuns:
         There are as many samples as lanes at least.
         """
         kind, (n, _, m) = (samples, iteration), self.sizes
-        run = self._pool.taken(kind, lambda: self._packed(samples, iteration))
+        run = call, counted, place = self._pool.taken(kind, lambda: self._packed(*kind))
         # One table is written faster than two.
         table = np.empty((len(samples.bundle.inputs), n + m))
-        run.call.words[run.table] = address_of_array(table)
-        status, seconds = timed(run.call)
-        counts = run.counts.tolist()
+        call.words[place] = address_of_array(table)
+        status, seconds = timed(call)
+        counts = counted.tolist()
         self._pool.give_back(kind, run)
         return None if status else (table, counts, seconds)
 
-    def _packed(self, samples: Ready, iteration: Ready) -> LaneRun:
+    def _packed(self, samples: Ready, iteration: Ready) -> tuple[Prepared, np.ndarray, int]:
         n, inputs, m = self.sizes
         solution = Solution(np.empty((0, n + m)), np.zeros(SAMPLE + 1, dtype=np.int64))
         buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 2))
@@ -58,4 +50,4 @@ class LaneRuns:
         call = self.loop.prepared(*shared, solution, buffer)
         table = call.address("solution.path")
         call.words[table + 1] = len(samples.bundle.inputs)
-        return LaneRun(call, solution.counts, table)
+        return call, solution.counts, table

@@ -13,6 +13,7 @@ import math
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, matrix, vector
+from vehiclemor.simulation.integrators.dense_solves import small_solve
 
 CONVERGED, TOO_MANY_ITERATIONS, NOT_FINITE, SINGULAR, OFF_BRANCH = range(5)
 # Places of the counts; behind them the sample at which a loop has stopped.
@@ -80,7 +81,6 @@ class Solution(NamedTuple):
 INLINED = (
     "all_below",
     "failure",
-    "small_solve",
     "increments",
     "scratch",
     "newton",
@@ -90,12 +90,8 @@ INLINED = (
 )
 
 
-def residual(q: Vector, u: Vector, constants: Vector, result: Vector) -> None:
-    """Residual Phi(q; u) into result (N,): a kernel that stands in the loop."""
-
-
 def residual_jacobian(q: Vector, u: Vector, constants: Vector, result: Matrix) -> None:
-    """Jacobian into result[:, :N] and residual into result[:, N]."""
+    """Jacobian into result[:, :N], residual into result[:, N]: a kernel that stands in the loop."""
 
 
 def newton_step(q: Vector, u: Vector, constants: Vector, result: Vector) -> None:
@@ -147,41 +143,6 @@ def stopped(counts, iterations, jacobians, status):
     )
     counts[JACOBIANS] = jacobians
     return status
-
-
-def small_solve(a, r):
-    """Solve the leading r x r block of a for column N by elimination with partial pivoting.
-
-    The solution replaces column N.  Gives the sign of the determinant, zero if a pivot is zero or
-    not finite.
-    """
-    sign = 1
-    for k in range(r):
-        pivot = k
-        for i in range(k + 1, r):
-            if abs(a[i, k]) > abs(a[pivot, k]):
-                pivot = i
-        if a[pivot, k] == 0.0 or not math.isfinite(a[pivot, k]):
-            return 0
-        if a[pivot, k] < 0.0:
-            sign = -sign
-        if pivot != k:
-            sign = -sign
-            for j in range(k, r):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-            a[k, N], a[pivot, N] = a[pivot, N], a[k, N]
-        inverse = 1.0 / a[k, k]
-        for i in range(k + 1, r):
-            factor = a[i, k] * inverse
-            for j in range(k + 1, r):
-                a[i, j] -= factor * a[k, j]
-            a[i, N] -= factor * a[k, N]
-    for k in range(r - 1, -1, -1):
-        total = a[k, N]
-        for j in range(k + 1, r):
-            total -= a[k, j] * a[j, N]
-        a[k, N] = total / a[k, k]
-    return sign
 
 
 def newton(q, u, mechanism, iteration, work):

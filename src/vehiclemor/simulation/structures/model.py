@@ -22,7 +22,6 @@ from vehiclemor.simulation.checks import (
     lifted_wheels,
     limits_of,
 )
-from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.structures import time_loops as compiled
@@ -62,14 +61,8 @@ STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 100
 class Periods:
     """Structures that follow one another in time; the full one is a single period.
 
-    Attributes
-    ----------
-    systems
-        Of each period.
-    edges
-        Times in s at which the next one begins.
-    passed
-        Coordinates at each edge are these matrices times the ones before.
+    The next one begins at an edge, a time in s, where coordinates are those before times the matrix
+    by which they are passed.
     """
 
     systems: tuple[StructuralSystem, ...]
@@ -136,13 +129,10 @@ class Periods:
         return histories, states, np.sum([part[2] for part in parts], axis=0), parts[-1][3]
 
     def steps(self, maneuver: Maneuver, tolerance: float, alike: np.ndarray) -> tuple[int, str]:
-        """Steps between output times, so many that outputs are as accurate as asked for.
-
-        Beside them is said if no step that is tried is short enough.
+        """Steps between output times of this accuracy, and a remark if no step is short enough.
 
         A part of a run, in which its inputs change most, is repeated with half the step, as long as
-        they differ by more than the tolerance times the range of an output; the method is of second
-        order.
+        outputs differ by more than the tolerance times their range; the method is of second order.
         """
         spacing = spacing_of(maneuver)
         if spacing > LONGEST_SPACING:
@@ -167,10 +157,11 @@ class Periods:
         # Errors grow with the square of the step.
         while every > least and not every % 2 and 5.0 * error < tolerance:
             every, error = every // 2, 4.0 * error
-        missed = (
-            f"steps of {spacing / every:.3g} s leave an error of {error:.1e} of an output's range"
+        missed = f"an error of {error:.1e} of an output's range"
+        return (
+            every,
+            f"steps of {spacing / every:.3g} s leave {missed}" if error > tolerance else "",
         )
-        return every, missed if error > tolerance else ""
 
 
 def spacing_of(maneuver: Maneuver) -> float:
@@ -245,10 +236,6 @@ class StructuralModel(Model):
             raise InputError(f"model {name!r}: structure: {wrong}")
         return StructuralSystem(structure, self._static_law(structure))
 
-    def assemble(self) -> None:
-        """Make the matrices, so that what is wrong with them is told now."""
-        _ = self.system
-
     @cached_property
     def _whole(self) -> Periods:
         """The full structure, with the step sizes of its runs."""
@@ -300,30 +287,7 @@ class StructuralModel(Model):
         tolerance: float | None = None,
         outputs: Names = None,
     ) -> Trajectory:
-        """Full-order trajectory at the output times, or at some of them.
-
-        Parameters
-        ----------
-        maneuver
-            Its inputs are the model's.
-        start
-            The static state, whose name is the only start.
-        times
-            Some of the maneuver's output times (samples,) in s.
-        solver
-            `generalised_alpha`, the only one.
-        tolerance
-            Largest error of an output by the step size, as part of the output's range.
-        outputs
-            Names of outputs to keep, see `Trajectory.chosen`.
-
-        Raises
-        ------
-        InputError
-            If an input isn't finite, leaves the range of validity, or a name is unknown.
-        ConvergenceError
-            If the run leaves the model's range of validity.
-        """
+        """Full-order trajectory at the output times, or at some of them, see `Model.simulate`."""
         choice("solver", SOLVER if solver is None else solver, (SOLVER,))
         tolerance = TIGHT if tolerance is None else tolerance
         check_positive("tolerance", tolerance)
@@ -386,8 +350,3 @@ class StructuralModel(Model):
             model=self,
         )
         return run if names is None else run.chosen(names)
-
-    def jacobian(self, state: Any, u: Any, with_respect_to: By = "state") -> np.ndarray:
-        """There is none by named states: `InputError`."""
-        del state, u, with_respect_to
-        raise InputError(f"{self.name} has no named states; reduce it for Jacobians")

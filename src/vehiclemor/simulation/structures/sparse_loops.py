@@ -8,14 +8,8 @@ from vehiclemor.codegen.loop_types import IntVector, Vector, matrix
 class Columns(NamedTuple):
     """A sparse matrix by columns, each in pieces of consecutive rows.
 
-    Attributes
-    ----------
-    pieces
-        First piece of each column and, last, their number (columns + 1,).
-    rows
-        First row of each piece, then the place of its first value (2 (pieces + 1),).
-    values
-        Entries, piece by piece.
+    First piece of each column and, last, their number (columns + 1,); first row of each piece, then
+    the place of its first value (2 (pieces + 1),); entries, piece by piece.
     """
 
     pieces: IntVector
@@ -26,14 +20,8 @@ class Columns(NamedTuple):
 class Blocks(NamedTuple):
     """A lower triangular matrix in blocks of neighbouring columns with the same rows below them.
 
-    Attributes
-    ----------
-    columns
-        First column of each block and, last, their number (blocks + 1,).
-    rows, row_places
-        Rows below the blocks, and where those of each begin (blocks + 1,).
-    values, places
-        Columns of the blocks, triangle and rows below, and where those of each begin (blocks + 1,).
+    First column of each block and, last, their number (blocks + 1,); rows below the blocks, and
+    where those of each begin; columns of the blocks, triangle and rows below, and where they begin.
     """
 
     columns: IntVector

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.multibody.structure import Structure
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.structures import time_loops as compiled
 from vehiclemor.simulation.structures.factors import blocks_of, columns_of, factored, ordering
 from vehiclemor.simulation.structures.time_loops import Marching, Weights
 
-STRUCTURAL_LOOPS = ("simulation.structures.sparse_loops", "simulation.structures.time_loops")
+STRUCTURAL_LOOPS = (
+    "simulation.integrators.dense_solves",
+    "simulation.structures.sparse_loops",
+    "simulation.structures.time_loops",
+)
 # Spectral radius of the method at infinity.
 DAMPED = 0.8
 
@@ -60,14 +64,9 @@ def weights_of(
 
 @dataclass(frozen=True, eq=False)
 class PortLaw:
-    """Forces of the ports, as equations declare them, about a static state.
+    """Kernel and constants of the port forces, about a static state.
 
-    Attributes
-    ----------
-    kernels, constants
-        Of the equations.
-    static
-        Deflections and forces (2, p) at the static state.
+    Static are deflections and forces (2, p) at that state.
     """
 
     kernels: Any
@@ -167,14 +166,9 @@ class StructuralSystem:
         counts, order = np.zeros(3, dtype=np.int64), self.order
         moved = np.ascontiguousarray(state[:, order])
         arguments = moved, inputs, every, histories, states, buffer, counts
-        reason = structural_loop()(self.marching(h, radius), *arguments)
+        loop = loops(STRUCTURAL_LOOPS, ("march",))["march"]
+        reason = loop(self.marching(h, radius), *arguments)
         state[:, order] = moved
         if recorded:
             states[:, order] = states.copy()
         return histories, states, counts, reason
-
-
-@cache
-def structural_loop() -> Loop:
-    """The time loop of all structures."""
-    return loops(STRUCTURAL_LOOPS, ("march",))["march"]

@@ -26,6 +26,7 @@ from vehiclemor.codegen.loop_types import (
     matrix,
     vector,
 )
+from vehiclemor.simulation.integrators.dense_solves import small_solve
 from vehiclemor.simulation.structures.sparse_loops import (
     Blocks,
     Columns,
@@ -51,26 +52,13 @@ PORT_ROWS = 8
 
 
 class Weights(NamedTuple):
-    """Coefficients of the method for one step size h, see `structural.weights_of`.
+    """Coefficients of the method for one step size h, see `system.weights_of`.
 
-    Attributes
-    ----------
-    slope, rate_rate, rate_acceleration
-        Next rate: of the change of a coordinate, of its rate and of its acceleration.
-    change, change_rate, change_acceleration
-        Next acceleration, in the same order.
-    mass_position, mass_rate, mass_acceleration
-        m, of q, q' and q''.
-    damped_position, damped_rate, damped_acceleration
-        e, in the same order.
-    mass_share, damping_share, stiffness_share
-        c_m / kappa, c_d / kappa, 1 / kappa.
-    after, before, earlier
-        1 - alpha_f, alpha_f, alpha_f / (1 - alpha_f).
-    damping_time
-        d of the structure.
-    lag
-        alpha_f - alpha_m: accelerations of the method are those so many steps before.
+    The next rate is that of `slope` times the change of a coordinate, `rate_rate` of its rate and
+    `rate_acceleration` of its acceleration; the next acceleration follows from `change...` in the
+    same order, m from `mass_...` and e from `damped_...` of q, q' and q''.  The shares are c_m,
+    c_d and 1 over kappa; after, before and earlier 1 - alpha_f, alpha_f and their ratio.
+    Accelerations of the method are those `lag` = alpha_f - alpha_m steps before.
     """
 
     slope: Float
@@ -98,28 +86,11 @@ class Weights(NamedTuple):
 class Marching(NamedTuple):
     """A structure with one step size.
 
-    Attributes
-    ----------
-    mass, factor, ports
-        M, L of R = L D L' without its diagonal, B and W side by side; rows in the order of L.
-    pivots
-        Diagonal (n,) of D, inverted.
-    response
-        S^-1 B and R^-1 W, by rows (p + k, n).
-    compliance
-        B' S^-1 B (1 - alpha_f), (p, p).
-    kept, taken
-        I - T W'R^-1 W and T = c_d (I + c_d W'R^-1 W)^-1, (k, k).
-    weights
-        Coefficients of the method.
-    law
-        Address of the kernel of the port forces.
-    constants
-        Hoisted constants of the law.
-    static
-        Deflections and forces at the static state (2, p).
-    positions, rates, accelerations, forces
-        Cq', Cv', Ca' (n, outputs) and Cf' (p, outputs).
+    M, L of R = L D L' without its diagonal, B and W side by side, rows in the order of L; D (n,)
+    inverted; S^-1 B and R^-1 W by rows (p + k, n); B' S^-1 B (1 - alpha_f), (p, p); I - T W'R^-1 W
+    and T = c_d (I + c_d W'R^-1 W)^-1, (k, k); coefficients of the method; address and hoisted
+    constants of the law of the ports; deflections and forces at the static state (2, p); Cq', Cv',
+    Ca' (n, outputs) and Cf' (p, outputs).
     """
 
     mass: Columns
@@ -175,7 +146,8 @@ def port_forces(system, ports, inputs, scratch, square, result):
                 square[i, j] = -stiffness * system.compliance[i, j]
             square[i, i] += 1.0
             square[i, p] = result[i, 0] - next_force[i]
-        eliminate(square, p)
+        if not small_solve(square, p):
+            return -iteration
         largest = 0.0
         for i in range(p):
             next_force[i] += square[i, p]
@@ -185,29 +157,6 @@ def port_forces(system, ports, inputs, scratch, square, result):
         if largest <= CLOSE * scale:
             return iteration
     return -MOST_ITERATIONS
-
-
-def eliminate(a, size):
-    """Solve the square block of a for its last column, which the solution replaces."""
-    for k in range(size):
-        pivot = k
-        for i in range(k + 1, size):
-            if abs(a[i, k]) > abs(a[pivot, k]):
-                pivot = i
-        if pivot != k:
-            for j in range(k, size + 1):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-        inverse = 1.0 / a[k, k]
-        for i in range(k + 1, size):
-            factor = a[i, k] * inverse
-            if factor != 0.0:
-                for j in range(k + 1, size + 1):
-                    a[i, j] -= factor * a[k, j]
-    for k in range(size - 1, -1, -1):
-        total = a[k, size]
-        for j in range(k + 1, size):
-            total -= a[k, j] * a[j, size]
-        a[k, size] = total / a[k, k]
 
 
 def write_accelerations(system, state, row):

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.experiment import Settings
 from vehiclemor.study.plans.protocol import Entry, Protocol
 from vehiclemor.study.plans.study_file import Bound
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Scores nearer to each other than this share are a tie, which the cheaper candidate wins; and
 # times, which scatter.
@@ -98,11 +96,8 @@ def errors_by(dataset: xr.Dataset, output: str, measure: str) -> xr.DataArray:
         alike = dataset["output_unit"] == own["output_unit"]
         least = ROUNDING * dataset["signal_range"].where(alike).max("output")
         size = own["signal_range"]
-        return (
-            (own["rms_error"] / size.where(size > least))
-            .where(size > least, 0.0)
-            .where(np.isfinite(own["rms_error"]))
-        )
+        share = (own["rms_error"] / size.where(size > least)).where(size > least, 0.0)
+        return share.where(np.isfinite(own["rms_error"]))
     return own[f"{measure}_error"]
 
 

@@ -9,9 +9,9 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from vehiclemor.exceptions import FileError
 from vehiclemor.provenance import layout_digest
@@ -39,9 +39,6 @@ from vehiclemor.study.plans.results import judged_set, protocol_dataset
 from vehiclemor.study.plans.study_file import DRAWN
 from vehiclemor.study.store import combined_path, run_path, stored
 from vehiclemor.study.workers import Engine, Workers
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Runs that are timed: the first of a set.
 TIMED = 24

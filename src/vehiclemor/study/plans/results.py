@@ -7,9 +7,10 @@ import json
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from vehiclemor.parameters import AXES, parameter_and_axis
 from vehiclemor.provenance import attributes, layout_digest, versions
@@ -20,9 +21,6 @@ from vehiclemor.study.plans.protocol import Protocol
 from vehiclemor.study.plans.study_file import PARAMETER, StudyFile
 from vehiclemor.study.result import meaning_of, variables
 from vehiclemor.study.store import read_run
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 # Dimensions of a run's errors; each has the units of its labels beside it.
 QUANTITIES = ("output", "coordinate", "speed")
@@ -38,8 +36,6 @@ def grid_digest(grid: Grid) -> str:
 
 def combined(grid: Grid, folder: Path) -> xr.Dataset:
     """All runs of a grid put together; `FileError` if one is missing, corrupt or foreign."""
-    import xarray as xr
-
     names, keys = tuple(grid.dimensions), grid.keys
     found, numbers = np.unique(keys, return_inverse=True)
     order = np.argsort(numbers, axis=None, kind="stable")
@@ -103,8 +99,6 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
     Histories are left out; grid dimensions become coordinates of the rows, missing where a study
     does not have them.
     """
-    import xarray as xr
-
     parts: list[xr.Dataset] = []
     units: dict[str, dict[str, str]] = {name: {} for name in QUANTITIES}
     for name, dataset in results.items():
@@ -140,8 +134,6 @@ def protocol_dataset(
     Given by set are the results of the rows, and why scenarios are not judged; `timed` are the
     first scenarios of what is judged.
     """
-    import xarray as xr
-
     parts: list[xr.Dataset] = []
     for name, datasets in found.items():
         number = datasets[0].sizes["scenario"]

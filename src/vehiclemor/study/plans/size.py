@@ -10,13 +10,14 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from vehiclemor.codegen.cache import compiler_identity
 from vehiclemor.exceptions import InputError
@@ -36,9 +37,6 @@ from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.result import variables
 from vehiclemor.study.store import combined_path, stored
 from vehiclemor.study.timing import called
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 FULL = "full order"
 # Groups of outputs, of which the worst error counts: strains are what coarse meshes are worst at.
@@ -61,8 +59,6 @@ def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
 
 
 def _measured(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
-    import xarray as xr
-
     size = study.size
     assert size is not None
     # What can't be had is told before anything is computed.
@@ -73,7 +69,8 @@ def _measured(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
         references = [_reference(model, chosen, size.step, folder) for model in meshes]
         fits = [_fits(study, model) for model in meshes]
         labels = [FULL, *(entry.label or entry.method for entry in study.methods)]
-        rows = [*map(_mesh_label, size.meshes), *size.beside]
+        texts = [[f"{name} {value:g}" for name, value in mesh.items()] for mesh in size.meshes]
+        rows = [*map(", ".join, texts), *size.beside]
         n = [model.size for model in meshes] + [len(full.model.coordinates) for full, _ in beside]
         timed = _timed(name, size, list(zip(meshes, fits, strict=True)), beside, chosen, n)
     shape = len(rows), len(labels)
@@ -109,7 +106,8 @@ def _measured(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
         *("mesh", "label"),
     )
     found |= variables({"relative_error": errors}, "mesh", "label", "group")
-    kinds = [_kind(mesh) for mesh in size.meshes] + ["vehicle"] * len(beside)
+    # What is refined first: meshes of one kind make one line.
+    kinds = [next(iter(mesh)) for mesh in size.meshes] + ["vehicle"] * len(beside)
     coordinates = {"mesh": rows, "label": labels, "group": list(GROUPS), "kind": ("mesh", kinds)}
     title = attributes(study.title, meshes[0].kernel_hash, study=name, model=study.model)
     own = {"configuration": study.model_dump_json(exclude_defaults=True)}
@@ -123,20 +121,8 @@ def strongest_full(name: str) -> ReducedOrderModel:
     return ReducedOrderModel(model, method.name, {}, (), method.fit(model, (), settings))
 
 
-def _mesh_label(mesh: Mapping[str, float]) -> str:
-    """Parameters of a mesh in one line."""
-    return ", ".join(f"{name} {value:g}" for name, value in mesh.items())
-
-
-def _kind(mesh: Mapping[str, float]) -> str:
-    """Name of what is refined: meshes of one kind make one line."""
-    return next(iter(mesh))
-
-
 def _reference(model: Any, maneuver: Maneuver, step: float, folder: Path) -> xr.Dataset:
     """Stored full-order outputs of a run; they do not depend on the machine."""
-    import xarray as xr
-
     parameters = json.dumps({k: e.value for k, e in model.parameters.entries.items()})
     parts = model.kernel_hash, code_digest(model.name, "full_order", {}), parameters
     run = maneuver.name, maneuver.frequency_factor, maneuver.amplitude_factor, step

@@ -275,13 +275,6 @@ def with_tires():
     return slow_manifold.fit(high_fidelity(), training, settings)
 
 
-def simulated(*run):
-    """The reduced run, and the full one."""
-    case, car = scenario(*run), high_fidelity()
-    start = start_of(car, case)
-    return with_tires().simulate(case.maneuver, start), car.simulate(case.maneuver, start)
-
-
 def of(run, name):
     return run.outputs[:, high_fidelity().outputs.index(name)]
 
@@ -303,26 +296,6 @@ def test_the_tires_are_those_of_the_vehicle():
             truth = of(run, f"{name}_{wheel}")
             # What is left is the longitudinal slip of the free rolling wheel.
             assert np.abs(given - truth).max() < 1e-3 * np.abs(truth).max()
-
-
-def test_steering_to_the_other_side_gives_the_mirror_image():
-    left, right = (simulated(1.1, amplitude, 21.0)[0] for amplitude in (1.2, -1.2))
-    for name, sign in (("lateral_position", -1), ("yaw", -1), ("roll", -1), ("pitch", 1)):
-        np.testing.assert_allclose(of(left, name), sign * of(right, name), atol=1e-8)
-
-
-@pytest.mark.parametrize("speed", [17.0, 23.0])
-def test_without_steering_it_goes_straight_on_at_its_speed(speed):
-    run, _ = simulated(1.0, 0.0, speed)
-    assert np.abs(of(run, "lateral_position")).max() < 1e-6
-    np.testing.assert_allclose(of(run, "longitudinal_position"), speed * run.times, rtol=1e-5)
-
-
-def test_exact_tires_predict_a_run_between_the_training_runs():
-    run, truth = simulated(1.1, -1.0, 20.5)
-    assert run.status == "ok"
-    for name in ("lateral_position", "longitudinal_position"):
-        assert np.abs(of(run, name) - of(truth, name)).max() < 0.1
 
 
 def test_it_tells_when_its_tires_slide():

@@ -61,23 +61,6 @@ def test_the_whole_space_gives_the_full_model(model, form, start):
     np.testing.assert_allclose(reduced.states, full.states, rtol=1e-7, atol=1e-6)
 
 
-def test_only_the_subspace_counts_not_its_basis(model):
-    reduced = fitted(model, "dropped")
-    spaces, generator = reduced.spaces, np.random.default_rng(1)
-    lifts, drops = spaces.trial_basis.copy(), spaces.test_basis.copy()
-    for k, rank in enumerate(spaces.ranks // 2):
-        mixing = np.linalg.qr(generator.normal(size=(rank, rank)))[0] * 2.0
-        lifts[k, :rank] = mixing @ lifts[k, :rank]
-        drops[k, :rank] = np.linalg.inv(mixing).T @ drops[k, :rank]
-    mixed = ControlPeriods(COORDINATES, spaces.edges, spaces.means, lifts, drops, spaces.ranks)
-    state = model.start("dropped")
-    runs = [
-        model.integrate(lane_change, state, s, Solver("dopri5", 1e-10, TIMES))
-        for s in (spaces, mixed)
-    ]
-    np.testing.assert_allclose(runs[0].states, runs[1].states, rtol=0, atol=1e-7)
-
-
 def test_projected_mechanics_keep_the_energy():
     model = build("independent_suspension_vehicle", overrides=CONSERVATIVE)
     maneuver = replace(lane_change, amplitude_factor=0.0, duration=3.0, samples=151)

@@ -30,7 +30,7 @@ from vehiclemor.simulation.trajectory import Trajectory
 LOOSE = 1e6
 FROZEN = [name for name in INTEGRATORS if frozen(name)]
 # With a Jacobian, frozen or fresh.
-STIFF = [name for name, own in INTEGRATORS.items() if own.operators or own.squares]
+STIFF = [name for name, own in INTEGRATORS.items() if own.tables or own.squares]
 DRIVEN = maneuver(driven, 8.0)
 
 

@@ -9,7 +9,6 @@ from itertools import chain
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from vehiclemor.simulation.integrators import dopri5 as pair
 from vehiclemor.simulation.integrators import rodas4, ros34pw2
@@ -96,12 +95,3 @@ def test_ros34pw2_has_order_3_and_2_with_any_matrix_in_place_of_the_jacobian():
     weighted(own.embedded, second, 1e-14)
     assert weighted(own.embedded, third, np.inf) > 1e-3
     np.testing.assert_allclose(at, OTHER[8], atol=1e-15)
-
-
-@pytest.mark.parametrize("own", [RODAS4, ROS34PW2], ids=["rodas4", "ros34pw2"])
-def test_rosenbrock_methods_are_l_stable(own):
-    beta = own.alpha + own.gamma
-    assert 1.0 - own.b @ np.linalg.solve(beta, own.one) == pytest.approx(0.0, abs=1e-12)
-    for z in 1j * np.logspace(-2, 5, 400):
-        stages = np.linalg.solve(np.eye(len(own.b)) - z * beta, own.one)
-        assert abs(1 + z * own.b @ stages) <= 1.0 + 1e-12

@@ -1,0 +1,207 @@
+"""Runs seen moving, full order and reduced together, as a GIF."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from vehiclemor.arguments import file_path, number, quoted, within
+from vehiclemor.exceptions import InputError
+from vehiclemor.files import write_whole
+from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.parameters import load_parameters
+from vehiclemor.registry import component
+from vehiclemor.report.figures.mechanisms import Values, car, line, suspension, truck, turned
+from vehiclemor.report.figures.theme import COLORS, FULL, Style, panels, styled
+from vehiclemor.report.labels import method_text
+from vehiclemor.simulation.trajectory import Trajectory
+
+FULL_ORDER = "full order"
+FRAMES_PER_SECOND, DOTS, DURATIONS, FACTORS = 12, 100, (0.5, 60.0), (0.01, 1000.0)
+# Half of what is seen of the road from above; and least and most of it from behind (m).
+ALONG, ACROSS, NARROWEST, WIDEST = 16.0, 7.0, 3.0, 6.5
+PLACE = ("longitudinal_position", "lateral_position", "yaw")
+
+
+class Scene(NamedTuple):
+    """How runs with some quantities are drawn, and from where beside from behind."""
+
+    draw: Callable[[Values, Values, float], np.ndarray]
+    view: str
+    columns: list[int]
+    magnify: float
+    needed: tuple[str, ...]
+
+
+TRUCK = ("driver_height", *(f"{q}_{w}" for q in ("road", "Fz", "deflection") for w in WHEELS))
+TRUCK = (*TRUCK, *(f"platform_{w}_height" for w in WHEELS))
+LINKAGE = ("spindle_x", "spindle_y", "second_euler_angle", "toe", "camber", "rack", "z")
+SCENES = {
+    "a car": Scene(car, "from above", [0, 1], 3.0, (*PLACE, "pitch", "roll")),
+    "a truck": Scene(truck, "from the right", [0, 2], 10.0, TRUCK),
+    "a suspension": Scene(suspension, "from above", [0, 1], 1.0, LINKAGE),
+}
+
+
+def animate(
+    run: Trajectory | xr.Dataset,
+    *beside: Trajectory | xr.Dataset,
+    labels: Sequence[str] = (),
+    duration: float = 8.0,
+    magnify: float | None = None,
+    out: str | Path = "car.gif",
+) -> Path:
+    """Write a film of runs of the same input, together in colours.
+
+    Parameters
+    ----------
+    run
+        A run, or a dataset of `vehiclemor.simulate`, which holds its full order too.
+    *beside
+        Further runs, the full order last: it is grey, and the view follows it.
+    labels
+        Text of each run.
+    duration
+        Of the film in s; the run is shown faster or slower.
+    magnify
+        Factor on roll, bounce and deflections, which the title names.
+    out
+        GIF file.
+
+    Raises
+    ------
+    InputError
+        If the runs are of several inputs, or the model lacks outputs that a drawing needs.
+    """
+    path = file_path("out", out)
+    if path.suffix.lower() != ".gif":
+        raise InputError(f"out is {quoted(str(path))}; a film ends with .gif")
+    seconds = within("duration", number("duration", duration), DURATIONS, " s")
+    runs = [found for each in (run, *beside) for found in _histories(each)]
+    names = list(labels) or [text for text, _ in runs]
+    if not labels and beside:
+        names[-1] = FULL_ORDER
+    if len(names) != len(runs):
+        raise InputError(f"labels: {len(runs)} runs are drawn, not {len(names)}")
+    found = [quantities for _, quantities in runs]
+    scene, followed = _scene(found), found[-1]
+    if not all(np.array_equal(followed["time"], h["time"]) for h in found):
+        raise InputError("the runs have several times; a film shows runs of one input")
+    factor = scene.magnify if magnify is None else number("magnify", magnify)
+    values = _parameters(run), within("magnify", factor, FACTORS)
+    finite = np.flatnonzero(np.isfinite([followed[n] for n in scene.needed]).all(0))
+    if not len(finite):
+        raise InputError("the last run has no finite values; the view follows it")
+    frames = max(2, round(FRAMES_PER_SECOND * seconds))
+    rows = np.linspace(finite[0], finite[-1], frames).round().astype(int)
+    with styled():
+        shown = [{name: h[name][rows] for name in h} for h in found]
+        try:
+            film = _film(scene, shown, names, values)
+        except KeyError as missing:
+            raise InputError(f"the drawing needs the parameter {missing} of the model") from None
+        writer = PillowWriter(fps=FRAMES_PER_SECOND)
+        return write_whole(path, lambda part: film.save(part, writer=writer, dpi=DOTS))
+
+
+def _film(scene: Scene, runs: list[Any], names: Sequence[str], values: Any) -> FuncAnimation:
+    """Two views, and in each of them a line a run that moves."""
+    followed, moves = runs[-1], scene.draw is car
+    times = followed["time"]
+    place, yaw = np.zeros((len(times), 1, 3)), 0.0 * times
+    if moves:
+        place, yaw = line((*(followed[name] for name in PLACE[:2]), 0.0)), followed["yaw"]
+    figure, grid = panels(2, 1, (5.6, 4.4)) if moves else panels(1, 2, (5.6, 3.2))
+    FigureCanvasAgg(figure)
+    side, back = grid.ravel()
+    drawn = []
+    for k, (h, name) in enumerate(zip(runs, names, strict=True)):
+        style: Style = {"color": COLORS[k % len(COLORS)], "linewidth": 1.2}
+        style = FULL | {"zorder": 1.5, "linewidth": 3.5} if h is followed and k else style
+        if moves:
+            side.plot(h[PLACE[0]], h[PLACE[1]], **style | {"linewidth": 0.6})
+        space = scene.draw(h, *values)
+        behind = turned(space - place, "Z", -yaw)[..., 1:] * (-1.0, 1.0)
+        for axis, lines in ((side, space[..., scene.columns]), (back, behind)):
+            (curve,) = axis.plot(*lines[0].T, **style, label=name)
+            drawn.append((curve, lines))
+    told = f", motion x {values[1]:g}" if values[1] != 1.0 else ""
+    for axis, title in ((side, scene.view), (back, f"from behind{told}")):
+        every = np.concatenate([lines.reshape(-1, 2) for c, lines in drawn if c.axes is axis])
+        low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)
+        edge = 0.05 * (high - low).max()
+        if moves:
+            reach = np.clip(abs(every[:, 0]), NARROWEST, WIDEST)
+            low[0], high[0] = -np.nanmax(reach), np.nanmax(reach)
+        axis.set(aspect="equal", title=title, xlabel="m", ylabel="m")
+        axis.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
+
+    def show(frame: int) -> None:
+        for curve, lines in drawn:
+            curve.set_data(*lines[frame].T)
+        figure.suptitle(f"t = {times[frame]:.1f} s")
+        if moves:
+            (x, y, _) = place[frame, 0]
+            side.set(xlim=(x - ALONG, x + ALONG), ylim=(y - ACROSS, y + ACROSS))
+
+    show(0)
+    figure.legend(handles=[curve for curve, _ in drawn[::2]], loc="outside lower center", ncols=4)
+    figure.draw_without_rendering()
+    # The panels stay where they are while the numbers beside them change.
+    figure.set_layout_engine("none")
+    return FuncAnimation(figure, show, frames=len(times), repeat=False)
+
+
+def _histories(run: Any) -> list[tuple[str, dict[str, np.ndarray]]]:
+    """Name and quantities (samples,) of a run; of a dataset each method's, the full order last."""
+    dataset = run.dataset() if isinstance(run, Trajectory) else run
+    if not isinstance(dataset, xr.Dataset) or "outputs" not in dataset:
+        raise InputError(f"{quoted(run)} is neither a run nor a dataset with histories")
+    if "label" not in dataset.dims:
+        method = json.loads(dataset.attrs.get("configuration", "{}")).get("method", "reduced")
+        label = dataset.coords.get("label", method)
+        dataset = dataset.assign_coords(label=label).expand_dims("label")
+    known = [str(label) for label in dataset["label"].values]
+    reduced = [label for label in known if not label.startswith("full_order")] or known[:1]
+    found = [(method_text(n), _quantities(dataset.sel(label=n), "outputs")) for n in reduced]
+    if "reference_outputs" in dataset and not reduced[0].startswith("full_order"):
+        found += [(FULL_ORDER, _quantities(dataset.isel(label=0), "reference_outputs"))]
+    return found
+
+
+def _quantities(dataset: xr.Dataset, outputs: str) -> dict[str, np.ndarray]:
+    """Histories (samples,) by name; of the full order in a dataset no coordinates are stored."""
+    found = {"time": dataset["time"].values}
+    kinds = {"inputs": "input", "coordinates": "coordinate", outputs: "output"}
+    for variable, kind in kinds.items():
+        if variable in dataset and (kind != "coordinate" or outputs == "outputs"):
+            columns = dataset[variable].transpose(kind, "time").values
+            found |= dict(zip(map(str, dataset[kind].values), columns, strict=True))
+    return found
+
+
+def _scene(runs: Sequence[Values]) -> Scene:
+    """What can be drawn of all runs; `InputError` names what is missing."""
+    lacks = {n: [q for q in s.needed if any(q not in r for r in runs)] for n, s in SCENES.items()}
+    fitting = [SCENES[name] for name, missing in lacks.items() if not missing]
+    if not fitting:
+        name, missing = min(
+            lacks.items(), key=lambda item: len(item[1]) / len(SCENES[item[0]].needed)
+        )
+        raise InputError(f"no film of these runs: to draw {name} it lacks {', '.join(missing)}")
+    return fitting[0]
+
+
+def _parameters(run: Any) -> dict[str, Any]:
+    """Parameters by name: those of a run, or of its model's file with what a dataset tells."""
+    if isinstance(run, Trajectory):
+        return run.model.parameters.values()
+    told = json.loads(run.attrs.get("configuration", "{}"))
+    model = component("model", str(run.attrs.get("model") or told.get("model")))
+    known = load_parameters(model.name, model.parameters, model.parameter_file).values()
+    return known | {name: np.array(v) for name, v in told.get("parameters", {}).items()}

@@ -1,0 +1,93 @@
+"""The paper's figures at their final size, and its numbers by name."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from drawings.catalogue import FIGURES
+from regenerate import PAPER, STYLE, main
+
+from tests.report.figure_texts import checked
+from vehiclemor.parameters import load_parameters
+from vehiclemor.registry import component
+from vehiclemor.report.figures.theme import styled
+
+# Widths of a column and of both in inches.
+WIDTHS = 8.6 / 2.54, 17.8 / 2.54
+
+
+def datasets(entry, results):
+    """Datasets of a figure, from the studies of the paper; None if one is not among them."""
+    if not set(entry.studies) <= set(results):
+        return None
+    return {name: results[name] for name in entry.studies}
+
+
+@pytest.fixture(scope="session")
+def drawn(results):
+    """Every figure of the paper that its studies and models give, drawn."""
+    figures = {}
+    for name, entry in FIGURES.items():
+        data = datasets(entry, results)
+        if data is not None:
+            with styled(STYLE):
+                figures[name] = entry.draw(*([data] if data else []), **entry.options)
+    return figures
+
+
+def test_figures_are_as_wide_as_a_column_or_two_and_nothing_is_cut_off(drawn):
+    assert {f"figure-{number:02d}" for number in range(1, 15)} <= set(drawn)
+    for name, figure in drawn.items():
+        assert min(abs(figure.get_figwidth() - width) for width in WIDTHS) < 1e-9, name
+        with styled(STYLE):
+            checked(figure)
+
+
+def test_schematics_are_to_scale(drawn):
+    for name, model in (("01", "independent_suspension_vehicle"), ("08", "high_fidelity_vehicle")):
+        radius = load_parameters(model, component("model", model).parameters)["tire_radius"]
+        space = drawn[f"figure-{name}"].axes[0]
+        assert space.get_aspect() == 1.0
+        wheels = [line.get_xydata() for line in space.lines if len(line.get_xdata()) > 100]
+        assert len(wheels) == 4
+        for wheel in wheels:
+            # The longer half axis of a circle's projection is its radius.
+            longest = np.linalg.norm(wheel - wheel[:-1].mean(axis=0), axis=1).max()
+            assert longest == pytest.approx(float(radius), rel=1e-3)
+    texts = " ".join(text.get_text() for text in drawn["figure-01"].axes[0].texts)
+    # Of the public data.
+    assert "$a$ = 1.156 m" in texts
+    assert "$T_f$ = 1.387 m" in texts
+
+
+def test_what_the_folder_lacks_stays_as_it_is(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["regenerate", "--results", str(tmp_path), "--only", "size"])
+    before = (PAPER / "figures" / "size.svg").read_bytes()
+    assert main() == 0
+    assert "size.svg stays as it is" in capsys.readouterr().err
+    assert (PAPER / "figures" / "size.svg").read_bytes() == before
+
+
+def test_every_picture_and_number_of_the_text_is_there():
+    text = (PAPER / "paper.typ").read_text(encoding="utf-8")
+    pictures = set(re.findall(r'#picture\("([^"]+)"', text))
+    assert pictures == set(FIGURES)
+    for name in pictures:
+        picture = PAPER / "figures" / f"{name}.svg"
+        assert picture.stat().st_size <= 150_000, name
+        # Glyphs are paths.
+        assert "<text" not in picture.read_text(encoding="utf-8"), name
+    numbers = json.loads((PAPER / "numbers.json").read_text(encoding="utf-8"))
+    names = set(re.findall(r'\b(?:n|value|whole|percent)\(\s*"([^"]+\w)"\s*[,)]', text))
+    assert len(names) > 50
+    assert names <= set(numbers)
+
+
+def test_every_reference_is_cited_and_every_citation_known():
+    text = (PAPER / "paper.typ").read_text(encoding="utf-8")
+    entries = (PAPER / "references.bib").read_text(encoding="utf-8")
+    known = set(re.findall(r"^@\w+\{(\w+),", entries, re.MULTILINE))
+    cited = set(re.findall(r"@([a-z]+\d{4})", text))
+    assert cited <= known
+    assert len(known) >= 25
