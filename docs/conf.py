@@ -1,0 +1,112 @@
+"""Sphinx: pages in Markdown, executed examples, API reference.  `tox -e docs` builds the site."""
+
+import logging
+import re
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from sphinx.application import Sphinx
+from sphinx.util import logging as sphinx_logging
+
+DOCS = Path(__file__).parent
+# Beside this file are two modules; the numbers of the pages are in `paper`.
+sys.path[:0] = [str(DOCS), str(DOCS.parent / "paper")]
+
+from numbers_by_name import render  # noqa: E402
+
+import vehiclemor  # noqa: E402
+
+# No page tells how long something took to compile.
+logging.getLogger("vehiclemor").setLevel(logging.WARNING)
+project, release = "vehiclemor", vehiclemor.__version__
+author = "The vehiclemor developers"
+extensions = [
+    "mathml",
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["_build", "gallery/*.ipynb"]
+nitpicky = True
+# Types in signatures are as written in the source; most have no entry here.
+nitpick_ignore_regex = [("py:.*", ".*")]
+# In docstrings a name between single backticks is code.
+default_role = "code"
+
+myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "examples.in_order",
+    "image_scrapers": ("examples.picture", "matplotlib"),
+    "notebook_extensions": (),
+    "reset_modules": ("matplotlib", "examples.fresh"),
+    "capture_repr": (),
+    "image_srcset": ["2x"],
+    "download_all_examples": False,
+    "show_signature": False,
+    "write_computation_times": False,
+    "min_reported_time": 1e6,
+}
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"vehiclemor {release}"
+html_theme_options = {
+    "navbar_center": [],
+    "secondary_sidebar_items": ["page-toc"],
+    "show_prev_next": False,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+}
+html_sidebars = {"**": ["pages.html"]}
+copybutton_prompt_text = "$ "
+templates_path = ["_templates"]
+html_show_sourcelink = False
+html_css_files = ["site.css"]
+# The font of equations is served from here, so that they look the same everywhere.
+FONTS = Path(find_spec("ziamath").origin).parent / "fonts"  # type: ignore[union-attr,arg-type]
+html_static_path = ["_static", str(FONTS / "STIXTwoMath-Regular.ttf")]
+html_math_renderer = "mathml"
+
+
+def with_numbers(_: Sphinx, name: str, source: list[str]) -> None:
+    """Put measured numbers into a page; in tables no line breaks within 4.9e-7."""
+    if "{{" in source[0]:
+        try:
+            source[0] = render(source[0], name=name)
+        except KeyError as error:
+            sphinx_logging.getLogger(__name__).warning("%s", error, location=name)
+    rows = re.compile(r"^\|.*", re.MULTILINE)
+    source[0] = rows.sub(lambda row: re.sub(r"(?<=\de)-(?=\d+ )", "\u2011", row[0]), source[0])
+
+
+def write_file_reference(app: Sphinx) -> None:
+    """Write the page of the keys of study and parameter files, from the classes that read them."""
+    from vehiclemor.report.description import SCHEMAS, schema_description
+    from vehiclemor.report.printing import table
+
+    parts = ["# Keys of study and parameter files\n"]
+    for name in SCHEMAS:
+        described = schema_description(name)
+        parts.append(f"## {name}\n\n{described.pop('summary')}\n")
+        described.pop("schema")
+        for title, rows in described.items():
+            heading = "" if title == "keys" else f"### {title}\n\n"
+            parts.append(heading + table(rows, to="markdown"))
+    path = Path(app.srcdir) / "study-file-reference.md"
+    path.write_text("\n".join(parts), encoding="utf-8")
+
+
+def setup(app: Sphinx) -> None:
+    """Tell Sphinx of the functions above."""
+    app.connect("source-read", with_numbers)
+    app.connect("builder-inited", write_file_reference)
