@@ -2,9 +2,9 @@
 
 Usage: python paper/in_use.py [--results DIR]
 
-Writes DIR/in_use.nc, named values with units, which `paper/facts.py` writes into the texts.  It
-takes about a minute and needs a C compiler and FMPy.  Times are CPU times of the thread,
-minima over interleaved rounds, where nothing else is said.
+Writes DIR/in_use.nc, named values with units, which `paper/measured_numbers.py` reads.  It takes
+about a minute and needs a C compiler and FMPy.  Times are CPU times of the thread, minima over
+interleaved rounds, where nothing else is said.
 """
 
 from __future__ import annotations
@@ -12,29 +12,30 @@ from __future__ import annotations
 import argparse
 import runpy
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from named_values import Values, measured_values
 
 import vehiclemor as vm
 from vehiclemor.codegen.loops import Prepared
+from vehiclemor.files import make_folder
+from vehiclemor.netcdf_file import write_dataset
+from vehiclemor.provenance import attributes
 from vehiclemor.reduction.reduced_model import ReducedOrderModel as Car
 from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.registry import component
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
-FILE, TITLE = "in_use.nc", "Models in use"
+# `name, unit` -> value.
+Values = dict[str, float]
 # Short name of a vehicle -> its model, and a steering input that it is stepped with.
 VEHICLES = {
     "gv": ("independent_suspension_vehicle", 0.02),
@@ -133,7 +134,7 @@ def runs() -> Values:
 
 
 def batches() -> Values:
-    """The ten thousand maneuvers of the handbook: wall clock, compiled loops, errors of some."""
+    """The ten thousand maneuvers of the task: wall clock, compiled loops, errors of some."""
     count, rng = 10_000, np.random.default_rng(1)
     t = np.linspace(0.0, 10.0, 201)
     rate, phase = rng.uniform(0.5, 4.0, (count, 3, 1)), rng.uniform(0.0, 6.28, (count, 3, 1))
@@ -233,29 +234,22 @@ def through_fmpy(unit: Path, car: Car, u: np.ndarray, label: str) -> Values:
 
 
 def closed_loops() -> Values:
-    """The examples: a driver in the double lane change, and a steering column beside the car."""
-    drive, speed = runpy.run_path(str(EXAMPLES / "double_lane_change.py"))["drive"], 80.0 / 3.6
+    """The example of a driver in the double lane change."""
+    example = runpy.run_path(str(EXAMPLES / "double_lane_change.py"))
+    drive, speed = example["drive"], example["SPEED"]
     values: Values = {}
     for short, (name, _) in VEHICLES.items():
         reduced = vm.rom(name)
         full = vm.reduce(reduced.model, "full_order")
         start = vm.model(name, parameters={"initial_speed": speed}).start()
-        expected, found = (drive(car, start, speed)[0] for car in (full, reduced))
+        expected, found = (drive(car, start)[0] for car in (full, reduced))
         samples = min(len(found), len(expected))
         off = np.abs(found[:samples] - expected[:samples]).max(axis=0)
         for output in ("longitudinal_position", ASIDE):
             values[f"driver {short} {output}, mm"] = 1e3 * off[full.output_names.index(output)]
-        whole = cpu({"whole": partial(drive, reduced, start, speed)}, rounds=5)["whole, us"]
+        whole = cpu({"whole": partial(drive, reduced, start)}, rounds=5)["whole, us"]
         values[f"driver {short} round, us"] = whole / len(found)
-    drive = runpy.run_path(str(EXAMPLES / "steering_cosimulation.py"))["drive"]
-    reduced = vm.rom(VEHICLES["gv"][0])
-    full = vm.reduce(reduced.model, "full_order")
-    place, finely = full.output_names.index(ASIDE), drive(full, 2.5e-3)
-    for step in (0.02, 0.01):
-        off = np.abs(drive(full, step) - finely[:: round(step / 2.5e-3)]).max(axis=0)
-        values[f"coupling {step:g}, mm"] = 1e3 * off[place]
-    off = np.abs(drive(reduced, 0.01) - drive(full, 0.01)).max(axis=0)
-    return values | {"coupling reduced, mm": 1e3 * off[place]}
+    return values
 
 
 def restarts() -> Values:
@@ -318,17 +312,27 @@ def plans() -> Values:
     return values
 
 
-def measured(folder: Path, anew: bool = False) -> xr.Dataset:
-    """What the results folder holds; measured where it lacks it, or once more."""
-    parts = (steps, runs, batches, scipy, files, exports, closed_loops, restarts, kinks, plans)
-    return measured_values(folder / FILE, TITLE, parts, anew)
+def measured(path: Path) -> None:
+    """Measure every part, and keep the values with their units."""
+    import xarray as xr
+
+    values: Values = {}
+    for part in (steps, runs, batches, scipy, files, exports, closed_loops, restarts, kinks, plans):
+        began = time.perf_counter()
+        values |= part()
+        print(f"{part.__name__}: {time.perf_counter() - began:.0f} s", file=sys.stderr)
+    names, units = zip(*(name.rsplit(", ", 1) for name in values), strict=True)
+    coordinates = {"name": list(names), "output_unit": ("name", list(units))}
+    data = xr.Dataset({"value": ("name", [*map(float, values.values())])}, coordinates)
+    make_folder(path.parent)
+    write_dataset(data.assign_attrs(attributes("Models in use", "")), path)
 
 
 def main() -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
-    measured(parser.parse_args().results, anew=True)
+    measured(parser.parse_args().results / "in_use.nc")
 
 
 if __name__ == "__main__":

@@ -1,83 +1,109 @@
-"""Regenerates all figures and tables of the paper from stored results.
+"""Regenerates the figures, and the table of claims, of `paper.typ` from stored results.
 
-Usage: python paper/regenerate.py [--results DIR] [--out DIR] [--jobs N]
+Usage: python paper/regenerate.py [--results DIR] [--only NAME ...]
 
-Studies and timings that the results folder lacks are run first.  Two regenerations from the same
-results give byte-identical files.
+Nothing is computed: a figure whose datasets the results folder lacks stays as it is, and the
+command says so.  Two regenerations from the same results give byte-identical files.
 """
 
 import argparse
+import json
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
-import pandas as pd
+import matplotlib
+import numpy as np
+import xarray as xr
+from drawings.catalogue import FIGURES, Entry
 
-import vehiclemor as vm
 from vehiclemor import VehiclemorError
 from vehiclemor.files import write_text
-from vehiclemor.reduction.methods import pod
-from vehiclemor.registry import names
-from vehiclemor.report.comparison import cost_table, paper_comparison, study_comparison
-from vehiclemor.report.default_studies import nominal, of_paper, perturbed
-from vehiclemor.report.printing import Format, table
-from vehiclemor.report.spectrum import spectrum_table
+from vehiclemor.report.comparison import claim_criterion, of_published_start, rows_of
+from vehiclemor.report.figures import theme
+from vehiclemor.report.printed_numbers import TIMING
+from vehiclemor.report.published import load_published
+from vehiclemor.study.plans.loading import load_studies
 
-# Ending of a table -> its format.
-TABLES: dict[str, Format] = {"csv": "csv", "md": "markdown", "tex": "latex"}
-
-
-def regenerate_all(results: Path, out: Path, jobs: int = 1) -> list[Path]:
-    """All figures into `out`/figures and all tables into `out`/tables."""
-    written = regenerate_tables(results, out / "tables", jobs)
-    return vm.figures((), out / "figures", results, jobs) + written
+PAPER = Path(__file__).parent
+STYLE = str(PAPER / "figures.mplstyle")
+CLAIMS = PAPER / "claims.json"
 
 
-def regenerate_tables(results: Path, out: Path, jobs: int = 1) -> list[Path]:
-    """Write every table of every registered model in three formats; the files written."""
-    tables = {"comparison": paper_comparison(results, jobs)}
-    for model in names("model"):
-        tables |= {f"{name}-{model}": t for name, t in model_tables(model, results, jobs).items()}
-    return [
-        write_text(out / f"{name}.{suffix}", table(rows, to=to))
-        for name, rows in tables.items()
-        for suffix, to in TABLES.items()
-    ]
+def stored(results: Path, name: str) -> Any:
+    """A dataset of the results folder, or the times of other tools."""
+    if name == "peers":
+        return json.loads((results / "peers.json").read_text(encoding="utf-8"))
+    return xr.load_dataset(results / "studies" / f"{name}.nc")
 
 
-def model_tables(model: str, results: Path, jobs: int = 1) -> dict[str, pd.DataFrame]:
-    """Tables that every model has: costs, errors, spectrum, operations.
-
-    Errors are those of the paper's studies; of another model of its nominal and perturbed runs.
-    """
-    studies = (
-        ("paper",) if of_paper(model) else (nominal(model, results), perturbed(model, results))
-    )
-    errors = pd.concat([study_comparison(study, results, jobs) for study in studies])
-    tables = {
-        "costs": cost_table(model, results),
-        "errors": errors[errors["model"] == model],
-        "operations": operation_table(model),
-    }
-    if pod.METHOD.accepts(vm.model(model))[0]:
-        tables["spectrum"] = spectrum_table(model)
-    return tables
+def draw(entry: Entry, results: Path, path: Path) -> Path:
+    """Draw one figure as SVG, glyphs as paths."""
+    data = {name: stored(results, name) for name in entry.studies}
+    with theme.styled(STYLE):
+        figure = entry.draw(*([data] if data else []), **entry.options)
+        return theme.save_figure(figure, path)
 
 
-def operation_table(model: str) -> pd.DataFrame:
-    """Exact operation counts of a model's generated kernels."""
-    counts = vm.model(model).operation_counts
-    return pd.DataFrame([{"kernel": name, **count} for name, count in counts.items()])
+def claims(results: Path) -> list[dict[str, Any]]:
+    """Every claim of the paper that can be measured, with bound, both variants and verdicts."""
+    names = (*load_studies("paper"), *TIMING.values())
+    data = {name: of_published_start(stored(results, name)) for name in names}
+    return list(_claim_rows(data))
+
+
+def _claim_rows(data: dict[str, xr.Dataset]) -> Iterator[dict[str, Any]]:
+    for claim in load_published().claim:
+        if claim.kind == "setup":
+            continue
+        rows = [row for row in rows_of(claim, claim_criterion(claim), data) if row["measure"]]
+        if rows:
+            yield {
+                "id": claim.id,
+                "section": claim.section,
+                "statement": claim.statement,
+                "measure": rows[0]["measure"],
+                "bound": float(rows[0]["bound"]),
+                "rows": [
+                    {
+                        "variant": row["variant"],
+                        "value": float(f"{row['reproduced']:.4g}"),
+                        "verdict": row["verdict"],
+                    }
+                    for row in rows
+                    if np.isfinite(row["reproduced"])
+                ],
+            }
+
+
+def regenerate(results: Path, folder: Path, only: Sequence[str] = ()) -> list[Path]:
+    """All figures, or some, into a folder, and the table of claims; the files written."""
+    written: list[Path] = []
+    for name in only or FIGURES:
+        try:
+            written.append(draw(FIGURES[name], results, folder / f"{name}.svg"))
+        except FileNotFoundError as error:
+            print(f"{name}.svg stays as it is: {error.filename} is missing", file=sys.stderr)
+    if not only:
+        try:
+            text = json.dumps(claims(results), indent=1, ensure_ascii=False) + "\n"
+        except FileNotFoundError as error:
+            print(f"claims.json stays as it is: {error.filename} is missing", file=sys.stderr)
+        else:
+            written.append(write_text(CLAIMS, text))
+    return written
 
 
 def main() -> int:
-    """Regenerate everything; wrong input is one line and exit status 2."""
+    """Regenerate figures and claims; wrong input is one line and exit status 2."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
-    parser.add_argument("--out", type=Path, default=Path("results"), help="folder for the files")
-    parser.add_argument("--jobs", type=int, default=1, help="processes for missing studies")
+    parser.add_argument("--only", nargs="+", choices=list(FIGURES), default=[], metavar="NAME")
     arguments = parser.parse_args()
+    matplotlib.use("Agg")
     try:
-        for path in regenerate_all(arguments.results, arguments.out, arguments.jobs):
+        for path in regenerate(arguments.results, PAPER / "figures", arguments.only):
             print(path)
     except VehiclemorError as error:
         print(f"regenerate: {error}", file=sys.stderr)

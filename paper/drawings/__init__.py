@@ -1,0 +1,1 @@
+"""Figures of the paper at their final size; `regenerate.py` calls them."""

@@ -1,0 +1,167 @@
+"""Reduced models beside full order, contenders and other tools; where reduction pays."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from drawings import look
+from drawings.look import BLUE, GREEN, ORANGE, PINK, RED, THIN, TWO, Results, legend, panels, titles
+from vehiclemor.report.figures import size
+from vehiclemor.report.figures.theme import tick_decades
+from vehiclemor.report.unseen import method_rows, protocol_of
+from vehiclemor.study.plans.protocol import FULL_ORDER
+
+MODELS = {
+    "double_wishbone": "suspension",
+    "independent_suspension_vehicle": "14-DOF vehicle",
+    "high_fidelity_vehicle": "high-fidelity vehicle",
+    "flexible_truck": "truck",
+}
+# Method -> what it is drawn as: kind, colour, mark.
+LEARNED = "learned by a library"
+LINEAR = "linear or projected"
+STYLES: Mapping[str, tuple[str, str]] = {
+    LEARNED: (RED, "s"),
+    LINEAR: (ORANGE, "^"),
+    "this suite's methods": (BLUE, "o"),
+}
+OF_LIBRARIES = (
+    "operator_inference",
+    "sparse_identification",
+    "dynamic_mode_decomposition",
+    "gaussian_process",
+    "neural_network",
+)
+PROJECTED = (
+    "balanced_truncation",
+    "irka",
+    "deim",
+    "modal_truncation",
+    "linear_single_track",
+    "pod",
+    "fixed_basis",
+    "craig_bampton",
+    "krylov",
+    "coarse_mesh",
+)
+
+
+def figure_pareto(results: Results) -> Figure:
+    """Worst error on the test set over the time of a whole call: every method, all four models."""
+    figure, grid = panels(1, 4, TWO, 2.4)
+    for axis, model in zip(grid.flat, MODELS, strict=True):
+        found: dict[tuple[str, str], dict[str, Any]] = {}
+        for study in (f"contenders-{model}", f"predictive-{model}"):
+            data = results[study]
+            # Times of the protocol's study count where both have a row.
+            found |= {(r["method"], r["label"]): r for r in method_rows(data, protocol_of(data))}
+        rows = [r for r in found.values() if r["seconds"] > 0.0 and np.isfinite(r["score"])]
+        full = _least((r["score"], r["seconds"]) for r in rows if r["role"] == FULL_ORDER)
+        _draw_front(axis, full)
+        for row in rows:
+            if row["role"] != FULL_ORDER and row["method"] != "replay":
+                _draw_row(axis, row)
+        axis.axhline(1.0, **THIN)
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        axis.set_ylim(bottom=max(axis.get_ylim()[0], 1e-3))
+        look.decades(axis, 1)
+        axis.set_xlabel("whole call (ms)")
+    grid[0, 0].set_ylabel("worst error / bound")
+    titles(grid, MODELS.values())
+    legend(figure, grid.flat, 5)
+    return figure
+
+
+def _draw_front(axis: Any, points: list[tuple[float, float]]) -> None:
+    y, x = np.array(points).reshape(-1, 2).T
+    style = {"color": "black", "marker": ".", "markersize": 4, "linewidth": 0.9}
+    axis.plot(1e3 * x, y, label="full order, fastest", **style)
+
+
+def _draw_row(axis: Any, row: Mapping[str, Any]) -> None:
+    kind = LEARNED if row["method"] in OF_LIBRARIES else LINEAR
+    if row["method"] not in (*OF_LIBRARIES, *PROJECTED):
+        kind = "this suite's methods"
+    color, marker = STYLES[kind]
+    style = {"marker": marker, "linestyle": "none", "markersize": 4, "markerfacecolor": "none"}
+    axis.plot(1e3 * row["seconds"], row["score"], color=color, label=kind, **style)
+    if row["winner"]:
+        star = {"marker": "*", "markersize": 11, "linestyle": "none", "color": GREEN}
+        star["markerfacecolor"] = "none"
+        axis.plot(1e3 * row["seconds"], row["score"], label="chosen by validation", **star)
+
+
+def figure_size(results: Results) -> Figure:
+    """CPU time of a whole run over the number of coordinates, and what reduction gains."""
+    figure = size.figure_size(results)
+    figure.set_size_inches(TWO, 2.8)
+    # Room for the names of the vehicles.
+    figure.axes[1].set_ylim(bottom=0.2)
+    return figure
+
+
+# Errors in m that are shown of other tools, by what they compute.
+SHOWN = {"": (0.1, 2e-8), "-steps": (0.1, 1e-9), "-batch": (0.1, 2e-8)}
+# Beginning of a label in the results of the peers -> colour, dashes, text; later ones win.
+PEERS: Mapping[str, tuple[str, Any, str]] = {
+    "ours": ("black", "-", "fastest here"),
+    "CVODE in C": (RED, "-", "CVODE, C by hand"),
+    "CasADi CVODES": (BLUE, "-", "CasADi CVODES"),
+    "CasADi Runge-Kutta": (BLUE, "--", "CasADi Runge-Kutta"),
+    "scikit-sundae": (GREEN, "-", "scikit-sundae"),
+    "SciPy": (PINK, "-", "SciPy, best"),
+    "JAX": (ORANGE, "-", "JAX diffrax"),
+}
+
+
+def figure_peers(results: Mapping[str, Any]) -> Figure:
+    """CPU time over error of both vehicles in other tools: a run, a step and a run of a batch."""
+    figure, grid = panels(2, 3, TWO, 3.6, sharex="col")
+    models = "independent_suspension_vehicle", "high_fidelity_vehicle"
+    for row, model in zip(grid, models, strict=True):
+        for axis, part in zip(row, ("", "-steps", "-batch"), strict=True):
+            case = results["peers"][model + part]
+            for label, (color, dashes, text) in PEERS.items():
+                points = _front(case, label, SHOWN[part])
+                if points:
+                    style = {"color": color, "linestyle": dashes, "marker": ".", "markersize": 3}
+                    axis.loglog(*np.array(points).T, label=text, **style)
+            axis.set_xlim(*SHOWN[part])
+            tick_decades(axis.yaxis, *axis.get_ylim())
+        row[0].set_ylabel(f"{MODELS[model]}\nCPU time (ms)")
+    for axis in grid[-1]:
+        axis.set_xlabel("largest error of the position (m)")
+    titles(grid, ["a run", "a step of 10 ms", "a run of a batch of 200"] * 2)
+    legend(figure, grid.flat, 4)
+    return figure
+
+
+def _front(
+    case: Mapping[str, Any], beginning: str, shown: tuple[float, float]
+) -> list[tuple[float, float]]:
+    """Errors and least milliseconds of curves with this beginning, outputs left out."""
+    curves = [
+        curve
+        for label, curve in case["curves"].items()
+        if label.startswith(beginning) and curve["delivers"] != "outputs"
+    ]
+    count = case.get("per", (1, ""))[0]
+    points = [
+        (p["error"], 1e3 * p["seconds"] / count)
+        for curve in curves
+        for p in curve["points"]
+        if shown[1] <= p["error"] <= shown[0]
+    ]
+    return _least(points)
+
+
+def _least(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Of points (error, time) those that no point of smaller error undercuts in time."""
+    kept: list[tuple[float, float]] = []
+    for point in sorted(points):
+        if not kept or point[1] < kept[-1][1]:
+            kept.append(point)
+    return kept

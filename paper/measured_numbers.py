@@ -1,0 +1,120 @@
+"""Numbers of README, pages and paper by name, from stored results: `paper/numbers.json`.
+
+Usage: python paper/measured_numbers.py [--results DIR] [--readme] [--list PATTERN]
+
+A name is a place in a table: `predictive.double_wishbone.path_map.misses`.  Nothing is computed
+anew.  Numbers whose file the results folder lacks stay as they are, and the script says which.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from number_tables import (
+    Entry,
+    benchmark,
+    comparison,
+    in_use,
+    operations,
+    peers,
+    published,
+    studies,
+)
+from numbers_by_name import FILE, load, render
+
+from vehiclemor.files import write_text
+from vehiclemor.registry import component, names
+from vehiclemor.report.printed_numbers import TIMING
+
+README, SOURCE = (FILE.parents[1] / name for name in ("README.md", "docs/README.md.in"))
+# Last part of a name -> its unit; an error has that of its output.
+UNITS = {"us": "us", "offline_us": "us", "ns_per_sample": "ns", "median": "s"}
+UNITS |= {"growth_rate": "1/s", "growth_largest": "1/s"}
+UNITS |= {"largest_lateral_position_without_steering": "m"}
+ERRORS = ("rms_error", "floor", "smallest", "largest", "natural")
+
+
+@cache
+def output_units() -> dict[str, str]:
+    """Unit of every output of every model."""
+    return {q.name: q.unit for name in names("model") for q in component("model", name).outputs}
+
+
+def unit(name: str) -> str:
+    """Unit of a number by the last parts of its name."""
+    *_, output, last = ["", *re.sub(r"worst_(rms|max|relative)_", "", name).split(".")]
+    if last.endswith("seconds"):
+        return "s"
+    return output_units().get(output if last in ERRORS else last, UNITS.get(last, "1"))
+
+
+def sources(results: Path) -> Iterator[tuple[str, str, Callable[[], Iterator[Entry]]]]:
+    """Source, command that writes it, numbers of it."""
+
+    def of_file(make: Callable[[Any], Iterator[Entry]], file: str) -> Iterator[Entry]:
+        if file.endswith(".json"):
+            return make(json.loads((results / file).read_text(encoding="utf-8")))
+        return make(xr.open_dataset(results / file).load())
+
+    yield "data/published/masoudi2015.toml", "", published
+    yield "src", "", operations
+    yield "studies", "vehiclemor compare paper", partial(comparison, results / "studies")
+    yield "in_use.nc", "python paper/in_use.py", partial(of_file, in_use, "in_use.nc")
+    yield "benchmark.json", "tox -e bench", partial(of_file, benchmark, "benchmark.json")
+    yield "peers.json", "tox -e peers", partial(of_file, peers, "peers.json")
+    for name, make in studies():
+        command = "compare paper" if name in TIMING.values() else f"run {name}"
+        file = f"studies/{name}.nc"
+        yield file, f"vehiclemor {command}", partial(of_file, make, file)
+
+
+def measured(results: Path, known: dict[str, Any]) -> dict[str, Any]:
+    """All numbers by name; those whose file is missing as they are `known`."""
+    numbers: dict[str, Any] = {}
+    for source, command, make in sources(results):
+        try:
+            found = [(name, float(value), *units) for name, value, *units in make()]
+        except FileNotFoundError as error:
+            old = {name: entry for name, entry in known.items() if entry["source"] == source}
+            print(
+                f"{error.filename}: missing; {len(old)} numbers stay as they are", file=sys.stderr
+            )
+            numbers |= old
+            continue
+        for name, value, *units in found:
+            if np.isfinite(value):
+                head = {"value": float(f"{value:.6g}"), "unit": units[0] if units else unit(name)}
+                numbers[name] = head | {"source": source, "command": command}
+    return dict(sorted(numbers.items()))
+
+
+def main() -> None:
+    """Write the numbers and README, or list names."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
+    parser.add_argument("--readme", action="store_true", help="only render README")
+    parser.add_argument("--list", metavar="PATTERN", help="only list names that match")
+    wanted = parser.parse_args()
+    known = load() if FILE.exists() else {}
+    if wanted.list is not None:
+        for name in filter(re.compile(wanted.list).search, known):
+            print(f"{name} = {known[name]['value']:g} {known[name]['unit']}")
+        return
+    if not wanted.readme:
+        known = measured(wanted.results, known)
+        rows = (f"{json.dumps(name)}: {json.dumps(entry)}" for name, entry in known.items())
+        write_text(FILE, "{\n" + ",\n".join(rows) + "\n}\n")
+    write_text(README, render(SOURCE.read_text(encoding="utf-8"), known, SOURCE.name))
+
+
+if __name__ == "__main__":
+    main()
