@@ -8,7 +8,7 @@ from tests.oracles.taylor import axial, euler_321, times, turned
 from tests.unit.programs import function_of
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
-from vehiclemor.symbolic.joints import STILL, along, carried, free_rate, successive
+from vehiclemor.symbolic.mechanics import STILL, along, carried, free_rate, successive
 from vehiclemor.symbolic.tape import Tape
 
 TENSOR = np.array([[2.0, 0.3, -0.2], [0.3, 3.0, 0.4], [-0.2, 0.4, 4.5]])

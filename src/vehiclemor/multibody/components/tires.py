@@ -1,4 +1,7 @@
-"""Tire forces as symbolic expressions, for any set of coefficients.
+"""Wheels on the road as symbolic expressions: contact, vertical load, tire forces.
+
+The contact point of a wheel with camber is where its plane, through its centre and across its spin
+axis, meets the road; the loaded radius is also the effective rolling radius.
 
 Fiala: E. Fiala, Seitenkraefte am rollenden Luftreifen, VDI-Zeitschrift 96 (1954), in the form of
 MSC Adams/Tire and of the MapleSim Tire Library: friction falls with the combined slip.
@@ -9,11 +12,14 @@ PAC2002.  Signs are those of ISO 8855 with a slip angle that is positive when th
 slides to the left.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import sympy as sp
 
+from vehiclemor.multibody.components.body import Attitude
+from vehiclemor.symbolic import geometry as g
+from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.tape import Tape
 
 # Keeps 0/0 from a wheel without load and slip; nothing else notices it.
@@ -30,12 +36,10 @@ class TireForces:
 
 
 def tire_outputs(
-    tires: Sequence[TireForces],
-    loads: Sequence[sp.Expr],
-    slip_ratios: Sequence[sp.Expr],
-    slip_angles: Sequence[sp.Expr],
+    wheels: Iterable[tuple[TireForces, sp.Expr, sp.Expr, sp.Expr]],
 ) -> list[sp.Expr]:
-    """The outputs `TIRE_OUTPUTS` of four wheels."""
+    """Outputs of wheels by forces, load, slip ratio and slip angle of each."""
+    tires, loads, slip_ratios, slip_angles = zip(*wheels, strict=True)
     return [
         *(tire.longitudinal for tire in tires),
         *(tire.lateral for tire in tires),
@@ -146,3 +150,125 @@ def maximum(tape: Tape, a: sp.Expr, b: sp.Expr) -> sp.Expr:
 def minimum(tape: Tape, a: sp.Expr, b: sp.Expr) -> sp.Expr:
     """The smaller of two values, without a branch."""
     return tape.let((a + b - sp.Abs(tape.let(a - b))) / 2)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Wheel on the road, chassis components."""
+
+    # Height of the wheel centre above the road in m and its rate in m/s.
+    height: sp.Expr
+    rise: sp.Expr
+    # Unit vectors along and across the wheel in the road plane.
+    heading: Vector
+    leftward: Vector
+    # kappa, alpha in rad (sliding to the left is positive), cos alpha.
+    slip_ratio: sp.Expr
+    slip_angle: sp.Expr
+    cos_slip_angle: sp.Expr
+
+
+def contact_of(
+    tape: Tape,
+    chassis: Attitude,
+    height: sp.Expr,  # Height of the chassis origin above the road.
+    # Wheel centre and spin axis in the chassis frame.
+    place: Vector,
+    axle: Vector,
+    # Velocity of the wheel centre and complete angular velocity of the wheel.
+    velocity: Vector,
+    rotation: Vector,
+    slip_speed: sp.Expr,  # Speed (m/s) below which slip is regularised.
+) -> Contact:
+    """Contact of a rigid wheel whose effective radius is the height of its centre."""
+    up = chassis.road_normal
+    above = tape.let(height + tape.let(up @ place))
+    along = g.named(tape, axle.cross(up))
+    inverse = tape.let(1 / g.length(tape, along))
+    heading = g.named(tape, along * inverse)
+    leftward = g.named(tape, up.cross(heading))
+    arm = g.named(tape, up * -above)
+    sliding = g.named(tape, velocity + rotation.cross(arm))
+    forward = tape.let(heading @ velocity)
+    speed = tape.let(sp.sqrt(tape.let(forward**2 + slip_speed**2)))
+    lateral = tape.let(tape.let(leftward @ sliding) / speed)
+    return Contact(
+        above,
+        tape.let(up @ velocity),
+        heading,
+        leftward,
+        tape.let(-tape.let(heading @ sliding) / speed),
+        tape.let(sp.atan(lateral)),
+        tape.let(1 / sp.sqrt(tape.let(1 + lateral**2))),
+    )
+
+
+@dataclass(frozen=True)
+class TiltedContact:
+    """Wheel on the road, chassis components."""
+
+    arm: Vector  # From the wheel centre to the contact point in m.
+    # Unit vectors along and across the wheel in the road's plane, and its normal.
+    heading: Vector
+    leftward: Vector
+    up: Vector
+    load: sp.Expr  # Vertical force in N, not negative.
+    # kappa and the tangent of the slip angle (sliding to the left is positive).
+    slip_ratio: sp.Expr
+    tan_slip: sp.Expr
+
+    def loads(self, tape: Tape, tire: TireForces) -> tuple[Vector, Vector]:
+        """Force on the wheel and its moment about the wheel centre."""
+        shear = self.heading * tire.longitudinal + self.leftward * tire.lateral
+        force = g.named(tape, shear + self.up * self.load)
+        moment = self.arm.cross(force) + self.up * tire.aligning
+        return force, g.named(tape, moment)
+
+
+def tilted_contact(
+    tape: Tape,
+    up: Vector,  # Road normal.
+    height: sp.Expr,  # Height of the wheel centre above the road.
+    axle: Vector,  # Unit spin axis.
+    # Velocity of the wheel centre, angular velocity of the carrier without the spin.
+    velocity: Vector,
+    turning: Vector,
+    spin: sp.Expr,  # Spin of the wheel on its carrier in rad/s.
+    p: Mapping[str, sp.Expr],  # `tire_radius`, `tire_stiffness`, `tire_damping`, `slip_speed`.
+) -> TiltedContact:
+    """Contact of a wheel with camber."""
+    let = tape.let
+    across = g.named(tape, axle.cross(up))
+    # The length of axle x up is the cosine of the camber angle.
+    cosine = g.length(tape, across)
+    inverse = let(1 / cosine)
+    heading = g.named(tape, across * inverse)
+    leftward = g.named(tape, up.cross(heading))
+    down = g.named(tape, axle.cross(heading))
+    radius = let(height * inverse)
+    arm = g.named(tape, down * radius)
+    sliding = g.named(tape, velocity + turning.cross(arm))
+    forward, lateral = let(sliding @ heading), let(sliding @ leftward)
+    rise = let(sliding @ up)
+
+    load = vertical_load(tape, radius, rise * inverse, p)
+    per_speed = let(1 / maximum(tape, let(sp.Abs(forward)), p["slip_speed"]))
+    return TiltedContact(
+        arm,
+        heading,
+        leftward,
+        up,
+        load,
+        let(let(spin * radius - forward) * per_speed),
+        let(lateral * per_speed),
+    )
+
+
+def vertical_load(tape: Tape, radius: sp.Expr, rate: sp.Expr, p: Mapping[str, sp.Expr]) -> sp.Expr:
+    """Vertical force of a wheel that pushes and never pulls, from its loaded radius and rate."""
+    let = tape.let
+    pressed = let(p["tire_radius"] - radius)
+    elastic = let(let(p["tire_stiffness"] / 2) * (pressed + sp.Abs(pressed)))
+    damping = let(-p["tire_damping"] * let(rate))
+    total = let(elastic + minimum(tape, elastic, damping))
+    return let((total + sp.Abs(total)) / 2)

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.exceptions import GeometryError, InputError
+from vehiclemor.multibody.definition import Structure
 from vehiclemor.multibody.flexible_truck import beams, shells
 from vehiclemor.multibody.flexible_truck.frame import Layout, levers, planes
 from vehiclemor.multibody.flexible_truck.motions import OTHERS, Motions, block
 from vehiclemor.multibody.quantities import declared
-from vehiclemor.multibody.structure import Structure
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array

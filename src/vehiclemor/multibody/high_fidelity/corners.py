@@ -1,4 +1,4 @@
-"""Corners of the high-fidelity vehicle: double wishbones in front, trailing arms behind.
+"""The high-fidelity vehicle and its corners: double wishbones in front, trailing arms behind.
 
 Each corner gives its bodies with their loads for any rates of its joint coordinates: where these
 are speeds of their own the result is the unconstrained system, where they follow from the lower
@@ -11,21 +11,103 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from vehiclemor.multibody.components import tilted_wheel
-from vehiclemor.multibody.components.tires import TireForces
-from vehiclemor.multibody.double_wishbone.linkage import Arm, Linkage
-from vehiclemor.multibody.high_fidelity.linkage_motions import LinkageMotions
-from vehiclemor.multibody.high_fidelity.parts import SIDES, Vehicle
+from vehiclemor.multibody.components import body
+from vehiclemor.multibody.components import linkage as links
+from vehiclemor.multibody.components.tires import TiltedContact, TireForces, fiala, tilted_contact
+from vehiclemor.multibody.double_wishbone.definition import POINTS
+from vehiclemor.multibody.high_fidelity.definition import DECLARED, SOLVED
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
 from vehiclemor.symbolic.geometry import Vector
-from vehiclemor.symbolic.joints import STILL, Rate, along, carried
-from vehiclemor.symbolic.mechanics import Body, Motion, Rotor, Tensor
+from vehiclemor.symbolic.mechanics import STILL, Body, Motion, Rate, Rotor, Tensor, along, carried
 from vehiclemor.symbolic.tape import Tape
 
 Parameters = Mapping[str, sp.Expr]
-# Of the corners in order.
+# Of the corners in order: FL, FR, RL, RR; 1 on the left, -1 on the right.
 ENDS = ("front", "front", "rear", "rear")
+SIDES = (1, -1, 1, -1)
+# Places of the front corners' coordinates, of the arms that carry the springs (lower arms in front,
+# trailing arms behind), and of the wheels' spins.
+CORNER = (range(6, 13), range(13, 20))
+ARMS = (10, 17, 20, 21)
+SPINS = (22, 23, 24, 25)
+FRONT_POINTS = (
+    *POINTS,
+    *("front_spring_chassis_point", "front_spring_arm_point"),
+    *("upper_arm_centre", "lower_arm_centre", "carrier_centre"),
+)
+REAR_POINTS = (
+    *("rear_arm_pivot", "rear_arm_centre", "rear_spring_chassis_point", "rear_spring_arm_point"),
+)
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """The chassis, the design points, and the front linkages in any position."""
+
+    attitude: body.Attitude
+    # Moving frame of the chassis, its origin the centre of mass; its first three speeds are
+    # velocities in space, and gravity is counted as an acceleration upwards.
+    frame: m.MovingFrame
+    points: tuple[dict[str, Vector], ...]  # Design points of the four corners, chassis frame.
+    linkages: tuple[links.Linkage, ...]
+    # Coordinates and their rates; displacement, velocity and acceleration of the rack.
+    q: Sequence[sp.Symbol]
+    rates: Sequence[sp.Symbol]
+    rack: Sequence[sp.Symbol]
+    p: Parameters
+
+    @property
+    def speeds(self) -> list[sp.Expr]:
+        """The six speeds of the chassis."""
+        return [*self.frame.velocity, *self.frame.angular_velocity]
+
+    def motions(self, tape: Tape, rates: Sequence[Rate], k: int) -> links.LinkageMotions:
+        """Motions of the front left (0) or right (1) corner for rates of all coordinates."""
+        q, own = [self.q[j] for j in CORNER[k]], [rates[j] for j in CORNER[k]]
+        return links.linkage_motions(tape, self.linkages[k], q, own, self.rack[1:])
+
+
+def vehicle(tape: Tape) -> tuple[Vehicle, list[sp.Symbol]]:
+    """The vehicle, and the symbols of its parameters in order."""
+    q, rates, rack = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds", "inputs"))
+    flat = []
+    for name, declared in DECLARED["parameters"].items():
+        flat += [name] if declared.size == 1 else [f"{name}_{axis}" for axis in "xyz"]
+    p = {name: sp.Symbol(f"p_{name}", real=True) for name in (*flat, *SOLVED)}
+    attitude = body.attitude(tape, q)
+    speeds = body.speeds(tape, attitude, rates)
+    frame = m.MovingFrame(
+        g.vector(speeds[:3]),
+        g.vector(speeds[3:6]),
+        first=0,
+        acceleration=g.named(tape, attitude.road_normal * p["gravity"]),
+    )
+    points = _design_points(tape, p)
+    linkages = tuple(
+        links.assembled(tape, [q[j] for j in CORNER[k]], rack[0], points[k], SIDES[k])
+        for k in range(2)
+    )
+    return Vehicle(attitude, frame, points, linkages, q, rates, rack, p), list(p.values())
+
+
+def _design_points(tape: Tape, p: Parameters) -> tuple[dict[str, Vector], ...]:
+    """Design points of the four corners, chassis frame."""
+
+    def vector(name: str) -> Vector:
+        return g.vector([p[f"{name}_{axis}"] for axis in "xyz"])
+
+    origin = vector("chassis_centre")
+    front = g.named(tape, vector("front_frame_origin") - origin)
+    rear = g.named(tape, vector("rear_wheel_centre") - origin)
+    left = {name: g.named(tape, vector(name) + front) for name in FRONT_POINTS}
+    behind = {name: g.named(tape, vector(name) + rear) for name in REAR_POINTS}
+    behind["rear_wheel_centre"] = rear
+
+    def mirrored(points: dict[str, Vector]) -> dict[str, Vector]:
+        return {name: Vector(x, -y, z) for name, (x, y, z) in points.items()}
+
+    return left, mirrored(left), behind, mirrored(behind)
 
 
 class _WheelCarrier(NamedTuple):
@@ -52,15 +134,13 @@ class Corner:
     # Generalised force of the spring-damper on the arm that carries it in N m.
     spring_moment: sp.Expr
     # Wheel on the road.
-    contact: tilted_wheel.TiltedContact
+    contact: TiltedContact
     tire: TireForces
 
 
-def front_corner(
-    tape: Tape, v: Vehicle, k: int, linkage: Linkage, motions: LinkageMotions
-) -> Corner:
+def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) -> Corner:
     """Arms, wheel carrier with its wheel, and tie rod of the left (k = 0) or right (1) corner."""
-    frame, points, p = v.frame, v.points[k], v.p
+    frame, points, p, linkage = v.frame, v.points[k], v.p, v.linkages[k]
 
     def arm(name: str, turn: Motion) -> Body:
         part = linkage.upper if name == "upper" else linkage.lower
@@ -120,7 +200,7 @@ def front_corner(
 
 def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner:
     """Trailing arm with its wheel, left (k = 2) or right (3); it turns about the lateral axis."""
-    points, side, p, number = v.points[k], SIDES[k], v.p, v.numbers.arms[k]
+    points, side, p, number = v.points[k], SIDES[k], v.p, ARMS[k]
     pivot, axis, angle = points["rear_arm_pivot"], m.UNIT[1], v.q[number]
     turn = along(rates[number], axis)
 
@@ -169,9 +249,9 @@ def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner
 
 def _wheeled_body(
     tape: Tape, v: Vehicle, k: int, part: _WheelCarrier
-) -> tuple[Body, tilted_wheel.TiltedContact, TireForces]:
+) -> tuple[Body, TiltedContact, TireForces]:
     """A carrier or arm together with its wheel, and the wheel on the road."""
-    frame, axle, spin = v.frame, part.axle, v.numbers.spins[k]
+    frame, axle, spin = v.frame, part.axle, SPINS[k]
     levers = (part.to_centre, part.to_wheel)
     places = [g.named(tape, part.base + lever) for lever in levers]
     centre, wheel = (
@@ -179,11 +259,11 @@ def _wheeled_body(
         for point, lever in zip(places, levers, strict=True)
     )
     turning = frame.turning(tape, part.turn)
-    height = tape.let(v.q[2] + tape.let(v.up @ places[1]))
-    contact = tilted_wheel.tilted_contact(
-        tape, v.up, height, axle, wheel.value, turning.value, v.rates[spin], v.p
+    height = tape.let(v.q[2] + tape.let(v.attitude.road_normal @ places[1]))
+    contact = tilted_contact(
+        tape, v.attitude.road_normal, height, axle, wheel.value, turning.value, v.rates[spin], v.p
     )
-    tire = tilted_wheel.tire_on(tape, contact, v.p)
+    tire = fiala(tape, v.p, contact.load, contact.slip_ratio, contact.tan_slip)
     force, moment = contact.loads(tape, tire)
     arm = g.named(tape, places[1] - places[0])
     inertia = v.p[f"{ENDS[k]}_wheel_spin_inertia"]
@@ -213,7 +293,7 @@ def _spring(tape: Tape, gap: Vector, motion: Motion, v: Vehicle, k: int) -> sp.E
     rate = tape.let(direction @ motion.value)
     compression = tape.let(p[f"{end}_free_length"] - length)
     force = tape.let(p[f"{end}_stiffness"] * compression - p[f"{end}_damping"] * rate)
-    return tape.let(force * tape.let(direction @ motion.columns[v.numbers.arms[k]]))
+    return tape.let(force * tape.let(direction @ motion.columns[ARMS[k]]))
 
 
 def _with_wheel(
@@ -249,7 +329,7 @@ def diagonal(p: Parameters, name: str) -> Tensor:
     return g.vector((x, 0, 0)), g.vector((0, y, 0)), g.vector((0, 0, z))
 
 
-def _arm_tensor(tape: Tape, v: Vehicle, k: int, arm: Arm, name: str) -> Tensor:
+def _arm_tensor(tape: Tape, v: Vehicle, k: int, arm: links.Arm, name: str) -> Tensor:
     """Tensor of a control arm at the design position, from that in its own axes."""
     axis = arm.axis(tape)
     lever = g.named(tape, v.points[k][f"{name}_ball_joint"] - arm.rear)
