@@ -8,7 +8,7 @@ the opposite of its force.  A tire lifts its axle.  Springs, dampers and stops a
 import sympy as sp
 
 from vehiclemor.multibody.components import body
-from vehiclemor.multibody.flexible_truck.vehicle import DECLARED, ENDS
+from vehiclemor.multibody.flexible_truck.definition import DECLARED, ENDS
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
