@@ -17,9 +17,8 @@ from vehiclemor.arguments import loop_array
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.piecewise import polynomial_loops
-from vehiclemor.inputs.sample_loops import Pieces
-from vehiclemor.inputs.signal import Signal
+from vehiclemor.inputs.polynomial_loops import Pieces
+from vehiclemor.inputs.signal import Signal, polynomial_loops
 
 Made = TypeVar("Made")
 ACCURACY = 1e-11
