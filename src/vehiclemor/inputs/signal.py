@@ -105,7 +105,11 @@ class Signal(Maneuver):
             inputs = self.pieces.coefficients.shape[1]
             orders = np.array([_order(name, self.inputs) for name in self.inputs] or [0] * inputs)
             amplitudes = amplitude * frequency**orders
-            self.kept["polynomials"] = scaled(self.pieces, frequency, amplitudes)
+            self.kept["polynomials"] = self.pieces._replace(
+                edges=self.pieces.edges / frequency,
+                starts=self.pieces.starts / frequency,
+                coefficients=self.pieces.coefficients * amplitudes[:, None],
+            )
         return self.kept["polynomials"]
 
     @property
@@ -316,27 +320,16 @@ def _through() -> Loop:
     return loops(("inputs.polynomial_loops",), ("through",))["through"]
 
 
-def lengths(pieces: Pieces) -> np.ndarray:
-    """Lengths (pieces,) in s."""
-    if len(pieces.starts):
-        return np.diff(pieces.starts, append=pieces.edges[-1])
-    counts = np.diff(pieces.first)
-    return np.repeat(np.diff(pieces.edges) / counts, counts)
-
-
-def scaled(pieces: Pieces, frequency: float, amplitudes: np.ndarray) -> Pieces:
-    """So much faster, and each input times its own amplitude (inputs,)."""
-    edges, starts = pieces.edges / frequency, pieces.starts / frequency
-    return pieces._replace(
-        edges=edges, starts=starts, coefficients=pieces.coefficients * amplitudes[:, None]
-    )
-
-
 def derivative(pieces: Pieces) -> Pieces:
     """By time; jumps have none."""
+    if len(pieces.starts):
+        lengths = np.diff(pieces.starts, append=pieces.edges[-1])
+    else:
+        counts = np.diff(pieces.first)
+        lengths = np.repeat(np.diff(pieces.edges) / counts, counts)
     rates = np.zeros_like(pieces.coefficients)
     rates[:, :, :-1] = pieces.coefficients[:, :, 1:] * np.arange(1.0, rates.shape[2])
-    return pieces._replace(coefficients=rates / lengths(pieces)[:, None, None])
+    return pieces._replace(coefficients=rates / lengths[:, None, None])
 
 
 def at(pieces: Pieces, times: np.ndarray) -> np.ndarray:
