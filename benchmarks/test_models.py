@@ -5,6 +5,7 @@ tools are compared in `peers/`.
 """
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,9 +55,9 @@ CASES = [(name, label) for name, own in METHODS.items() for label in [*ALL, *own
 
 
 @cache
-def nominal(name):
+def nominal(name: str) -> tuple[Any, Any, Any]:
     """A model, compiled and parametrised, its maneuver, and the full run."""
-    model = vm.model(name)
+    model: Any = vm.model(name)
     maneuver = vm.maneuver(model.definition.maneuver)
     return model, maneuver, model.simulate(maneuver)
 
