@@ -23,7 +23,7 @@ class Arm:
     # Pivots on the chassis.
     rear: g.Vector
     front: g.Vector
-    angle: g.Angle  # Rotation from the design position.
+    angle: sp.Expr  # Rotation from the design position.
 
     def axis(self, tape: Tape) -> g.Vector:
         """Unit axis."""

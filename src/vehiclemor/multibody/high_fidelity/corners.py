@@ -80,7 +80,6 @@ def vehicle(tape: Tape) -> tuple[Vehicle, list[sp.Symbol]]:
     frame = m.MovingFrame(
         g.vector(speeds[:3]),
         g.vector(speeds[3:6]),
-        first=0,
         acceleration=g.named(tape, attitude.road_normal * p["gravity"]),
     )
     points = _design_points(tape, p)
@@ -267,7 +266,7 @@ def _wheeled_body(
     force, moment = contact.loads(tape, tire)
     arm = g.named(tape, places[1] - places[0])
     inertia = v.p[f"{ENDS[k]}_wheel_spin_inertia"]
-    rotor = Rotor(spin, v.rates[spin], axle, inertia, tape.let(moment @ axle))
+    rotor = Rotor(spin, v.rates[spin], axle, inertia, tape.let(moment @ axle), turning.bias)
     body = Body(
         part.mass,
         centre,
@@ -276,7 +275,6 @@ def _wheeled_body(
         part.tensor,
         g.named(tape, moment + arm.cross(force)),
         rotor,
-        turning.bias,
     )
     return body, contact, tire
 

@@ -92,7 +92,7 @@ def _vehicle(tape: Tape) -> _Vehicle:
     pairs = {
         k: tuple(map(tape.let, getattr(d, k))) for k in ("sprung_distance", "depth", "preload")
     }
-    frame = mechanics.MovingFrame(g.vector(nu[:3]), g.vector(nu[3:6]), first=0)
+    frame = mechanics.MovingFrame(g.vector(nu[:3]), g.vector(nu[3:6]))
     return _Vehicle(frame, attitude, q, nu, delta, p, replace(d, **pairs))
 
 
