@@ -165,15 +165,7 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
         m.with_inertia(tape, tensor, frame.turning(tape, motions.rod)),
         tensor,
     )
-    mass, centre, tensor = _with_wheel(
-        tape,
-        p["carrier_mass"],
-        points["carrier_centre"],
-        diagonal(p, "carrier_inertia"),
-        points["wheel_centre"],
-        p,
-        "front",
-    )
+    mass, centre, tensor = _with_wheel(tape, v, k, "carrier", diagonal(p, "carrier_inertia"))
     wheeled = _WheelCarrier(
         mass,
         m.rotated_tensor(tape, tensor, linkage.carrier),
@@ -186,13 +178,7 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
     )
     carrier, contact, tire = _wheeled_body(tape, v, k, wheeled)
     lever = linkage.lower.lever(tape, points["front_spring_arm_point"])
-    moment = _spring(
-        tape,
-        linkage.lower.rear + lever - points["front_spring_chassis_point"],
-        carried(tape, STILL, motions.lower, lever),
-        v,
-        k,
-    )
+    moment = _spring(tape, v, k, linkage.lower.rear, lever, motions.lower)
     bodies = (arm("upper", motions.upper), arm("lower", motions.lower), carrier, rod)
     return Corner(bodies, moment, contact, tire)
 
@@ -214,15 +200,7 @@ def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner
         Vector(side * xy, yy, side * yz),
         Vector(xz, side * yz, zz),
     )
-    mass, centre, tensor = _with_wheel(
-        tape,
-        p["rear_arm_mass"],
-        points["rear_arm_centre"],
-        arm_tensor,
-        points["rear_wheel_centre"],
-        p,
-        "rear",
-    )
+    mass, centre, tensor = _with_wheel(tape, v, k, "rear_arm", arm_tensor)
     to_centre = g.rotate_about_axis(tape, g.named(tape, centre - pivot), axis, angle)
     wheeled = _WheelCarrier(
         mass,
@@ -235,14 +213,7 @@ def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner
         axis,
     )
     arm, contact, tire = _wheeled_body(tape, v, k, wheeled)
-    to_spring = lever("rear_spring_arm_point")
-    moment = _spring(
-        tape,
-        pivot + to_spring - points["rear_spring_chassis_point"],
-        carried(tape, STILL, turn, to_spring),
-        v,
-        k,
-    )
+    moment = _spring(tape, v, k, pivot, lever("rear_spring_arm_point"), turn)
     return Corner((arm,), moment, contact, tire)
 
 
@@ -279,13 +250,11 @@ def _wheeled_body(
     return body, contact, tire
 
 
-def _spring(tape: Tape, gap: Vector, motion: Motion, v: Vehicle, k: int) -> sp.Expr:
-    """Generalised force of a spring-damper from the chassis to a moving point of an arm.
-
-    The gap leads from the chassis to the arm, the motion is of the end on the arm.
-    """
+def _spring(tape: Tape, v: Vehicle, k: int, pivot: Vector, lever: Vector, turn: Motion) -> sp.Expr:
+    """Generalised force of a spring-damper from the chassis to an arm on a pivot, at a lever."""
     p, end = v.p, ENDS[k]
-    gap = g.named(tape, gap)
+    motion = carried(tape, STILL, turn, lever)
+    gap = g.named(tape, pivot + lever - v.points[k][f"{end}_spring_chassis_point"])
     length = g.length(tape, gap)
     direction = g.named(tape, gap * tape.let(1 / length))
     rate = tape.let(direction @ motion.value)
@@ -295,16 +264,12 @@ def _spring(tape: Tape, gap: Vector, motion: Motion, v: Vehicle, k: int) -> sp.E
 
 
 def _with_wheel(
-    tape: Tape,
-    mass: sp.Expr,
-    centre: Vector,
-    tensor: Tensor,
-    wheel_centre: Vector,
-    p: Parameters,
-    end: str,
+    tape: Tape, v: Vehicle, k: int, name: str, tensor: Tensor
 ) -> tuple[sp.Expr, Vector, Tensor]:
     """Mass, centre of mass and tensor of a carrier with its wheel, at the design position."""
-    wheel = p[f"{end}_wheel_mass"]
+    p, points, end = v.p, v.points[k], ENDS[k]
+    mass, centre, wheel = p[f"{name}_mass"], points[f"{name}_centre"], p[f"{end}_wheel_mass"]
+    wheel_centre = points["wheel_centre" if end == "front" else "rear_wheel_centre"]
     total = tape.let(mass + wheel)
     weighted = centre * mass + wheel_centre * wheel
     both = g.named(tape, weighted * (1 / total))
