@@ -18,7 +18,7 @@ from tests.oracles.vehicle_lagrange import (
 )
 from tests.unit.programs import function_of
 from vehiclemor.multibody.components import tires
-from vehiclemor.multibody.quantities import FIALA, MAGIC_FORMULA
+from vehiclemor.multibody.quantities import FIALA
 from vehiclemor.symbolic.tape import Tape
 
 ALONG, ACROSS, MOST, LEAST, WIDTH = COEFFICIENTS = [
@@ -39,7 +39,7 @@ def compiled(name: str):
         own = exact(dict(zip(FIALA, COEFFICIENTS, strict=True)))
         forces = tires.fiala(tape, own, load, kappa, slip)
     else:
-        own = exact({name: PARAMETERS[name] for name in MAGIC_FORMULA})
+        own = exact(PARAMETERS)
         sizes = sp.Float(REFERENCE_LOAD, 17), sp.Float(PARAMETERS["R0"], 17)
         forces = tires.magic_formula(tape, own, load, *sizes, kappa, slip, cosine)
     results = [forces.longitudinal, forces.lateral, forces.aligning]

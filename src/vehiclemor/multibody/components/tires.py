@@ -52,7 +52,7 @@ def tire_outputs(
 
 def magic_formula(
     tape: Tape,
-    coefficients: Mapping[str, sp.Expr],  # `MAGIC_FORMULA` name -> value.
+    c: Mapping[str, sp.Expr],  # Coefficients, dimensionless, by their published names.
     # Vertical force and F_z0 in N.
     load: sp.Expr,
     reference_load: sp.Expr,
@@ -63,7 +63,7 @@ def magic_formula(
     cos_slip_angle: sp.Expr,
 ) -> TireForces:
     """Forces at combined slip; zero where the load is zero."""
-    c, let = coefficients, tape.let
+    let = tape.let
     d = let((load - reference_load) / reference_load)
     kappa, alpha = slip_ratio, slip_angle
 
@@ -110,7 +110,7 @@ def _arc(tape: Tape, x: sp.Expr, curvature: sp.Expr) -> sp.Expr:
 
 def fiala(
     tape: Tape,
-    coefficients: Mapping[str, sp.Expr],  # `FIALA` name -> value.
+    c: Mapping[str, sp.Expr],  # Coefficients `FIALA`.
     load: sp.Expr,  # Vertical force in N.
     # kappa, and the tangent of the slip angle.
     slip_ratio: sp.Expr,
@@ -121,7 +121,7 @@ def fiala(
     Each force grows with its own slip until the contact slides; the slips act on each other through
     the friction coefficient alone.
     """
-    c, let = coefficients, tape.let
+    let = tape.let
     combined = let(sp.sqrt(let(slip_ratio**2 + tan_slip**2)))
     sliding = let(minimum(tape, combined, sp.Integer(1)))
     fall = let(c["largest_friction"] - c["smallest_friction"])

@@ -55,11 +55,8 @@ def check(p: Mapping[str, Any]) -> None:
     _check_inertia(p)
     if wheels[0][0] <= wheels[1][0]:
         raise GeometryError("the vehicle can't stand: its front wheels are not ahead of the rear")
-    for name, (start, end) in {
-        "front": ("front_spring_chassis_point", "front_spring_arm_point"),
-        "rear": ("rear_spring_chassis_point", "rear_spring_arm_point"),
-    }.items():
-        if np.linalg.norm(p[end] - p[start]) < 1e-6:
+    for name in ("front", "rear"):
+        if np.linalg.norm(p[f"{name}_spring_arm_point"] - p[f"{name}_spring_chassis_point"]) < 1e-6:
             raise GeometryError(f"the geometry can't be assembled: the {name} spring has length 0")
     mass, centre = _mass_and_centre(p)
     share = (centre - wheels[1][0]) / (wheels[0][0] - wheels[1][0])
@@ -83,15 +80,11 @@ def _check_inertia(p: Mapping[str, Any]) -> None:
     xy, xz, yz = p["rear_arm_inertia_products"]
     xx, yy, zz = p["rear_arm_inertia"]
     arm = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    moments = {
-        name: p[name]
-        for name in ("chassis_inertia", "upper_arm_inertia", "lower_arm_inertia", "carrier_inertia")
-    }
-    moments["rear_arm_inertia"] = np.linalg.eigvalsh(arm)
+    for name in ("chassis_inertia", "upper_arm_inertia", "lower_arm_inertia", "carrier_inertia"):
+        check_moments(name, p[name])
+    check_moments("rear_arm_inertia", np.linalg.eigvalsh(arm))
     across = p["tie_rod_transverse_inertia"]
-    moments["tie_rod_axial_inertia"] = np.array([p["tie_rod_axial_inertia"], across, across])
-    for name, values in moments.items():
-        check_moments(name, values)
+    check_moments("tie_rod_axial_inertia", np.array([p["tie_rod_axial_inertia"], across, across]))
 
 
 def wheel_places(p: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,6 @@ from vehiclemor.multibody.components.tires import (
     tire_outputs,
 )
 from vehiclemor.multibody.independent_suspension.definition import DECLARED, Derived, derived
-from vehiclemor.multibody.quantities import MAGIC_FORMULA
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
@@ -134,16 +133,8 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
     deflection = p["tire_stiffness"] * (p["tire_radius"] - contact.height)
     pressed = tape.let(deflection - p["tire_damping"] * contact.rise)
     load = tape.let((pressed + sp.Abs(pressed)) / 2)
-    tire = magic_formula(
-        tape,
-        {name: p[name] for name in MAGIC_FORMULA},
-        load,
-        tape.let(d.reference_load),
-        p["tire_radius"],
-        contact.slip_ratio,
-        contact.slip_angle,
-        contact.cos_slip_angle,
-    )
+    slips = contact.slip_ratio, contact.slip_angle, contact.cos_slip_angle
+    tire = magic_formula(tape, p, load, tape.let(d.reference_load), p["tire_radius"], *slips)
     up = v.attitude.road_normal
     shear = g.named(tape, contact.heading * tire.longitudinal + contact.leftward * tire.lateral)
     moment = g.named(tape, up * -contact.height).cross(shear) + up * tire.aligning
