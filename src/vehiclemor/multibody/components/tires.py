@@ -1,8 +1,5 @@
 """Wheels on the road as symbolic expressions: contact, vertical load, tire forces.
 
-The contact point of a wheel with camber is where its plane, through its centre and across its spin
-axis, meets the road; the loaded radius is also the effective rolling radius.
-
 Fiala: E. Fiala, Seitenkraefte am rollenden Luftreifen, VDI-Zeitschrift 96 (1954), in the form of
 MSC Adams/Tire and of the MapleSim Tire Library: friction falls with the combined slip.
 
@@ -12,7 +9,7 @@ PAC2002.  Signs are those of ISO 8855 with a slip angle that is positive when th
 slides to the left.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
@@ -35,18 +32,29 @@ class TireForces:
     aligning: sp.Expr
 
 
-def tire_outputs(
-    wheels: Iterable[tuple[TireForces, sp.Expr, sp.Expr, sp.Expr]],
-) -> list[sp.Expr]:
-    """Outputs of wheels by forces, load, slip ratio and slip angle of each."""
-    tires, loads, slip_ratios, slip_angles = zip(*wheels, strict=True)
+@dataclass(frozen=True)
+class WheelOnRoad:
+    """What the road does to a wheel, chassis components."""
+
+    tire: TireForces
+    load: sp.Expr  # Vertical force in N, not negative.
+    # kappa and the tangent of the slip angle (sliding to the left is positive).
+    slip_ratio: sp.Expr
+    tan_slip: sp.Expr
+    # Force on the wheel in N and its moment about the wheel centre in N m.
+    force: Vector
+    moment: Vector
+
+
+def tire_outputs(tape: Tape, wheels: Sequence[WheelOnRoad]) -> list[sp.Expr]:
+    """Outputs of the tires: forces, loads, moments, slip ratios and slip angles."""
     return [
-        *(tire.longitudinal for tire in tires),
-        *(tire.lateral for tire in tires),
-        *loads,
-        *(tire.aligning for tire in tires),
-        *slip_ratios,
-        *slip_angles,
+        *(wheel.tire.longitudinal for wheel in wheels),
+        *(wheel.tire.lateral for wheel in wheels),
+        *(wheel.load for wheel in wheels),
+        *(wheel.tire.aligning for wheel in wheels),
+        *(wheel.slip_ratio for wheel in wheels),
+        *(tape.let(sp.atan(wheel.tan_slip)) for wheel in wheels),
     ]
 
 
@@ -152,23 +160,7 @@ def minimum(tape: Tape, a: sp.Expr, b: sp.Expr) -> sp.Expr:
     return tape.let((a + b - sp.Abs(tape.let(a - b))) / 2)
 
 
-@dataclass(frozen=True)
-class Contact:
-    """Wheel on the road, chassis components."""
-
-    # Height of the wheel centre above the road in m and its rate in m/s.
-    height: sp.Expr
-    rise: sp.Expr
-    # Unit vectors along and across the wheel in the road plane.
-    heading: Vector
-    leftward: Vector
-    # kappa, alpha in rad (sliding to the left is positive), cos alpha.
-    slip_ratio: sp.Expr
-    slip_angle: sp.Expr
-    cos_slip_angle: sp.Expr
-
-
-def contact_of(
+def upright_wheel(
     tape: Tape,
     chassis: Attitude,
     height: sp.Expr,  # Height of the chassis origin above the road.
@@ -178,54 +170,38 @@ def contact_of(
     # Velocity of the wheel centre and complete angular velocity of the wheel.
     velocity: Vector,
     rotation: Vector,
-    slip_speed: sp.Expr,  # Speed (m/s) below which slip is regularised.
-) -> Contact:
-    """Contact of a rigid wheel whose effective radius is the height of its centre."""
-    up = chassis.road_normal
-    above = tape.let(height + tape.let(up @ place))
+    p: Mapping[str, sp.Expr],  # Parameters of the vehicle.
+) -> WheelOnRoad:
+    """A wheel whose effective radius is the height of its centre, with the Magic Formula.
+
+    The vertical load has no arm.
+    """
+    let, up = tape.let, chassis.road_normal
+    above = let(height + let(up @ place))
     along = g.named(tape, axle.cross(up))
-    inverse = tape.let(1 / g.length(tape, along))
+    inverse = let(1 / g.length(tape, along))
     heading = g.named(tape, along * inverse)
     leftward = g.named(tape, up.cross(heading))
     arm = g.named(tape, up * -above)
     sliding = g.named(tape, velocity + rotation.cross(arm))
-    forward = tape.let(heading @ velocity)
-    speed = tape.let(sp.sqrt(tape.let(forward**2 + slip_speed**2)))
-    lateral = tape.let(tape.let(leftward @ sliding) / speed)
-    return Contact(
-        above,
-        tape.let(up @ velocity),
-        heading,
-        leftward,
-        tape.let(-tape.let(heading @ sliding) / speed),
-        tape.let(sp.atan(lateral)),
-        tape.let(1 / sp.sqrt(tape.let(1 + lateral**2))),
-    )
+    forward = let(heading @ velocity)
+    speed = let(sp.sqrt(let(forward**2 + p["slip_speed"] ** 2)))
+    lateral = let(let(leftward @ sliding) / speed)
+    rise = let(up @ velocity)
+    ratio, angle = let(-let(heading @ sliding) / speed), let(sp.atan(lateral))
+    slips = ratio, angle, let(1 / sp.sqrt(let(1 + lateral**2)))
+
+    pressed = let(p["tire_stiffness"] * (p["tire_radius"] - above) - p["tire_damping"] * rise)
+    load = let((pressed + sp.Abs(pressed)) / 2)
+    reference_load = let(p["nominal_load"] * p["load_scale"])
+    tire = magic_formula(tape, p, load, reference_load, p["tire_radius"], *slips)
+    shear = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral)
+    moment = arm.cross(shear) + up * tire.aligning
+    force = g.named(tape, shear + up * load)
+    return WheelOnRoad(tire, load, ratio, lateral, force, g.named(tape, moment))
 
 
-@dataclass(frozen=True)
-class TiltedContact:
-    """Wheel on the road, chassis components."""
-
-    arm: Vector  # From the wheel centre to the contact point in m.
-    # Unit vectors along and across the wheel in the road's plane, and its normal.
-    heading: Vector
-    leftward: Vector
-    up: Vector
-    load: sp.Expr  # Vertical force in N, not negative.
-    # kappa and the tangent of the slip angle (sliding to the left is positive).
-    slip_ratio: sp.Expr
-    tan_slip: sp.Expr
-
-    def loads(self, tape: Tape, tire: TireForces) -> tuple[Vector, Vector]:
-        """Force on the wheel and its moment about the wheel centre."""
-        shear = self.heading * tire.longitudinal + self.leftward * tire.lateral
-        force = g.named(tape, shear + self.up * self.load)
-        moment = self.arm.cross(force) + self.up * tire.aligning
-        return force, g.named(tape, moment)
-
-
-def tilted_contact(
+def tilted_wheel(
     tape: Tape,
     up: Vector,  # Road normal.
     height: sp.Expr,  # Height of the wheel centre above the road.
@@ -234,14 +210,17 @@ def tilted_contact(
     velocity: Vector,
     turning: Vector,
     spin: sp.Expr,  # Spin of the wheel on its carrier in rad/s.
-    p: Mapping[str, sp.Expr],  # `tire_radius`, `tire_stiffness`, `tire_damping`, `slip_speed`.
-) -> TiltedContact:
-    """Contact of a wheel with camber."""
+    p: Mapping[str, sp.Expr],  # Parameters of the vehicle.
+) -> WheelOnRoad:
+    """A wheel with camber and Fiala's tire.
+
+    The contact point is where the wheel's plane, through its centre and across its spin axis, meets
+    the road; the loaded radius is also the effective rolling radius.
+    """
     let = tape.let
     across = g.named(tape, axle.cross(up))
     # The length of axle x up is the cosine of the camber angle.
-    cosine = g.length(tape, across)
-    inverse = let(1 / cosine)
+    inverse = let(1 / g.length(tape, across))
     heading = g.named(tape, across * inverse)
     leftward = g.named(tape, up.cross(heading))
     down = g.named(tape, axle.cross(heading))
@@ -253,15 +232,11 @@ def tilted_contact(
 
     load = vertical_load(tape, radius, rise * inverse, p)
     per_speed = let(1 / maximum(tape, let(sp.Abs(forward)), p["slip_speed"]))
-    return TiltedContact(
-        arm,
-        heading,
-        leftward,
-        up,
-        load,
-        let(let(spin * radius - forward) * per_speed),
-        let(lateral * per_speed),
-    )
+    ratio, tan_slip = let(let(spin * radius - forward) * per_speed), let(lateral * per_speed)
+    tire = fiala(tape, p, load, ratio, tan_slip)
+    force = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral + up * load)
+    moment = g.named(tape, arm.cross(force) + up * tire.aligning)
+    return WheelOnRoad(tire, load, ratio, tan_slip, force, moment)
 
 
 def vertical_load(tape: Tape, radius: sp.Expr, rate: sp.Expr, p: Mapping[str, sp.Expr]) -> sp.Expr:

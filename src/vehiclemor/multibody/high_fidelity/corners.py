@@ -13,7 +13,7 @@ import sympy as sp
 
 from vehiclemor.multibody.components import body
 from vehiclemor.multibody.components import linkage as links
-from vehiclemor.multibody.components.tires import TiltedContact, TireForces, fiala, tilted_contact
+from vehiclemor.multibody.components.tires import WheelOnRoad, tilted_wheel
 from vehiclemor.multibody.double_wishbone.definition import POINTS
 from vehiclemor.multibody.high_fidelity.definition import DECLARED, SOLVED
 from vehiclemor.symbolic import geometry as g
@@ -132,9 +132,7 @@ class Corner:
     bodies: tuple[Body, ...]
     # Generalised force of the spring-damper on the arm that carries it in N m.
     spring_moment: sp.Expr
-    # Wheel on the road.
-    contact: TiltedContact
-    tire: TireForces
+    wheel: WheelOnRoad
 
 
 def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) -> Corner:
@@ -176,11 +174,11 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
         linkage.carrier_lever(tape, points["wheel_centre"]),
         g.column(linkage.carrier, 1),
     )
-    carrier, contact, tire = _wheeled_body(tape, v, k, wheeled)
+    carrier, wheel = _wheeled_body(tape, v, k, wheeled)
     lever = linkage.lower.lever(tape, points["front_spring_arm_point"])
     moment = _spring(tape, v, k, linkage.lower.rear, lever, motions.lower)
     bodies = (arm("upper", motions.upper), arm("lower", motions.lower), carrier, rod)
-    return Corner(bodies, moment, contact, tire)
+    return Corner(bodies, moment, wheel)
 
 
 def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner:
@@ -212,14 +210,12 @@ def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner
         lever("rear_wheel_centre"),
         axis,
     )
-    arm, contact, tire = _wheeled_body(tape, v, k, wheeled)
+    arm, wheel = _wheeled_body(tape, v, k, wheeled)
     moment = _spring(tape, v, k, pivot, lever("rear_spring_arm_point"), turn)
-    return Corner((arm,), moment, contact, tire)
+    return Corner((arm,), moment, wheel)
 
 
-def _wheeled_body(
-    tape: Tape, v: Vehicle, k: int, part: _WheelCarrier
-) -> tuple[Body, TiltedContact, TireForces]:
+def _wheeled_body(tape: Tape, v: Vehicle, k: int, part: _WheelCarrier) -> tuple[Body, WheelOnRoad]:
     """A carrier or arm together with its wheel, and the wheel on the road."""
     frame, axle, spin = v.frame, part.axle, SPINS[k]
     levers = (part.to_centre, part.to_wheel)
@@ -230,11 +226,10 @@ def _wheeled_body(
     )
     turning = frame.turning(tape, part.turn)
     height = tape.let(v.q[2] + tape.let(v.attitude.road_normal @ places[1]))
-    contact = tilted_contact(
+    on_road = tilted_wheel(
         tape, v.attitude.road_normal, height, axle, wheel.value, turning.value, v.rates[spin], v.p
     )
-    tire = fiala(tape, v.p, contact.load, contact.slip_ratio, contact.tan_slip)
-    force, moment = contact.loads(tape, tire)
+    force, moment = on_road.force, on_road.moment
     arm = g.named(tape, places[1] - places[0])
     inertia = v.p[f"{ENDS[k]}_wheel_spin_inertia"]
     rotor = Rotor(spin, v.rates[spin], axle, inertia, tape.let(moment @ axle), turning.bias)
@@ -247,7 +242,7 @@ def _wheeled_body(
         g.named(tape, moment + arm.cross(force)),
         rotor,
     )
-    return body, contact, tire
+    return body, on_road
 
 
 def _spring(tape: Tape, v: Vehicle, k: int, pivot: Vector, lever: Vector, turn: Motion) -> sp.Expr:

@@ -187,15 +187,10 @@ def _outputs(tape: Tape, v: Vehicle, parts: Sequence[Corner]) -> list[sp.Expr]:
     """The model's outputs but for the last two, which measure the constraints."""
     # The vertical speed is that in space.
     speeds = [*v.speeds[:2], v.rates[2], *v.speeds[3:]]
-    contacts = [corner.contact for corner in parts]
-    angles = [tape.let(sp.atan(contact.tan_slip)) for contact in contacts]
     carriers = [part.carrier for part in v.linkages]
     return [
         *body.outputs(v.q, speeds),
-        *tire_outputs(
-            (corner.tire, corner.contact.load, corner.contact.slip_ratio, angle)
-            for corner, angle in zip(parts, angles, strict=True)
-        ),
+        *tire_outputs(tape, [corner.wheel for corner in parts]),
         *(tape.let(sp.atan2(-carrier[0][1], carrier[1][1])) for carrier in carriers),
     ]
 

@@ -37,7 +37,6 @@ class Derived:
     preload: tuple[Any, Any]
     loaded_radius: tuple[Any, Any]  # Static height of a wheel centre above the road in m.
     depth: tuple[Any, Any]  # Sprung centre of mass above the wheel centres at zero travel in m.
-    reference_load: Any  # F_z0 of the tire in N.
 
 
 def derived(p: Mapping[str, Any]) -> Derived:
@@ -63,7 +62,6 @@ def derived(p: Mapping[str, Any]) -> Derived:
         (load[0] - corner * p["gravity"], load[1] - corner * p["gravity"]),
         (radius[0], radius[1]),
         (p["sprung_height"] - radius[0], p["sprung_height"] - radius[1]),
-        p["nominal_load"] * p["load_scale"],
     )
 
 

@@ -6,13 +6,7 @@ from typing import NamedTuple
 import sympy as sp
 
 from vehiclemor.multibody.components import body
-from vehiclemor.multibody.components.tires import (
-    Contact,
-    TireForces,
-    contact_of,
-    magic_formula,
-    tire_outputs,
-)
+from vehiclemor.multibody.components.tires import WheelOnRoad, tire_outputs, upright_wheel
 from vehiclemor.multibody.independent_suspension.definition import DECLARED, Derived, derived
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
@@ -36,7 +30,7 @@ def derive() -> Program:
     accelerations = eliminate_symmetric(tape, mass, force, order)
     rates = [*body.rates(tape, attitude, nu), *nu[6:]]
     second_order = body.in_coordinates(tape, attitude, nu, mass, force)
-    of_tires = [(w.tire, w.load, w.contact.slip_ratio, w.contact.slip_angle) for w in wheels]
+    of_tires = tire_outputs(tape, [wheel.on_road for wheel in wheels])
     n = len(q)
     return assemble(
         tape,
@@ -45,7 +39,7 @@ def derive() -> Program:
         {
             "derivative": ([*rates, *accelerations], (2 * n,)),
             "outputs": (
-                [*body.outputs(q, nu), *tire_outputs(of_tires)],
+                [*body.outputs(q, nu), *of_tires],
                 (len(DECLARED["outputs"]),),
             ),
             "second_order": (second_order, (n, n + 1)),
@@ -78,9 +72,7 @@ class _Wheel(NamedTuple):
 
     rigid: mechanics.Body
     spring: sp.Expr
-    contact: Contact
-    load: sp.Expr
-    tire: TireForces
+    on_road: WheelOnRoad
 
 
 def _vehicle(tape: Tape) -> _Vehicle:
@@ -109,7 +101,7 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
 
 
 def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
-    """A wheel of number 0 to 3 with its load, tire and spring; the load has no arm."""
+    """A wheel of number 0 to 3 with its load, tire and spring."""
     p, d, frame, front = v.p, v.derived, v.frame, wheel < 2
     end, side = (0, "front") if front else (1, "rear")
     travel, rate, spin = v.q[6 + wheel], v.nu[6 + wheel], v.nu[10 + wheel]
@@ -127,20 +119,9 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
     centre = frame.point(tape, place, upwards)
     about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
     rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
-    contact = contact_of(
-        tape, v.attitude, v.q[2], place, axle, centre.value, rotation.value, p["slip_speed"]
-    )
-    deflection = p["tire_stiffness"] * (p["tire_radius"] - contact.height)
-    pressed = tape.let(deflection - p["tire_damping"] * contact.rise)
-    load = tape.let((pressed + sp.Abs(pressed)) / 2)
-    slips = contact.slip_ratio, contact.slip_angle, contact.cos_slip_angle
-    tire = magic_formula(tape, p, load, tape.let(d.reference_load), p["tire_radius"], *slips)
-    up = v.attitude.road_normal
-    shear = g.named(tape, contact.heading * tire.longitudinal + contact.leftward * tire.lateral)
-    moment = g.named(tape, up * -contact.height).cross(shear) + up * tire.aligning
-    force, moment = g.named(tape, shear + up * load), g.named(tape, moment)
+    on_road = upright_wheel(tape, v.attitude, v.q[2], place, axle, centre.value, rotation.value, p)
     mass = p["unsprung_mass"]
-    whole = g.named(tape, force + v.weight * mass)
+    whole = g.named(tape, on_road.force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate
-    rigid = mechanics.Body(mass, centre, whole, rotation, about, moment)
-    return _Wheel(rigid, tape.let(spring), contact, load, tire)
+    rigid = mechanics.Body(mass, centre, whole, rotation, about, on_road.moment)
+    return _Wheel(rigid, tape.let(spring), on_road)
