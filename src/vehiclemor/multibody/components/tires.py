@@ -17,6 +17,7 @@ import sympy as sp
 from vehiclemor.multibody.components.body import Attitude
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
+from vehiclemor.symbolic.mechanics import Body, kane
 from vehiclemor.symbolic.tape import Tape
 
 # Keeps 0/0 from a wheel without load and slip; nothing else notices it.
@@ -46,8 +47,29 @@ class WheelOnRoad:
     moment: Vector
 
 
-def tire_outputs(tape: Tape, wheels: Sequence[WheelOnRoad]) -> list[sp.Expr]:
+@dataclass(frozen=True)
+class Corner:
+    """Bodies of a corner with what acts on them."""
+
+    bodies: tuple[Body, ...]
+    spring: sp.Expr  # Generalised force of the spring-damper on the coordinate that it acts on.
+    wheel: WheelOnRoad
+
+
+def kane_with_corners(
+    tape: Tape, chassis: Body, corners: Sequence[Corner], springs: Sequence[int], speeds: int
+) -> tuple[list[list[sp.Expr]], list[sp.Expr]]:
+    """Mass matrix and forces of all bodies; springs act on the coordinates of these numbers."""
+    bodies = [chassis, *(part for corner in corners for part in corner.bodies)]
+    mass, force = kane(tape, speeds, bodies)
+    for number, corner in zip(springs, corners, strict=True):
+        force[number] = tape.let(force[number] + corner.spring)
+    return mass, force
+
+
+def tire_outputs(tape: Tape, corners: Sequence[Corner]) -> list[sp.Expr]:
     """Outputs of the tires: forces, loads, moments, slip ratios and slip angles."""
+    wheels = [corner.wheel for corner in corners]
     return [
         *(wheel.tire.longitudinal for wheel in wheels),
         *(wheel.tire.lateral for wheel in wheels),

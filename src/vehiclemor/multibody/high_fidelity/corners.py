@@ -13,7 +13,7 @@ import sympy as sp
 
 from vehiclemor.multibody.components import body
 from vehiclemor.multibody.components import linkage as links
-from vehiclemor.multibody.components.tires import WheelOnRoad, tilted_wheel
+from vehiclemor.multibody.components.tires import Corner, WheelOnRoad, tilted_wheel
 from vehiclemor.multibody.double_wishbone.definition import POINTS
 from vehiclemor.multibody.high_fidelity.definition import DECLARED, SOLVED
 from vehiclemor.symbolic import geometry as g
@@ -123,16 +123,6 @@ class _WheelCarrier(NamedTuple):
     to_centre: Vector
     to_wheel: Vector
     axle: Vector  # Spin axis of the wheel.
-
-
-@dataclass(frozen=True)
-class Corner:
-    """Bodies of a corner with what acts on them."""
-
-    bodies: tuple[Body, ...]
-    # Generalised force of the spring-damper on the arm that carries it in N m.
-    spring_moment: sp.Expr
-    wheel: WheelOnRoad
 
 
 def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) -> Corner:

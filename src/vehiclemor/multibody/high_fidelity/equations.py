@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 
 from vehiclemor.multibody.components import body, linkage
-from vehiclemor.multibody.components.tires import tire_outputs
+from vehiclemor.multibody.components.tires import Corner, kane_with_corners, tire_outputs
 from vehiclemor.multibody.high_fidelity import corners
-from vehiclemor.multibody.high_fidelity.corners import ARMS, CORNER, SPINS, Corner, Vehicle
+from vehiclemor.multibody.high_fidelity.corners import ARMS, CORNER, SPINS, Vehicle
 from vehiclemor.multibody.high_fidelity.definition import DECLARED
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
@@ -140,11 +140,7 @@ def _kane(
         v.frame.rotation(tape, inertia),
         inertia,
     )
-    bodies = [chassis, *(part for corner in parts for part in corner.bodies)]
-    mass, force = mechanics.kane(tape, len(v.q), bodies)
-    for number, corner in zip(ARMS, parts, strict=True):
-        force[number] = tape.let(force[number] + corner.spring_moment)
-    return mass, force
+    return kane_with_corners(tape, chassis, parts, ARMS, len(v.q))
 
 
 def _solved(tape: Tape, v: Vehicle, parts: Sequence[Corner]) -> dict[int, sp.Expr]:
@@ -190,7 +186,7 @@ def _outputs(tape: Tape, v: Vehicle, parts: Sequence[Corner]) -> list[sp.Expr]:
     carriers = [part.carrier for part in v.linkages]
     return [
         *body.outputs(v.q, speeds),
-        *tire_outputs(tape, [corner.wheel for corner in parts]),
+        *tire_outputs(tape, parts),
         *(tape.let(sp.atan2(-carrier[0][1], carrier[1][1])) for carrier in carriers),
     ]
 

@@ -1,12 +1,16 @@
 """Equations of the 14-DOF vehicle: Kane's equations of its five bodies and four spinning wheels."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import sympy as sp
 
 from vehiclemor.multibody.components import body
-from vehiclemor.multibody.components.tires import WheelOnRoad, tire_outputs, upright_wheel
+from vehiclemor.multibody.components.tires import (
+    Corner,
+    kane_with_corners,
+    tire_outputs,
+    upright_wheel,
+)
 from vehiclemor.multibody.independent_suspension.definition import DECLARED, Derived, derived
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
@@ -22,15 +26,12 @@ def derive() -> Program:
     q, nu, attitude = vehicle.q, vehicle.nu, vehicle.attitude
     sprung = _sprung_body(tape, vehicle)
     wheels = [_wheel(tape, vehicle, number) for number in range(4)]
-    mass, force = mechanics.kane(tape, len(nu), [sprung, *(wheel.rigid for wheel in wheels)])
-    for number, wheel in enumerate(wheels):
-        force[6 + number] = tape.let(force[6 + number] - wheel.spring)
+    mass, force = kane_with_corners(tape, sprung, wheels, range(6, 10), len(nu))
     # Spins and travels couple to the chassis alone: what is left of it is 6 x 6.
     order = [*range(10, 14), *range(6, 10), *range(6)]
     accelerations = eliminate_symmetric(tape, mass, force, order)
     rates = [*body.rates(tape, attitude, nu), *nu[6:]]
     second_order = body.in_coordinates(tape, attitude, nu, mass, force)
-    of_tires = tire_outputs(tape, [wheel.on_road for wheel in wheels])
     n = len(q)
     return assemble(
         tape,
@@ -39,7 +40,7 @@ def derive() -> Program:
         {
             "derivative": ([*rates, *accelerations], (2 * n,)),
             "outputs": (
-                [*body.outputs(q, nu), *of_tires],
+                [*body.outputs(q, nu), *tire_outputs(tape, wheels)],
                 (len(DECLARED["outputs"]),),
             ),
             "second_order": (second_order, (n, n + 1)),
@@ -67,14 +68,6 @@ class _Vehicle:
         return self.attitude.road_normal * -self.p["gravity"]
 
 
-class _Wheel(NamedTuple):
-    """A wheel with what acts on it, and the force of its spring."""
-
-    rigid: mechanics.Body
-    spring: sp.Expr
-    on_road: WheelOnRoad
-
-
 def _vehicle(tape: Tape) -> _Vehicle:
     """The sprung body on the road."""
     q, nu, (delta,) = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds", "inputs"))
@@ -100,7 +93,7 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
     return mechanics.Body(mass, origin, v.weight * mass, rotation, inertia)
 
 
-def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
+def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> Corner:
     """A wheel of number 0 to 3 with its load, tire and spring."""
     p, d, frame, front = v.p, v.derived, v.frame, wheel < 2
     end, side = (0, "front") if front else (1, "rear")
@@ -124,4 +117,4 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
     whole = g.named(tape, on_road.force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate
     rigid = mechanics.Body(mass, centre, whole, rotation, about, on_road.moment)
-    return _Wheel(rigid, tape.let(spring), on_road)
+    return Corner((rigid,), -tape.let(spring), on_road)
