@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.exceptions import InputError, blamed, one_line
-from vehiclemor.inputs.columns import chosen_columns, csv_columns, listed
+from vehiclemor.inputs.columns import csv_samples, listed
 from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
 from vehiclemor.inputs.polynomial_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
 from vehiclemor.registry import choice
@@ -223,8 +223,8 @@ class Signal(Maneuver):
         **further
             As of `from_samples`.
         """
-        columns = csv_columns(file_path("path", path), separator)
-        times, values, names = chosen_columns(path, columns, time, inputs)
+        path = file_path("path", path)
+        times, values, names = csv_samples(path, separator, time, inputs)
         return cls.from_samples(times, values, hold, inputs=names, **further)
 
 
