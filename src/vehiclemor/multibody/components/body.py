@@ -4,12 +4,13 @@ Chassis frame: origin at the centre of mass of the sprung body, x forward, y lef
 The speeds are components in this frame.  The road is the plane z = 0.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
 
 from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
 from vehiclemor.symbolic.tape import Tape
@@ -18,6 +19,16 @@ from vehiclemor.symbolic.tape import Tape
 def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
     """A symbol for each quantity, real."""
     return [sp.Symbol(quantity.name, real=True) for quantity in quantities]
+
+
+def parameters(
+    declared: Mapping[str, Declared], further: Iterable[str] = ()
+) -> dict[str, sp.Symbol]:
+    """A symbol for each parameter, three for a point, and for each further name."""
+    flat: list[str] = []
+    for name, parameter in declared.items():
+        flat += [name] if parameter.size == 1 else [f"{name}_{axis}" for axis in "xyz"]
+    return {name: sp.Symbol(f"p_{name}", real=True) for name in (*flat, *further)}
 
 
 def outputs(q: Sequence[sp.Symbol], nu: Sequence[sp.Symbol]) -> list[sp.Expr]:

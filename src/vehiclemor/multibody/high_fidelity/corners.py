@@ -71,10 +71,7 @@ class Vehicle:
 def vehicle(tape: Tape) -> tuple[Vehicle, list[sp.Symbol]]:
     """The vehicle, and the symbols of its parameters in order."""
     q, rates, rack = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds", "inputs"))
-    flat = []
-    for name, declared in DECLARED["parameters"].items():
-        flat += [name] if declared.size == 1 else [f"{name}_{axis}" for axis in "xyz"]
-    p = {name: sp.Symbol(f"p_{name}", real=True) for name in (*flat, *SOLVED)}
+    p = body.parameters(DECLARED["parameters"], SOLVED)
     attitude = body.attitude(tape, q)
     speeds = body.speeds(tape, attitude, rates)
     frame = m.MovingFrame(

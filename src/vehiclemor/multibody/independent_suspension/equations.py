@@ -71,7 +71,7 @@ class _Vehicle:
 def _vehicle(tape: Tape) -> _Vehicle:
     """The sprung body on the road."""
     q, nu, (delta,) = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds", "inputs"))
-    p = {name: sp.Symbol(f"p_{name}", real=True) for name in DECLARED["parameters"]}
+    p = body.parameters(DECLARED["parameters"])
     attitude, d = body.attitude(tape, q), derived(p)
     pairs = {
         k: tuple(map(tape.let, getattr(d, k))) for k in ("sprung_distance", "depth", "preload")
