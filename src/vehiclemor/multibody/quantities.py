@@ -51,7 +51,7 @@ def declared(model: str) -> dict[str, Any]:
 
 
 def equations_of(package: str) -> Callable[[], Any]:
-    """Derives by the module `equations` of a model's package, imported at the call: SymPy's too."""
+    """What derives by the module `equations` of a package; SymPy is imported when it is called."""
     return lambda: import_module(f"vehiclemor.multibody.{package}.equations").derive()
 
 

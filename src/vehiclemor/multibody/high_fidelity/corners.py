@@ -15,7 +15,7 @@ from vehiclemor.multibody.components import body
 from vehiclemor.multibody.components import linkage as links
 from vehiclemor.multibody.components.tires import Corner, WheelOnRoad, tilted_wheel
 from vehiclemor.multibody.double_wishbone.definition import POINTS
-from vehiclemor.multibody.high_fidelity.definition import DECLARED, SOLVED
+from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SOLVED, SPINS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
 from vehiclemor.symbolic.geometry import Vector
@@ -26,11 +26,6 @@ Parameters = Mapping[str, sp.Expr]
 # Of the corners in order: FL, FR, RL, RR; 1 on the left, -1 on the right.
 ENDS = ("front", "front", "rear", "rear")
 SIDES = (1, -1, 1, -1)
-# Places of the front corners' coordinates, of the arms that carry the springs (lower arms in front,
-# trailing arms behind), and of the wheels' spins.
-CORNER = (range(6, 13), range(13, 20))
-ARMS = (10, 17, 20, 21)
-SPINS = (22, 23, 24, 25)
 FRONT_POINTS = (
     *POINTS,
     *("front_spring_chassis_point", "front_spring_arm_point"),

@@ -26,10 +26,13 @@ from vehiclemor.multibody.quantities import (
     equations_of,
 )
 
-# Places of z, theta, the left lower arm and the left rear arm among the coordinates.
-HEIGHT, PITCH, LOWER_ARM, REAR_ARM = 2, 4, 10, 20
 COORDINATES = 26
-SPINS = slice(48, 52)
+# Places of z and theta among the coordinates, of those of the front corners, of the arms that carry
+# the springs (lower arms in front, trailing arms behind), and of the wheels' spins.
+HEIGHT, PITCH = 2, 4
+CORNER = (range(6, 13), range(13, 20))
+ARMS = (10, 17, 20, 21)
+SPINS = (22, 23, 24, 25)
 # Accelerations (m/s^2, rad/s^2) below which nothing moves; rounding alone gives a tenth of it.
 AT_REST = 1e-9
 MOST_ITERATIONS = 30
@@ -118,8 +121,8 @@ def design_state(p: Mapping[str, Any], height: float, pitch: float) -> np.ndarra
     x[HEIGHT], x[PITCH] = height, pitch
     inner, outer = p["tie_rod_inner"], p["tie_rod_outer"]
     mirror = np.array([1.0, -1.0, 1.0])
-    x[11:13] = tie_rod_angles(inner, outer)
-    x[18:20] = tie_rod_angles(mirror * inner, mirror * outer, side=-1)
+    x[CORNER[0][5:]] = tie_rod_angles(inner, outer)
+    x[CORNER[1][5:]] = tie_rod_angles(mirror * inner, mirror * outer, side=-1)
     return x
 
 
@@ -142,7 +145,7 @@ def solve_equilibrium(p: Mapping[str, Any], derivative: Derivative) -> dict[str,
     def accelerations(values: np.ndarray) -> np.ndarray:
         x = design_state(p, values[0], values[1])
         change = derivative(list(values[2:]), x, nothing)[COORDINATES:]
-        return change[[HEIGHT, PITCH, LOWER_ARM, REAR_ARM]]
+        return change[[HEIGHT, PITCH, ARMS[0], ARMS[2]]]
 
     residual, moved = accelerations(unknown), np.inf
     for _ in range(MOST_ITERATIONS):
@@ -175,7 +178,7 @@ def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
     equilibrium[COORDINATES] = p["initial_speed"]
     up = np.array([-np.sin(p["pitch"]), 0.0, np.cos(p["pitch"])])
     radii = [p["height"] + float(up @ wheel) for wheel in wheel_places(p)]
-    equilibrium[SPINS] = p["initial_speed"] / np.repeat(radii, 2)
+    equilibrium[COORDINATES + np.array(SPINS)] = p["initial_speed"] / np.repeat(radii, 2)
     dropped = equilibrium.copy()
     dropped[HEIGHT] += p["drop_height"]
     dropped[PITCH] += p["drop_pitch"]

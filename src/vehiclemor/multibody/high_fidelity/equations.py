@@ -12,8 +12,8 @@ import sympy as sp
 from vehiclemor.multibody.components import body, linkage
 from vehiclemor.multibody.components.tires import Corner, kane_with_corners, tire_outputs
 from vehiclemor.multibody.high_fidelity import corners
-from vehiclemor.multibody.high_fidelity.corners import ARMS, CORNER, SPINS, Vehicle
-from vehiclemor.multibody.high_fidelity.definition import DECLARED
+from vehiclemor.multibody.high_fidelity.corners import Vehicle
+from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SPINS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate, eliminate_symmetric
