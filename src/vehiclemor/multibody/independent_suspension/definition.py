@@ -29,12 +29,9 @@ from vehiclemor.multibody.quantities import (
 class Derived:
     """What follows from the parameters, numbers or symbols; front first where there are two."""
 
-    total_mass: Any  # In kg.
     sprung_distance: tuple[Any, Any]  # Sprung centre of mass to the front and rear axle in m.
     yaw_inertia: Any  # Of the sprung body in kg m^2.
-    # Static vertical load of a tire, static force of a spring, in N.
-    load: tuple[Any, Any]
-    preload: tuple[Any, Any]
+    preload: tuple[Any, Any]  # Static force of a spring in N.
     loaded_radius: tuple[Any, Any]  # Static height of a wheel centre above the road in m.
     depth: tuple[Any, Any]  # Sprung centre of mass above the wheel centres at zero travel in m.
 
@@ -52,13 +49,11 @@ def derived(p: Mapping[str, Any]) -> Derived:
     )
     radius = tuple(p["tire_radius"] - part / p["tire_stiffness"] for part in load)
     return Derived(
-        total,
         (sprung_a, a + b - sprung_a),
         p["whole_car_yaw_inertia"]
         - corners
         - 4 * p["diametral_inertia"]
         - mass * (a - sprung_a) ** 2,
-        load,
         (load[0] - corner * p["gravity"], load[1] - corner * p["gravity"]),
         (radius[0], radius[1]),
         (p["sprung_height"] - radius[0], p["sprung_height"] - radius[1]),
