@@ -46,7 +46,7 @@ def derive() -> Program:
 
     bound = _bound_rates(tape, motions, gamma, free)
     closed = _corners(tape, vehicle, bound)
-    solved = _solved(tape, vehicle, closed)
+    solved = eliminate_symmetric(tape, *_kane(tape, vehicle, closed), ORDER)
     accelerations = [
         *_chassis_accelerations(tape, vehicle, solved),
         *_joint_accelerations(tape, bound, solved)[6:],
@@ -143,21 +143,8 @@ def _kane(
     return kane_with_corners(tape, chassis, parts, ARMS, len(v.q))
 
 
-def _solved(tape: Tape, v: Vehicle, parts: Sequence[Corner]) -> dict[int, sp.Expr]:
-    """Derivatives of the independent speeds by number; of the chassis', see `Vehicle.speeds`."""
-    mass, force = _kane(tape, v, parts)
-    chosen = sorted(ORDER)
-    values = eliminate_symmetric(
-        tape,
-        [[mass[j][k] for k in chosen] for j in chosen],
-        [force[j] for j in chosen],
-        [chosen.index(k) for k in ORDER],
-    )
-    return dict(zip(chosen, values, strict=True))
-
-
 def _chassis_accelerations(tape: Tape, v: Vehicle, solved: Mapping[int, sp.Expr]) -> list[sp.Expr]:
-    """Second derivatives of position, yaw, pitch and roll."""
+    """Second derivatives of position, yaw, pitch and roll from the derivatives of the speeds."""
     attitude = v.attitude
     position = g.rotate(tape, attitude.rotation, g.vector([solved[k] for k in range(3)]))
     bias = body.angle_bias(tape, attitude, v.frame.angular_velocity)

@@ -29,7 +29,7 @@ def derive() -> Program:
     mass, force = kane_with_corners(tape, sprung, wheels, range(6, 10), len(nu))
     # Spins and travels couple to the chassis alone: what is left of it is 6 x 6.
     order = [*range(10, 14), *range(6, 10), *range(6)]
-    accelerations = eliminate_symmetric(tape, mass, force, order)
+    solved = eliminate_symmetric(tape, mass, force, order)
     rates = [*body.rates(tape, attitude, nu), *nu[6:]]
     second_order = body.in_coordinates(tape, attitude, nu, mass, force)
     n = len(q)
@@ -38,7 +38,7 @@ def derive() -> Program:
         {"x": [*q, *nu], "u": [vehicle.delta]},
         list(vehicle.p.values()),
         {
-            "derivative": ([*rates, *accelerations], (2 * n,)),
+            "derivative": ([*rates, *(solved[k] for k in range(n))], (2 * n,)),
             "outputs": (
                 [*body.outputs(q, nu), *tire_outputs(tape, wheels)],
                 (len(DECLARED["outputs"]),),
