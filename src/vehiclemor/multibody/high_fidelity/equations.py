@@ -47,9 +47,10 @@ def derive() -> Program:
     bound = _bound_rates(tape, motions, gamma, free)
     closed = _corners(tape, vehicle, bound)
     solved = eliminate_symmetric(tape, *_kane(tape, vehicle, closed), ORDER)
-    accelerations = [
-        *_chassis_accelerations(tape, vehicle, solved),
-        *_joint_accelerations(tape, bound, solved)[6:],
+    accelerations = _chassis_accelerations(tape, vehicle, solved)
+    accelerations += [
+        tape.let(rate.bias + sp.Add(*[factor * solved[j] for j, factor in rate.columns.items()]))
+        for rate in bound[6:]
     ]
 
     mass, force = _kane(tape, vehicle, _corners(tape, vehicle, free))
@@ -150,20 +151,6 @@ def _chassis_accelerations(tape: Tape, v: Vehicle, solved: Mapping[int, sp.Expr]
     bias = body.angle_bias(tape, attitude, v.frame.angular_velocity)
     change = g.named(tape, g.vector([solved[k] for k in range(3, 6)]) - bias)
     return [*position, *body.angle_rates(tape, attitude, change)]
-
-
-def _joint_accelerations(
-    tape: Tape, rates: Sequence[Rate], solved: Mapping[int, sp.Expr]
-) -> list[sp.Expr]:
-    """Derivatives of rates, from those that are solved for."""
-    return [
-        solved[k]
-        if k in solved
-        else tape.let(
-            rate.bias + sp.Add(*[factor * solved[j] for j, factor in rate.columns.items()])
-        )
-        for k, rate in enumerate(rates)
-    ]
 
 
 def _outputs(tape: Tape, v: Vehicle, parts: Sequence[Corner]) -> list[sp.Expr]:
