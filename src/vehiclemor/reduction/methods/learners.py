@@ -43,26 +43,26 @@ SEED = 0
 
 
 def learner(
+    described: tuple[str, str, str],
     learned: Callable[[Learning, Any], LearnedModel],
     settings: type[LearnedSettings],
     library: str,
     *,
     mapped: bool = True,
     kinds: tuple[str, ...] = MOVING,
-    **described: str,
 ) -> Method:
-    """The method of a learner: of changes in one step where `mapped`, else of rates."""
+    """The method of a learner: of changes in one step where `mapped`, else of rates.
+
+    It is described by name, summary and reference.
+    """
 
     def fit(model: Any, training: Training, chosen: Any) -> LearnedModel:
         steps = mapped and model.kind != "ae"
         return learned(Learning.of(model, training, chosen, steps, library), chosen)
 
-    return Method(
-        settings=dict.fromkeys(kinds, settings),
-        fit=fit,
-        packages=(PACKAGES[library],),
-        **described,
-    )
+    name, summary, reference = described
+    declared = dict.fromkeys(kinds, settings)
+    return Method(name, summary, declared, fit, reference, packages=(PACKAGES[library],))
 
 
 class OperatorInferenceSettings(LearnedSettings):
@@ -209,46 +209,56 @@ def with_network(learning: Learning, settings: NeuralNetworkSettings) -> Learned
 
 
 OPERATOR_INFERENCE = learner(
+    (
+        "operator_inference",
+        "linear or quadratic rates of principal components, fitted by opinf",
+        "10.1016/j.cma.2016.03.025",
+    ),
     operators,
     OperatorInferenceSettings,
     "opinf",
     mapped=False,
-    name="operator_inference",
-    summary="linear or quadratic rates of principal components, fitted by opinf",
-    reference="10.1016/j.cma.2016.03.025",
 )
 SPARSE_IDENTIFICATION = learner(
+    (
+        "sparse_identification",
+        "sparse polynomial rates of principal components (SINDYc), fitted by PySINDy",
+        "10.1016/j.ifacol.2016.10.249",
+    ),
     sparse_terms,
     SparseIdentificationSettings,
     "pysindy",
     mapped=False,
-    name="sparse_identification",
-    summary="sparse polynomial rates of principal components (SINDYc), fitted by PySINDy",
-    reference="10.1016/j.ifacol.2016.10.249",
 )
 DYNAMIC_MODE_DECOMPOSITION = learner(
+    (
+        "dynamic_mode_decomposition",
+        "one linear step of components and their monomials (DMDc, EDMDc), by scikit-learn",
+        "10.1016/j.automatica.2018.03.046",
+    ),
     linear_step,
     DynamicModeSettings,
     "sklearn",
-    name="dynamic_mode_decomposition",
-    summary="one linear step of components and their monomials (DMDc, EDMDc), by scikit-learn",
-    reference="10.1016/j.automatica.2018.03.046",
 )
 GAUSSIAN_PROCESS = learner(
+    (
+        "gaussian_process",
+        "one linear step and Gaussian kernels on what it leaves, by scikit-learn",
+        "10.7551/mitpress/3206.001.0001",
+    ),
     with_kernels,
     GaussianProcessSettings,
     "sklearn",
     kinds=("ae", *MOVING),
-    name="gaussian_process",
-    summary="one linear step and Gaussian kernels on what it leaves, by scikit-learn",
-    reference="10.7551/mitpress/3206.001.0001",
 )
 NEURAL_NETWORK = learner(
+    (
+        "neural_network",
+        "one linear step and a multilayer perceptron on what it leaves, by scikit-learn",
+        "10.1109/72.80202",
+    ),
     with_network,
     NeuralNetworkSettings,
     "sklearn",
     kinds=("ae", *MOVING),
-    name="neural_network",
-    summary="one linear step and a multilayer perceptron on what it leaves, by scikit-learn",
-    reference="10.1109/72.80202",
 )

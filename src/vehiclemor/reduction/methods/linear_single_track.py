@@ -26,6 +26,7 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import PLANAR, FeatureListing
+from vehiclemor.reduction.vehicle.linear_modes import slow_modes
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import (
     CORNERING,
@@ -37,7 +38,6 @@ from vehiclemor.reduction.vehicle.shape import (
     linearisation_cost,
     no_steered_vehicle,
 )
-from vehiclemor.reduction.vehicle.slow_modes import slow_modes
 from vehiclemor.simulation.dynamic import DynamicModel
 
 # Lateral speed (m/s) of a typical maneuver.

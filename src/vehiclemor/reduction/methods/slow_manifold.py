@@ -25,6 +25,7 @@ from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
+from vehiclemor.reduction.vehicle.linear_modes import SlowModes, slow_modes
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import (
@@ -41,7 +42,6 @@ from vehiclemor.reduction.vehicle.slow_features import (
     odd_candidates,
     slow_features,
 )
-from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
 from vehiclemor.reduction.vehicle.training_runs import (
     after_transient,
     training_reach,

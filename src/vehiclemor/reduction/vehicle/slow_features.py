@@ -27,9 +27,9 @@ from vehiclemor.reduction.vehicle.features import (
     monomials,
     product,
 )
+from vehiclemor.reduction.vehicle.linear_modes import SlowModes
 from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
-from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 from vehiclemor.simulation.dynamic import DynamicModel
 
 AXLES = (WHEELS[:2], WHEELS[2:])

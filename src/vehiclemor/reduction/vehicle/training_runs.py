@@ -12,21 +12,22 @@ import numpy as np
 
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.trust import largest_inputs
-from vehiclemor.reduction.vehicle.decoding import ROUNDING, Transient
-from vehiclemor.reduction.vehicle.decoding_loops import MOVING
-from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, ReducedVehicle
-from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.reduction.vehicle.slow_modes import SlowModes
-from vehiclemor.reduction.vehicle.training_reach import (
+from vehiclemor.reduction.vehicle.decoding import (
     BESIDE,
     KNOWN,
     LONGER,
     NOTHING_KNOWN,
+    ROUNDING,
     SHORTEST,
+    UNLIKE,
     TrainingReach,
+    Transient,
     durations,
-    known_starts,
 )
+from vehiclemor.reduction.vehicle.decoding_loops import MOVING
+from vehiclemor.reduction.vehicle.linear_modes import SlowModes
+from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, ReducedVehicle
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -113,6 +114,9 @@ def training_reach(
         left.append(np.abs(reduced.remainder(later.states, later.inputs)).max(axis=0))
         starts.append(reduced.remainder(run.states[:1], run.inputs[:1], excited)[0])
     leaves, steered = np.max(left, axis=0), np.max(decaying, axis=0)
+    # Directions in which starts leave more than runs do.
+    _, factors, directions = np.linalg.svd(starts / leaves, full_matrices=False)
+    directions = directions[factors > UNLIKE]
     lasted, longest = np.max(lasted, axis=0), max(run.times[-1] for run in runs)
     # A little may last as long as any run does, and no longer.
     lasted[:lateral, 0], lasted[lateral:, 0] = longest, longest**2
@@ -124,6 +128,7 @@ def training_reach(
         min(faded, default=0.0) / LONGER,
         np.maximum(amplitudes, ROUNDING * amplitudes.max(initial=0.0)),
         leaves,
-        **known_starts(np.array(starts), leaves),
-        inputs=KNOWN[:, : len(shape.model.inputs)] * largest_inputs(maneuvers),
+        directions,
+        np.abs(starts / leaves @ directions.T).max(axis=0),
+        KNOWN[:, : len(shape.model.inputs)] * largest_inputs(maneuvers),
     )

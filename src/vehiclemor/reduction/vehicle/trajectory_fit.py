@@ -14,12 +14,11 @@ from functools import cached_property
 
 import numpy as np
 
-from vehiclemor.codegen.loops import loops
 from vehiclemor.reduction.training import Training, TrainingRun
+from vehiclemor.reduction.vehicle.decoding import decoding_loops
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.regression import unit_diagonal
-from vehiclemor.reduction.vehicle.sensitivity_loops import AlongRun
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Errors that count the same: heading in rad, place in m, part of a slow coordinate's range.
@@ -30,7 +29,6 @@ STRIDE, COMPARED = 2, 4
 # Where the slow coordinates have come to rest, to this part of their range, steps are longer.
 REST, LONG_STRIDE = 3e-4, 25
 DIFFERENCE = 1e-6
-LOOPS = ("simulation.integrators.dense_solves", "reduction.vehicle.sensitivity_loops")
 # Least sum of squares that a weight is made of.
 NOTHING = 1e-12
 DAMPING = 1e-4
@@ -186,19 +184,23 @@ def _sensitivities(
     )
     rates = (columns @ c).reshape(k + 1, samples, -1)
     values, others = rates[0], rates[1:]
-    slopes = np.ascontiguousarray(((others - values) / widths[:, None, None]).transpose(1, 2, 0))
-    cosine, sine = np.cos(path[:, k]), np.sin(path[:, k])
-    forward, sideward = values[:, k + 1], values[:, k + 2]
-    by_heading = -forward * sine - sideward * cosine, forward * cosine - sideward * sine
-    motion = np.column_stack([cosine, sine, *by_heading])
-    terms = np.concatenate([some for some, _ in free])
-    driven = np.repeat([column for _, column in free], [len(some) for some, _ in free])
-    dim, m = k + PLANAR, len(terms)
-    result = np.empty((len(target.compared), dim, m))
-    scratch = np.empty((2 * dim + PLANAR) * m + 3 * k * k)
-    run = AlongRun(times, columns[:samples], slopes, motion)
-    pivots = np.empty(k, dtype=np.int64)
-    loop = loops(LOOPS, ("sensitivities",))["sensitivities"]
-    if not loop(run, terms, driven, COMPARED, weights, result, scratch, pivots):
-        raise np.linalg.LinAlgError("a step of the variational equations is singular")
-    return result
+    slopes = ((others - values) / widths[:, None, None]).transpose(1, 2, 0)
+    # (z', psi', U, V) turned into rates of the state.
+    dim, cosine, sine = k + PLANAR, np.cos(path[:, k]), np.sin(path[:, k])
+    turns = np.tile(np.eye(dim), (samples, 1, 1))
+    turns[:, -2:, -2:] = np.moveaxis(np.array([[cosine, -sine], [sine, cosine]]), -1, 0)
+    jacobian = np.zeros((samples, dim, dim))
+    jacobian[:, :, :k] = turns @ slopes
+    # Turning by a right angle is the derivative by the heading.
+    jacobian[:, -2:, k] = np.einsum("nij,nj->ni", turns[:, -2:, -2:], values[:, [-1, -2]] * [-1, 1])
+    half = 0.5 * np.diff(times)[:, None, None]
+    inverse = np.linalg.inv(np.eye(dim) - half * jacobian[1:])
+    advance = inverse @ (np.eye(dim) + half * jacobian[:-1])
+    now, before = half * inverse @ turns[1:], half * inverse @ turns[:-1]
+    targets = np.repeat([column for _, column in free], [len(some) for some, _ in free])
+    driven = columns[:samples, None, np.concatenate([some for some, _ in free])]
+    forcing = np.take(now, targets, axis=2) * driven[1:]
+    forcing += np.take(before, targets, axis=2) * driven[:-1]
+    result = np.zeros((samples, dim, len(targets)))
+    decoding_loops()["recurrence"](advance, forcing, result)
+    return weights[:, :, None] * result[(samples - 1) % COMPARED :: COMPARED]

@@ -14,7 +14,7 @@ from vehiclemor.inputs.steering import (
     rack_straight_ahead,
     straight_ahead,
 )
-from vehiclemor.reduction.methods.modal_truncation import lateral_modes, truncated
+from vehiclemor.reduction.methods.linear import lateral_modes, truncated
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 VEHICLES = {

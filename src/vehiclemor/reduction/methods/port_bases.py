@@ -1,13 +1,17 @@
-"""Krylov vectors of structures: moments of the ports' response at one frequency are matched.
+"""Bases of structures without training: Krylov vectors, and those of Craig and Bampton.
 
-R. R. Craig, A. L. Hale, Block-Krylov component synthesis method for structural model reduction,
-J. Guid. Control Dyn. 11 (1988), 562-570.  With X = (K + s^2 M)^-1 and a real s in rad/s the basis
-spans X F, X M X F, (X M)^2 X F, ..., where F holds the ports and the linear dampers.  As what
-springs, dampers and tires do is within F, the basis is the same whatever they do.  The damping d K
-is left out.  X exists for any mesh, also where motions have no mass.
+Krylov vectors match moments of the ports' response at one frequency: R. R. Craig, A. L. Hale,
+Block-Krylov component synthesis method for structural model reduction, J. Guid. Control Dyn. 11
+(1988), 562-570.  With X = (K + s^2 M)^-1 and a real s in rad/s the basis spans X F, X M X F,
+(X M)^2 X F, ..., where F holds the ports and the linear dampers.  As what springs, dampers and
+tires do is within F, the basis is the same whatever they do.  The damping d K is left out.  X
+exists for any mesh, also where motions have no mass.  More frequencies with fewer moments each gave
+larger errors.
 
-An iteration that chooses frequencies (SOR-IRKA of pyMOR) did not converge on the truck.  More
-frequencies with fewer moments each gave larger errors.  Nothing is trained.
+Craig-Bampton: static shapes of unit deflections of the ports, and modes with the ports held.
+R. R. Craig, M. C. C. Bampton, Coupling of substructures for dynamic analyses, AIAA J. 6 (1968),
+1313-1319.  The boundary is the deflections of springs, dampers and tires: what these do is in the
+basis, whatever the force.
 """
 
 import time
@@ -17,6 +21,7 @@ from pydantic import Field
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.projection.modes import fixed_modes
 from vehiclemor.reduction.projection.structural import (
     ReducedStructure,
     StructuralSettings,
@@ -66,26 +71,53 @@ def krylov_vectors(model: StructuralModel, frequency: float, moments: int) -> np
     return np.column_stack(basis)
 
 
-def check(model: StructuralModel, settings: KrylovSettings) -> None:
+def check_moments(model: StructuralModel, settings: KrylovSettings) -> None:
     """Raise `InputError` if there are as many moments as coordinates."""
     if settings.moments >= model.size:
         most = model.size - 1
         raise InputError(f"moments is {settings.moments}; {model.name} allows at most {most}")
 
 
-def fit(model: StructuralModel, training: Training, settings: KrylovSettings) -> ReducedStructure:
+def by_krylov(
+    model: StructuralModel, training: Training, settings: KrylovSettings
+) -> ReducedStructure:
     """Krylov vectors; no training run is looked at."""
     began = time.process_time()
     basis = krylov_vectors(model, settings.frequency, settings.moments)
     return reduced(model, [basis], settings, began)
 
 
-METHOD = Method(
+class CraigBamptonSettings(StructuralSettings):
+    """Settings for a structure."""
+
+    highest: float = Field(
+        200.0, gt=0.0, le=1e5, description="modes of up to so many Hz are kept, ports held"
+    )
+
+
+def by_craig_bampton(
+    model: StructuralModel, training: Training, settings: CraigBamptonSettings
+) -> ReducedStructure:
+    """Static shapes and modes; no training run is looked at.  `InputError` if no mode is kept."""
+    began = time.process_time()
+    basis = np.hstack(fixed_modes(model, settings.highest))
+    return reduced(model, [basis], settings, began)
+
+
+KRYLOV = Method(
     name="krylov",
     summary="Krylov vectors: moments of the ports' response at a frequency",
     reference="10.2514/3.20353",
     settings={"structural": KrylovSettings},
-    fit=fit,
-    check=check,
+    fit=by_krylov,
+    check=check_moments,
+    learns_from="inputs",
+)
+CRAIG_BAMPTON = Method(
+    name="craig_bampton",
+    summary="static shapes of the ports and modes with the ports held",
+    reference="10.2514/3.4741",
+    settings={"structural": CraigBamptonSettings},
+    fit=by_craig_bampton,
     learns_from="inputs",
 )
