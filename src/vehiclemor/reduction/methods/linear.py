@@ -33,7 +33,7 @@ on the truck.
 """
 
 import time
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -49,6 +49,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import FeatureListing
 from vehiclemor.reduction.vehicle.linear_modes import (
     APART,
+    SlowModes,
     apart,
     real_modes,
     slow_modes,
@@ -75,24 +76,8 @@ FADING = 2.0
 LARGEST = 499
 
 
-@dataclass(frozen=True, eq=False)
-class Lateral:
-    """Linear lateral dynamics z' = a z + b s of a shape left + right z + follow (s, s', ...).
-
-    z is `left` (k, n) times the deviation of the shape, less `feedthrough` (k, inputs) of the
-    inputs; `follow` (n, inputs) is what follows these without delay.
-    """
-
-    a: np.ndarray
-    b: np.ndarray
-    left: np.ndarray
-    right: np.ndarray
-    follow: np.ndarray
-    feedthrough: np.ndarray
-
-
-def lateral_modes(shape: VehicleShape) -> Lateral:
-    """All modes that steering moves, slow ones first, in real form (blocks of two for pairs)."""
+def lateral_modes(shape: VehicleShape) -> tuple[SlowModes, np.ndarray]:
+    """All modes that steering moves, and what of the shape (n, inputs) follows inputs at once."""
     linear = shape.linearised
     follow, drive = without_derivatives(linear.a, linear.b)
     values, vectors = np.linalg.eig(linear.a.T)
@@ -102,24 +87,50 @@ def lateral_modes(shape: VehicleShape) -> Lateral:
     moved = np.abs(w @ drive) * np.linalg.norm(v, axis=0) / np.maximum(np.abs(values), APART)
     moved[~motion] = 0.0
     left, right = real_modes(values, w, v, moved > MOVED * moved.max())
-    return Lateral(left @ linear.a @ right, left @ drive, left, right, follow, left @ follow)
+    modes = replace(
+        slow_modes(shape, np.inf),
+        lateral=len(left),
+        rates=left @ linear.a @ right,
+        left=left,
+        right=right,
+        input_matrix=left @ drive,
+        input_shift=np.vstack([left @ follow, np.zeros(follow.shape[1])]),
+    )
+    return modes, follow
 
 
-def error_scale(shape: VehicleShape, lateral: Lateral) -> np.ndarray:
+def within(modes: SlowModes, test: np.ndarray, trial: np.ndarray) -> SlowModes:
+    """The modes in fewer coordinates: test (r, k) times the old ones, which are trial times new."""
+    return replace(
+        modes,
+        lateral=len(test),
+        rates=test @ modes.rates @ trial,
+        left=test @ modes.left,
+        right=modes.right @ trial,
+        input_matrix=test @ modes.input_matrix,
+        input_shift=np.vstack([test @ modes.input_shift[:-1], modes.input_shift[-1:]]),
+    )
+
+
+def error_scale(shape: VehicleShape, modes: SlowModes, follow: np.ndarray) -> np.ndarray:
     """Magnitudes (k,) of lateral coordinates: a multiple of those in steady cornering."""
-    steady = -np.linalg.solve(lateral.a, lateral.b)
-    turn = shape.linearised.motion_a[0] @ (lateral.right @ steady + lateral.follow[:, 0])
+    steady = -np.linalg.solve(modes.rates, modes.input_matrix)
+    turn = shape.linearised.motion_a[0] @ (modes.right @ steady + follow[:, 0])
     # At least a thousandth of the largest one, for coordinates that steady cornering leaves alone.
     sizes = np.maximum(np.abs(steady), 1e-3 * np.abs(steady).max())
     return MARGIN * CORNERING / shape.speed / abs(turn) * sizes
 
 
 def linear_vehicle(
-    shape: VehicleShape, lateral: Lateral, settings: OnlineSettings, began: float
+    shape: VehicleShape,
+    modes: SlowModes,
+    follow: np.ndarray,
+    settings: OnlineSettings,
+    began: float,
 ) -> ReducedVehicle:
     """The reduced vehicle of linear dynamics; cost from `began` (`time.process_time()`) on."""
-    linear, modes = shape.linearised, slow_modes(shape, np.inf)
-    k, inputs = len(lateral.a), linear.b.shape[1]
+    linear = shape.linearised
+    k, inputs = len(modes.rates), linear.b.shape[1]
     listing = FeatureListing(k + 1, inputs)
     terms = [(value,) for value in (listing.number(1.0), *listing.z, *listing.u)]
     odd, even = [*range(1, k + 1), *range(k + 2, k + 2 + inputs)], [0, k + 1]
@@ -127,10 +138,10 @@ def linear_vehicle(
     groups = ((tuple(odd), (*range(k), k + 1, k + 3)), (tuple(even), (k, k + 2)))
     features = listing.features(terms, groups)
     decoding = np.zeros((len(features.terms), len(linear.a)))
-    decoding[odd] = np.vstack([lateral.right.T, lateral.follow.T])
+    decoding[odd] = np.vstack([modes.right.T, follow.T])
     decoding[k + 1] = modes.speed_right
     c = np.zeros((len(features.terms), k + 4))
-    c[odd[: k + 1], :k] = np.vstack([lateral.a.T, lateral.b])
+    c[odd[: k + 1], :k] = np.vstack([modes.rates.T, modes.input_matrix])
     for column, row in ((k + 1, 0), (k + 3, 2)):
         c[odd, column] = decoding[odd] @ linear.motion_a[row]
         c[odd[k:], column] += linear.motion_b[row]
@@ -142,9 +153,9 @@ def linear_vehicle(
         np.zeros(0),
         c,
         decoding,
-        np.vstack([lateral.left, modes.speed_left]),
-        np.vstack([lateral.feedthrough, np.zeros(inputs)]),
-        np.concatenate([error_scale(shape, lateral), [SPEED, HEADING, PLACE, PLACE]]),
+        modes.encoding,
+        modes.input_shift,
+        np.concatenate([error_scale(shape, modes, follow), [SPEED, HEADING, PLACE, PLACE]]),
         linearisation_cost(shape, began),
         settings.solver,
         settings.tolerance,
@@ -172,24 +183,20 @@ class StructuralModesSettings(StructuralSettings):
     highest: float = Field(100.0, gt=0.0, le=1e5, description="modes of up to so many Hz are kept")
 
 
-def truncated(lateral: Lateral, fastest: float, static: bool) -> Lateral:
+def truncated(
+    modes: SlowModes, follow: np.ndarray, fastest: float, static: bool
+) -> tuple[SlowModes, np.ndarray]:
     """The modes with |lambda| up to `fastest` (1/s), the others static or dropped."""
     # In real form, rows of a block have the length |lambda|.
-    kept = np.linalg.norm(lateral.a, axis=1) <= fastest
+    kept = np.linalg.norm(modes.rates, axis=1) <= fastest
     if not kept.any():
         raise InputError(f"fastest is {fastest:g} 1/s: no mode that steering moves is that slow")
-    follow = lateral.follow.copy()
     if static and not kept.all():
-        rest = np.linalg.solve(lateral.a[~kept][:, ~kept], lateral.b[~kept])
-        follow[:, 0] -= lateral.right[:, ~kept] @ rest
-    return Lateral(
-        lateral.a[kept][:, kept],
-        lateral.b[kept],
-        lateral.left[kept],
-        lateral.right[:, kept],
-        follow,
-        lateral.feedthrough[kept],
-    )
+        rest = np.linalg.solve(modes.rates[~kept][:, ~kept], modes.input_matrix[~kept])
+        follow = follow.copy()
+        follow[:, 0] -= modes.right[:, ~kept] @ rest
+    chosen = np.eye(len(kept))[kept]
+    return within(modes, chosen, chosen.T), follow
 
 
 def by_modes(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
@@ -199,8 +206,8 @@ def by_modes(model: Any, training: Training, settings: Any) -> ReducedVehicle | 
         return structural.reduced(model, [free_modes(model, settings.highest)], settings, began)
     shape = VehicleShape(model)
     static = settings.static_correction == "yes"
-    lateral = truncated(lateral_modes(shape), settings.fastest, static)
-    return linear_vehicle(shape, lateral, settings, began)
+    modes, follow = truncated(*lateral_modes(shape), settings.fastest, static)
+    return linear_vehicle(shape, modes, follow, settings, began)
 
 
 class LinearVehicleSettings(OnlineSettings):
@@ -221,20 +228,16 @@ def linear_reduction(
     from pymor.models.iosys import LTIModel
 
     shape = VehicleShape(model)
-    lateral = lateral_modes(shape)
-    if settings.rank >= (most := len(lateral.a)):
+    modes, follow = lateral_modes(shape)
+    if settings.rank >= (most := len(modes.rates)):
         raise InputError(f"rank is {settings.rank}; {model.name} allows at most {most - 1}")
-    c = shape.linearised.motion_a[[0, 2]] @ lateral.right
+    c = shape.linearised.motion_a[[0, 2]] @ modes.right
     with log_levels({"pymor": "ERROR"}):
-        made = reductor(LTIModel.from_matrices(lateral.a, lateral.b[:, None], c))
+        made = reductor(LTIModel.from_matrices(modes.rates, modes.input_matrix[:, None], c))
         made.reduce(settings.rank)
     trial, test = (part.to_numpy() for part in (made.V, made.W))
-    left = np.linalg.solve(test.T @ trial, test.T)
-    found = Lateral(
-        *(left @ lateral.a @ trial, left @ lateral.b, left @ lateral.left),
-        *(lateral.right @ trial, lateral.follow, left @ lateral.feedthrough),
-    )
-    return linear_vehicle(shape, found, settings, began)
+    found = within(modes, np.linalg.solve(test.T @ trial, test.T), trial)
+    return linear_vehicle(shape, found, follow, settings, began)
 
 
 class BalancedTruncationSettings(StructuralSettings):

@@ -27,8 +27,8 @@ from vehiclemor.reduction.vehicle.features import (
     monomials,
     product,
 )
+from vehiclemor.reduction.vehicle.fitting import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.linear_modes import SlowModes
-from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
 
