@@ -11,8 +11,7 @@ import vehiclemor as vm
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.methods.linear import BALANCED_TRUNCATION
 from vehiclemor.reduction.methods.port_bases import CRAIG_BAMPTON, KRYLOV, krylov_vectors
-from vehiclemor.reduction.projection.modes import port_rates
-from vehiclemor.reduction.projection.structural import modes_within, projected
+from vehiclemor.reduction.projection.structural import modes_within, port_rates, projected
 
 
 @pytest.fixture(scope="module")

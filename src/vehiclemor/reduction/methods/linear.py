@@ -42,8 +42,12 @@ from pydantic import Field
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method, installed
 from vehiclemor.reduction.projection import structural
-from vehiclemor.reduction.projection.modes import free_modes, port_rates
-from vehiclemor.reduction.projection.structural import ReducedStructure, StructuralSettings
+from vehiclemor.reduction.projection.structural import (
+    ReducedStructure,
+    StructuralSettings,
+    free_modes,
+    port_rates,
+)
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import FeatureListing

@@ -21,10 +21,10 @@ from pydantic import Field
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.projection.modes import fixed_modes
 from vehiclemor.reduction.projection.structural import (
     ReducedStructure,
     StructuralSettings,
+    fixed_modes,
     reduced,
 )
 from vehiclemor.reduction.training import Training

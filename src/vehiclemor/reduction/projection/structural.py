@@ -1,4 +1,4 @@
-"""Structures in a basis: Galerkin projection of their matrices, ports and outputs.
+"""Structures in a basis: Galerkin projection of matrices, ports and outputs; and their modes.
 
 q = V z about the static state: M z'' + (W W' + d K) z' + K z = B f holds with V'MV in the place
 of M and so on; the law of the ports stays what it is.  Coordinates are turned so that V'MV is the
@@ -26,6 +26,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.kernel_derivatives import PLACES, By, chosen, parameter_names, partial
+from vehiclemor.simulation.structures.factors import factored
 from vehiclemor.simulation.structures.model import (
     FIRST_STEP,
     REASONS,
@@ -37,6 +38,8 @@ from vehiclemor.simulation.structures.system import StructuralSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory
 from vehiclemor.sizes import require
 
+# Modes that are looked for at first.
+FIRST_MODES = 16
 # Directions whose mass is below this part of the largest one carry none.
 MASSLESS = 1e-12
 RESULTS = {"rhs": "rhs", "outputs": "outputs"}
@@ -275,6 +278,77 @@ def reduced(
     kind = SteppedStructure if len(modes) == 1 else ReducedStructure
     ends = tuple(map(float, edges))
     return kind(model, modes, ends, cost, settings.tolerance, settings.step_size)
+
+
+def port_rates(model: StructuralModel) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and damping (p,) of the ports at the static state."""
+    law = model.system.law
+    rest = np.zeros(law.static.shape[1])
+    _, stiffness, damping = -law.at(rest, rest, np.zeros(len(model.inputs))).T
+    return stiffness, damping
+
+
+def free_modes(model: StructuralModel, highest: float) -> np.ndarray:
+    """Modes (n, k) up to so many Hz of the structure on its springs and tires.
+
+    It is linearised at the static state; dampers are left out.
+    """
+    structure: Any = model.system.structure
+    stiffness, _ = port_rates(model)
+    held = structure.held(stiffness)
+    # Shifted, so that motion that hardly anything holds does no harm.
+    shift = 1.0
+    solve = factored(held + shift * structure.mass, "MMD_AT_PLUS_A").solve
+    return _below(held, structure.mass, solve, -shift, highest)
+
+
+def fixed_modes(model: StructuralModel, highest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Static shapes (n, p) of unit deflections of the ports, and modes (n, k) up to so many Hz.
+
+    The modes are those of the structure whose ports do not deflect.
+    """
+    from scipy.sparse import block_array
+    from scipy.sparse.linalg import splu
+
+    structure: Any = model.system.structure
+    n, p = structure.ports.shape
+    # In a matrix of like sizes pivots stay where the factors are sparse.
+    size = float(np.abs(structure.stiffness.diagonal()).mean())
+    held = block_array(
+        [[structure.stiffness, size * structure.ports], [size * structure.ports.T, None]]
+    )
+    factor = splu(held.tocsc())
+    units = np.vstack([np.zeros((n, p)), size * np.eye(p)])
+    shapes = factor.solve(units)[:n]
+
+    def solve(b: np.ndarray) -> np.ndarray:
+        return factor.solve(np.concatenate([b, np.zeros(p)]))[:n]
+
+    return shapes, _below(structure.stiffness, structure.mass, solve, 0.0, highest)
+
+
+def _below(stiffness: Any, mass: Any, solve: Any, shift: float, highest: float) -> np.ndarray:
+    """Modes (n, k) up to so many Hz; `solve` is by the stiffness less `shift` times the mass."""
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    n, count, largest = mass.shape[0], FIRST_MODES, (2.0 * np.pi * highest) ** 2
+    operator = LinearOperator((n, n), matvec=solve, dtype=float)  # type: ignore[call-arg]
+    begin = solve(mass @ np.cos(np.arange(n, dtype=float)))
+    while True:
+        count = min(count, n - 2)
+        squares, modes = eigsh(stiffness, count, mass, shift, v0=begin, OPinv=operator)
+        order = np.argsort(squares)
+        squares, modes = squares[order], modes[:, order]
+        if squares[-1] > largest or count == n - 2:
+            break
+        count *= 2
+    if squares[0] > largest:
+        raise InputError(f"no mode is below {highest:g} Hz: the first has {_hertz(squares[0]):.4g}")
+    return modes[:, squares <= largest]
+
+
+def _hertz(square: float) -> float:
+    return float(np.sqrt(max(square, 0.0)) / (2.0 * np.pi))
 
 
 class StructuralPodSettings(StructuralSettings):
