@@ -321,11 +321,8 @@ class Decoding(ShortRepr):
             for place in places:
                 call.words[place] = rows
             call()
-        largest, first, watched = (
-            space.largest.tolist(),
-            space.first.tolist(),
-            len(space.largest) - BESIDES,
-        )
+        largest, first = space.largest.tolist(), space.first.tolist()
+        watched = len(largest) - BESIDES
         if largest and largest[watched] > 1.0:
             times, sizes = space.times[:rows], np.abs(space.states[:rows, self.layout.size :])
             spent = durations(times, sizes[:, : len(self.reach.lasted) // 2])

@@ -133,9 +133,7 @@ def durations(times, states, column, lasted, spent):
     Seconds beyond each level have a row for each column, and then so have their integrals.
     """
     columns, end, moving, longest = len(spent) // 2, times[len(times) - 1], len(times), 0.0
-    for row in range(2 * columns):
-        for level in range(LEVELS):
-            spent[row, level] = 0.0
+    spent[:, :] = 0.0
     for sample in range(len(times)):
         span = times[sample] - times[sample - 1] if sample else 0.0
         later = span * (end - times[sample] + span)
