@@ -1,4 +1,4 @@
-"""Reductions of a linearised model without training: slow modes, balanced truncation, IRKA.
+"""Reductions of a linearised model without training: modes, balancing, IRKA, single-track car.
 
 A vehicle is linearised at straight running:
 
@@ -30,10 +30,12 @@ Interpolation (IRKA), by pyMOR, of a vehicle: S. Gugercin, A. C. Antoulas, C. Be
 reduction for large-scale linear dynamical systems, SIAM J. Matrix Anal. Appl. 30 (2008), 609-638.
 Of structures pyMOR has the same iteration in second-order form (SOR-IRKA), which did not converge
 on the truck.
+
+The linear single-track car (bicycle model): P. Riekert, T. E. Schunck, Ing.-Arch. 11 (1940),
+210-224; M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (Springer).
 """
 
 import time
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -50,14 +52,12 @@ from vehiclemor.reduction.projection.structural import (
 )
 from vehiclemor.reduction.settings import OnlineSettings
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.features import FeatureListing
+from vehiclemor.reduction.vehicle.features import PLANAR, FeatureListing
 from vehiclemor.reduction.vehicle.linear_modes import (
-    APART,
     SlowModes,
-    apart,
-    real_modes,
+    lateral_modes,
     slow_modes,
-    without_derivatives,
+    within,
 )
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import (
@@ -72,48 +72,12 @@ from vehiclemor.reduction.vehicle.shape import (
 )
 from vehiclemor.simulation.dynamic import DynamicModel
 
-# Modes that steering moves by less than this part of the most moved one are symmetric.
-MOVED = 1e-8
 # Time in s in which motion counts less by a factor e.
 FADING = 2.0
 # Most coordinates n: from 2 n = 1000 on pyMOR iterates, which did not converge on the truck.
 LARGEST = 499
-
-
-def lateral_modes(shape: VehicleShape) -> tuple[SlowModes, np.ndarray]:
-    """All modes that steering moves, and what of the shape (n, inputs) follows inputs at once."""
-    linear = shape.linearised
-    follow, drive = without_derivatives(linear.a, linear.b)
-    values, vectors = np.linalg.eig(linear.a.T)
-    w = vectors.T
-    v = np.linalg.inv(w)
-    motion = apart(values) & (np.abs(values) > APART)
-    moved = np.abs(w @ drive) * np.linalg.norm(v, axis=0) / np.maximum(np.abs(values), APART)
-    moved[~motion] = 0.0
-    left, right = real_modes(values, w, v, moved > MOVED * moved.max())
-    modes = replace(
-        slow_modes(shape, np.inf),
-        lateral=len(left),
-        rates=left @ linear.a @ right,
-        left=left,
-        right=right,
-        input_matrix=left @ drive,
-        input_shift=np.vstack([left @ follow, np.zeros(follow.shape[1])]),
-    )
-    return modes, follow
-
-
-def within(modes: SlowModes, test: np.ndarray, trial: np.ndarray) -> SlowModes:
-    """The modes in fewer coordinates: test (r, k) times the old ones, which are trial times new."""
-    return replace(
-        modes,
-        lateral=len(test),
-        rates=test @ modes.rates @ trial,
-        left=test @ modes.left,
-        right=modes.right @ trial,
-        input_matrix=test @ modes.input_matrix,
-        input_shift=np.vstack([test @ modes.input_shift[:-1], modes.input_shift[-1:]]),
-    )
+# Lateral speed (m/s) of a typical maneuver.
+SIDEWARD = 0.5
 
 
 def error_scale(shape: VehicleShape, modes: SlowModes, follow: np.ndarray) -> np.ndarray:
@@ -299,6 +263,72 @@ def interpolated(
     return linear_reduction(IRKAReductor, model, settings, time.process_time())
 
 
+def single_track(
+    model: DynamicModel, training: Training, settings: OnlineSettings
+) -> ReducedVehicle:
+    """Linearise and condense; no training run is looked at.
+
+    Lateral speed V and yaw rate r at constant speed U, with C_i, l_i effective cornering stiffness
+    and place of the axles:
+
+        m V' = -m U r + sum_i F_i,   J r' = sum_i l_i F_i,   F_i = C_i (steer_i - (V + l_i r) / U)
+
+    The numbers come from the model itself: it is linearised at straight running (speed U0), and all
+    other lateral states are eliminated as if they were at rest (A_kk - A_kf A_ff^-1 A_fk, static
+    condensation).  So the stiffnesses are effective ones: pneumatic trail, roll steer, camber and,
+    for a prescribed rack, the wheels' angle per rack are in them; steady cornering is that of the
+    linearised model.  Masses and stiffnesses need not be told apart: the 2x2 matrix of the car is
+
+        A(U) = U [[0, -1], [0, 0]] + U0 / U A1
+
+    so A1 follows from the matrix at U0, and the car holds at the speed of its start, which stays
+    constant.  Velocity and acceleration of the rack are left out.  Heave and pitch have no place in
+    a single-track car.
+    """
+    began = time.process_time()
+    shape = VehicleShape(model)
+    linear, modes, inputs = shape.linearised, slow_modes(shape, np.inf), len(model.inputs)
+    # States of the shape that are nearest to V and r; the others follow them and the steering.
+    kept = np.argmax(np.abs(linear.motion_a[[2, 0]]), axis=1)
+    rest = np.setdiff1d(np.arange(len(linear.a)), kept)
+    drive = np.column_stack([linear.a[np.ix_(rest, kept)], linear.b[rest, 0]])
+    follow = np.zeros((len(linear.a), 3))
+    # The speed's zero eigenvalue makes the matrix singular: the least-squares solution cuts it.
+    follow[rest] = -np.linalg.lstsq(linear.a[np.ix_(rest, rest)], drive, rcond=1e-10)[0]
+    follow[kept, [0, 1]] = 1.0
+    condensed = linear.a[kept] @ follow
+    condensed[:, 2] += linear.b[kept, 0]
+    # What comes from the tires goes as one over the speed.
+    tire = condensed[:, :2] - np.array([[0.0, -shape.speed], [0.0, 0.0]])
+    # States V, r and the deviation of the speed.
+    listing = FeatureListing(3, inputs)
+    (v, r, slower), u, p = listing.z, listing.u[0], listing.p(0)
+    part, speed = listing.let(p / (p + slower)), p + slower
+    terms = ((v,), (r,), (u,), (part, v), (part, r), (speed, r), (speed,), (slower,))
+    groups = (((0, 1, 2, 3, 4, 5), (0, 1, 3, 5)), ((6, 7), (4,)))
+    features = listing.features(terms, groups)
+    c = np.zeros((len(terms), 3 + PLANAR))
+    c[[3, 4], :2], c[2, :2], c[5, 0] = tire.T, condensed[:, 2], -1.0
+    c[1, 3], c[6, 4], c[0, 5] = 1.0, 1.0, 1.0
+    decoding = np.zeros((len(terms), len(shape.reference)))
+    decoding[:3], decoding[7] = follow.T, modes.speed_right
+    turn = CORNERING / shape.speed
+    return ReducedVehicle(
+        model,
+        shape,
+        features,
+        np.array([shape.speed]),
+        c,
+        decoding,
+        np.vstack([np.eye(len(linear.a))[kept], modes.speed_left]),
+        np.zeros((3, inputs)),
+        np.array([MARGIN * SIDEWARD, MARGIN * turn, SPEED, HEADING, PLACE, PLACE]),
+        linearisation_cost(shape, began),
+        settings.solver,
+        settings.tolerance,
+    )
+
+
 MODAL_TRUNCATION = Method(
     name="modal_truncation",
     summary="slow modes of the linearised model: lateral ones of a car, all of a structure",
@@ -334,4 +364,13 @@ IRKA = Method(
     fit=interpolated,
     learns_from="inputs",
     packages=("pymor",),
+)
+LINEAR_SINGLE_TRACK = Method(
+    name="linear_single_track",
+    summary="linear single-track car with the model's own effective stiffnesses",
+    reference="10.1007/BF02086921",
+    settings=dict.fromkeys(("ode", "dae"), OnlineSettings),
+    refusal=no_steered_vehicle,
+    fit=single_track,
+    learns_from="inputs",
 )

@@ -141,12 +141,9 @@ class VehicleShape:
         steps = STEP * np.maximum(1.0, np.abs(self.reference))
         shapes = np.tile(self.reference, (2 * (n + inputs), 1))
         values = self._no_input(len(shapes))
-        for j in range(n):
-            shapes[2 * j, j] += steps[j]
-            shapes[2 * j + 1, j] -= steps[j]
-        for j in range(inputs):
-            values[2 * (n + j), j] += INPUT_STEP
-            values[2 * (n + j) + 1, j] -= INPUT_STEP
+        for side, sign in enumerate((1.0, -1.0)):
+            shapes[side : 2 * n : 2] += sign * np.diag(steps)
+            values[2 * n + side :: 2] += sign * INPUT_STEP * np.eye(inputs)
         widths = 2.0 * np.concatenate([steps, np.full(inputs, INPUT_STEP)])
         outputs = self.model.outputs_at(
             self.states(shapes, np.zeros((len(shapes), 3))), np.ascontiguousarray(values)
