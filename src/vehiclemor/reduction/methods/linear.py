@@ -42,7 +42,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.interface import Method, OfflineCost, installed, offline_cost
 from vehiclemor.reduction.projection import structural
 from vehiclemor.reduction.projection.structural import (
     ReducedStructure,
@@ -60,24 +60,25 @@ from vehiclemor.reduction.vehicle.linear_modes import (
     within,
 )
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.shape import (
-    CORNERING,
-    HEADING,
-    MARGIN,
-    PLACE,
-    SPEED,
-    VehicleShape,
-    linearisation_cost,
-    no_steered_vehicle,
-)
+from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
 
+# Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
+CORNERING = 4.0
+# Error scales: a multiple of steady cornering; of the speed (m/s), heading (rad), place (m).
+MARGIN = 3.0
+SPEED, HEADING, PLACE = 10.0, 1.0, 10.0
 # Time in s in which motion counts less by a factor e.
 FADING = 2.0
 # Most coordinates n: from 2 n = 1000 on pyMOR iterates, which did not converge on the truck.
 LARGEST = 499
 # Lateral speed (m/s) of a typical maneuver.
 SIDEWARD = 0.5
+
+
+def linearisation_cost(shape: VehicleShape, began: float) -> OfflineCost:
+    """Seconds since `began`; two evaluations for every state and input."""
+    return offline_cost(began, shape.model, further=2 * sum(shape.linearised.b.shape))
 
 
 def error_scale(shape: VehicleShape, modes: SlowModes, follow: np.ndarray) -> np.ndarray:

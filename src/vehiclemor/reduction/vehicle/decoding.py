@@ -42,15 +42,10 @@ from vehiclemor.sizes import require, shaped
 NEGLIGIBLE = 1e-4
 # Modes are known by differences: a smaller part of a deviation than this excites none.
 ROUNDING = 1e-7
-# A run may last so many times as long as any training run, and this (s) where none has been.
-LONGER, SHORTEST = 1.05, 0.1
-# Parts of the sizes of the training runs' steering that a run's may have: few of them are as quick
-# as the quickest; its derivatives are as in these.
-KNOWN = np.array([[0.95, 1.0, 1.0], [0.75, 1.0, 1.0], [0.75, 1.0, 1.0]])
+# A run may last so many times as long as any training run.
+LONGER = 1.05
 # A start may leave so many times what samples of training runs leave.
 UNLIKE = 3.0
-# Part of the steered motion's own amplitudes that a start's transient may have beside it.
-BESIDE = 0.3
 # What is left, beside its modes, of a start's motion when training runs begin to be steered.
 FADED = 0.01
 # Decay (1/s) that is none.

@@ -14,9 +14,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, reduce
-from itertools import combinations_with_replacement
 from operator import mul
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,7 +44,6 @@ CALL = 160
 ARGUMENTS = ("_x", "_u", "_constants", "_result")
 # Factors of a product, in order.
 Term = tuple[Value, ...]
-Factor = TypeVar("Factor")
 
 
 @dataclass(frozen=True)
@@ -144,16 +142,6 @@ class FeatureListing(Listing):
 def product(factors: Term) -> Value:
     """The product of factors, from the first one on."""
     return reduce(mul, factors)
-
-
-def monomials(values: Sequence[Factor], degree: int) -> tuple[tuple[Factor, ...], ...]:
-    """All products of that many of the values, or of their names."""
-    return tuple(combinations_with_replacement(values, degree))
-
-
-def held(value: Value) -> Value:
-    """A value held in [-1, 1]: nothing is known of what lies beyond the training runs."""
-    return 0.5 * (abs(value + 1.0) - abs(value - 1.0))
 
 
 class Layout(NamedTuple):

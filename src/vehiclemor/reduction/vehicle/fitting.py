@@ -17,12 +17,9 @@ import numpy as np
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.trust import largest_inputs
 from vehiclemor.reduction.vehicle.decoding import (
-    BESIDE,
-    KNOWN,
     LONGER,
     NOTHING_KNOWN,
     ROUNDING,
-    SHORTEST,
     UNLIKE,
     TrainingReach,
     Transient,
@@ -58,6 +55,13 @@ LANDED, DECAYED = 0.1, 4.0
 LANDING_STILL = 1e-6
 # Longest time (s) for which a run is looked at.
 LONGEST = 1.0
+# Time (s) that a run may spend where no training run has been.
+SHORTEST = 0.1
+# Parts of the sizes of the training runs' steering that a run's may have: few of them are as quick
+# as the quickest; its derivatives are as in these.
+KNOWN = np.array([[0.95, 1.0, 1.0], [0.75, 1.0, 1.0], [0.75, 1.0, 1.0]])
+# Part of the steered motion's own amplitudes that a start's transient may have beside it.
+BESIDE = 0.3
 # Histories of a trajectory.
 PATHS = ("times", "inputs", "coordinates", "speeds", "outputs")
 # Relative singular values of the starts' deviations below this are rounding.
