@@ -15,6 +15,7 @@ basis, whatever the force.
 """
 
 import time
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -24,7 +25,7 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.projection.structural import (
     ReducedStructure,
     StructuralSettings,
-    fixed_modes,
+    modes_below,
     reduced,
 )
 from vehiclemor.reduction.training import Training
@@ -85,6 +86,31 @@ def by_krylov(
     began = time.process_time()
     basis = krylov_vectors(model, settings.frequency, settings.moments)
     return reduced(model, [basis], settings, began)
+
+
+def fixed_modes(model: StructuralModel, highest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Static shapes (n, p) of unit deflections of the ports, and modes (n, k) up to so many Hz.
+
+    The modes are those of the structure whose ports do not deflect.
+    """
+    from scipy.sparse import block_array
+    from scipy.sparse.linalg import splu
+
+    structure: Any = model.system.structure
+    n, p = structure.ports.shape
+    # In a matrix of like sizes pivots stay where the factors are sparse.
+    size = float(np.abs(structure.stiffness.diagonal()).mean())
+    held = block_array(
+        [[structure.stiffness, size * structure.ports], [size * structure.ports.T, None]]
+    )
+    factor = splu(held.tocsc())
+    units = np.vstack([np.zeros((n, p)), size * np.eye(p)])
+    shapes = factor.solve(units)[:n]
+
+    def solve(b: np.ndarray) -> np.ndarray:
+        return factor.solve(np.concatenate([b, np.zeros(p)]))[:n]
+
+    return shapes, modes_below(structure.stiffness, structure.mass, solve, 0.0, highest)
 
 
 class CraigBamptonSettings(StructuralSettings):

@@ -14,14 +14,14 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.structure import Structure
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.projection.bases import RankTolerance
-from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTolerance
+from vehiclemor.reduction.settings import LARGEST_TOLERANCE, SHORTEST, Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
@@ -48,8 +48,26 @@ RESULTS = {"rhs": "rhs", "outputs": "outputs"}
 class StructuralSettings(Settings):
     """What all reductions of structures share."""
 
-    tolerance: StructuralTolerance = USUAL
-    step_size: StructuralStep = 0.0
+    tolerance: float = Field(
+        USUAL,
+        gt=0.0,
+        le=LARGEST_TOLERANCE,
+        description="largest error of an output by the step size, as part of its range",
+    )
+    step_size: float = Field(
+        0.0,
+        ge=0.0,
+        le=0.1,
+        description="step size in s in the place of the tolerance, from 1e-6 s on; 0: by that",
+    )
+
+    @field_validator("step_size")
+    @classmethod
+    def _long_enough(cls, value: float) -> float:
+        """A step that is none, or long enough that a run ends."""
+        if 0.0 < value < SHORTEST:
+            raise ValueError(f"is {value:g}; it must be 0 or at least {SHORTEST:g}")
+        return value
 
 
 def modes_within(structure: Structure, basis: np.ndarray) -> np.ndarray:
@@ -299,35 +317,10 @@ def free_modes(model: StructuralModel, highest: float) -> np.ndarray:
     # Shifted, so that motion that hardly anything holds does no harm.
     shift = 1.0
     solve = factored(held + shift * structure.mass, "MMD_AT_PLUS_A").solve
-    return _below(held, structure.mass, solve, -shift, highest)
+    return modes_below(held, structure.mass, solve, -shift, highest)
 
 
-def fixed_modes(model: StructuralModel, highest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Static shapes (n, p) of unit deflections of the ports, and modes (n, k) up to so many Hz.
-
-    The modes are those of the structure whose ports do not deflect.
-    """
-    from scipy.sparse import block_array
-    from scipy.sparse.linalg import splu
-
-    structure: Any = model.system.structure
-    n, p = structure.ports.shape
-    # In a matrix of like sizes pivots stay where the factors are sparse.
-    size = float(np.abs(structure.stiffness.diagonal()).mean())
-    held = block_array(
-        [[structure.stiffness, size * structure.ports], [size * structure.ports.T, None]]
-    )
-    factor = splu(held.tocsc())
-    units = np.vstack([np.zeros((n, p)), size * np.eye(p)])
-    shapes = factor.solve(units)[:n]
-
-    def solve(b: np.ndarray) -> np.ndarray:
-        return factor.solve(np.concatenate([b, np.zeros(p)]))[:n]
-
-    return shapes, _below(structure.stiffness, structure.mass, solve, 0.0, highest)
-
-
-def _below(stiffness: Any, mass: Any, solve: Any, shift: float, highest: float) -> np.ndarray:
+def modes_below(stiffness: Any, mass: Any, solve: Any, shift: float, highest: float) -> np.ndarray:
     """Modes (n, k) up to so many Hz; `solve` is by the stiffness less `shift` times the mass."""
     from scipy.sparse.linalg import LinearOperator, eigsh
 

@@ -92,16 +92,6 @@ def sizes(values: np.ndarray) -> np.ndarray:
     return np.where(found > 0.0, found, 1.0)
 
 
-def unit_diagonal(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normal matrix (n, n) scaled to a diagonal of ones, and the scales (n,) of coefficients.
-
-    A feature that is zero in all samples has the scale 1.
-    """
-    scale = np.sqrt(np.diag(normal))
-    scale[scale == 0.0] = 1.0
-    return normal / np.outer(scale, scale), scale
-
-
 def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more: int) -> list[int]:
     """Indices of the columns that explain most, one after the other (orthogonal least squares).
 
@@ -182,15 +172,22 @@ def improved(
     on, where the errors of some are too large to say much.
     """
     paths, error = _compared(reduced, targets, power)
-    change, moved, damping = np.zeros(sum(len(terms) for terms, _ in free)), reduced, DAMPING
+    terms = np.concatenate([some for some, _ in free])
+    targeted = np.repeat([column for _, column in free], [len(some) for some, _ in free])
+    change, moved, damping = np.zeros(len(terms)), reduced, DAMPING
     for _ in range(steps):
         if not np.isfinite(error):
             break
         normal, gradient = normal_equations(moved, targets, paths, free, power)
-        scaled, scale = unit_diagonal(normal)
+        scale = np.sqrt(np.diag(normal))
+        # Of a feature that is zero in all samples.
+        scale[scale == 0.0] = 1.0
+        scaled = normal / np.outer(scale, scale)
         while damping < MOST_DAMPING:
             step = np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient / scale) / scale
-            candidate = changed(reduced, free, change - step)
+            coefficients = reduced.coefficients.copy()
+            coefficients[terms, targeted] += change - step
+            candidate = replace(reduced, coefficients=coefficients)
             new, new_error = _compared(candidate, targets, power)
             if new_error < error:
                 change, moved, paths, error = change - step, candidate, new, new_error
@@ -198,15 +195,6 @@ def improved(
                 break
             damping *= 10.0
     return moved
-
-
-def changed(reduced: ReducedVehicle, free: Free, step: np.ndarray) -> ReducedVehicle:
-    """The reduced vehicle with its free coefficients changed."""
-    coefficients, first = reduced.coefficients.copy(), 0
-    for terms, column in free:
-        coefficients[list(terms), column] += step[first : first + len(terms)]
-        first += len(terms)
-    return replace(reduced, coefficients=coefficients)
 
 
 def _compared(
