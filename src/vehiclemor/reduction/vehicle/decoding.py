@@ -312,38 +312,33 @@ class Decoding(ShortRepr):
         return DecodingSpace(excited, times, states, largest, first, start, counted)
 
     def _lifted(self, space: DecodingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
+        """What `states` gives of the arrays; no trust where nothing tells how far a run goes."""
         for call, places in space.calls:
             for place in places:
                 call.words[place] = rows
             call()
-        largest, first = space.largest.tolist(), space.first.tolist()
-        watched = len(largest) - BESIDES
-        if largest and largest[watched] > 1.0:
+        largest, first, watched = (
+            space.largest.tolist(),
+            space.first.tolist(),
+            self.features.watched,
+        )
+        if not largest:
+            return space.states, None
+        if largest[len(watched)] > 1.0:
             times, sizes = space.times[:rows], np.abs(space.states[:rows, self.layout.size :])
             spent = durations(times, sizes[:, : len(self.reach.lasted) // 2])
-            first[watched] = int((spent > self.reach.lasted).any(axis=(1, 2)).argmax()) or rows - 1
-        left = min(first, default=rows)
-        return space.states, self.trust(
-            largest, first, float(space.times[left]) if left < rows else np.inf
-        )
-
-    def trust(self, largest: list[float], first: list[int], until: float) -> Trust | None:
-        """How far a run has gone; none if nothing tells.
-
-        Of each watched quantity and of what is told besides the largest magnitude, and the first
-        row at which it is above 1; `until` is the time (s) of the first of these rows.
-        """
-        if not largest:
-            return None
-        if np.isinf(until):
-            return Trust(max(largest))
+            beyond = int((spent > self.reach.lasted).any(axis=(1, 2)).argmax())
+            first[len(watched)] = beyond or rows - 1
+        left = min(first)
+        if left >= rows:
+            return space.states, Trust(max(largest))
         # Of what is left at once the start tells most.
-        column = len(first) - 1 - first[::-1].index(min(first))
-        watched = self.features.watched
-        if column >= len(watched):
-            return Trust(max(largest), until, REASONS[column - len(watched)])
-        reason = f"{watched[column][1]} leaves what the training runs have covered"
-        return Trust(max(largest), until, reason)
+        column = len(first) - 1 - first[::-1].index(left)
+        if column < len(watched):
+            reason = f"{watched[column][1]} leaves what the training runs have covered"
+        else:
+            reason = REASONS[column - len(watched)]
+        return space.states, Trust(max(largest), float(space.times[left]), reason)
 
 
 def decayed(excited: np.ndarray) -> float:
