@@ -96,7 +96,7 @@ def _draw_row(axis: Any, row: Mapping[str, Any]) -> None:
 
 def figure_size(results: Results) -> Figure:
     """CPU time of a whole run over the number of coordinates, and what reduction gains."""
-    figure = size.figure_size(results)
+    figure = size.figure_size(results["size"])
     figure.set_size_inches(TWO, 2.8)
     # Room for the names of the vehicles.
     figure.axes[1].set_ylim(bottom=0.2)

@@ -149,7 +149,7 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
     pictures: dict[str, Callable[[], Figure]] = {}
     if "scenario_set" in dataset.coords:
         rows = protocol_rows(dataset)
-        draw = partial(figure_pareto, {name: dataset})
+        draw = partial(figure_pareto, dataset)
         pictures["Worst error over bound, over time"] = draw
     else:
         rows = grid_rows(dataset)

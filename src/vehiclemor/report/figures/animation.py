@@ -1,6 +1,5 @@
 """Runs seen moving, full order and reduced together, as a GIF."""
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,6 +16,7 @@ from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component
 from vehiclemor.report.figures.mechanisms import Values, car, line, suspension, truck, turned
+from vehiclemor.report.figures.result_plot import by_method, configuration, model_name
 from vehiclemor.report.figures.theme import COLORS, FULL, Style, panels, styled
 from vehiclemor.report.labels import method_text
 from vehiclemor.simulation.trajectory import Trajectory
@@ -162,10 +162,7 @@ def _histories(run: Any) -> list[tuple[str, dict[str, np.ndarray]]]:
     dataset = run.dataset() if isinstance(run, Trajectory) else run
     if not isinstance(dataset, xr.Dataset) or "outputs" not in dataset:
         raise InputError(f"{quoted(run)} is neither a run nor a dataset with histories")
-    if "label" not in dataset.dims:
-        method = json.loads(dataset.attrs.get("configuration", "{}")).get("method", "reduced")
-        label = dataset.coords.get("label", method)
-        dataset = dataset.assign_coords(label=label).expand_dims("label")
+    dataset = by_method(dataset, "reduced")
     known = [str(label) for label in dataset["label"].values]
     reduced = [label for label in known if not label.startswith("full_order")] or known[:1]
     found = [(method_text(n), _quantities(dataset.sel(label=n), "outputs")) for n in reduced]
@@ -201,7 +198,7 @@ def _parameters(run: Any) -> dict[str, Any]:
     """Parameters by name: those of a run, or of its model's file with what a dataset tells."""
     if isinstance(run, Trajectory):
         return run.model.parameters.values()
-    told = json.loads(run.attrs.get("configuration", "{}"))
-    model = component("model", str(run.attrs.get("model") or told.get("model")))
+    model = component("model", model_name(run))
     known = load_parameters(model.name, model.parameters, model.parameter_file).values()
-    return known | {name: np.array(v) for name, v in told.get("parameters", {}).items()}
+    changed = configuration(run).get("parameters", {})
+    return known | {name: np.array(value) for name, value in changed.items()}

@@ -18,7 +18,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.runs import legend_of
-from vehiclemor.report.figures.theme import Places, Results, Style, places_of, tick_decades
+from vehiclemor.report.figures.theme import Places, Style, places_of, tick_decades
 from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
@@ -45,69 +45,59 @@ LEAST, DARK = 2.0, 120 / 256
 Lines = Mapping[str, tuple[str, xr.DataArray]]
 
 
-def figure_errors(
-    results: Results, *, outputs: Sequence[str], methods: Mapping[str, str] | None = None
-) -> Figure:
-    """RMS errors of studies over all that they vary.
-
-    `methods` are labels with their texts, by default all but the full order.
-    """
-    first = next(iter(results.values()))
-    if not {"rms_error", "signal_range"} <= set(first):
+def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
+    """RMS errors of a study over all that it varies; of full order where there is nothing else."""
+    if not {"rms_error", "signal_range"} <= set(dataset):
         raise InputError("no errors in this result: it was not compared with full order")
-    known = {str(label): labels.method_text(str(label)) for label in first["label"].values}
+    known = {str(label): labels.method_text(str(label)) for label in dataset["label"].values}
     reduced = {m: text for m, text in known.items() if not m.startswith("full_order")}
-    methods = {m: text for m, text in (methods or reduced or known).items() if m in known}
-    if not _varied(first):
-        return _of_a_point(first, reduced and methods)
-    panels: list[tuple[xr.Dataset, str, str, Places, Lines]] = []
-    notes: list[str] = []
-    for dataset in results.values():
-        axis, *others = _varied(dataset)
-        errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
-        lines = _lines(errors, methods, others)
-        sampled, factors = _is_sample(axis), set(FACTORS) <= {axis, *others}
-        mapped = not sampled and (factors or len(lines) > max(LINES, len(methods)))
-        shown = [axis] if not mapped else list(FACTORS) if factors else [axis, others[0]]
-        rest = [name for name in others if name not in shown]
-        if sampled or mapped:
-            errors = errors.max(rest)
-            lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
-            notes += [f"{dataset.sizes[axis]} samples"] if sampled else []
-            notes += [f"the largest error over {_listed(rest)}"] if rest else []
-        if mapped:
-            notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
-            figure = _map(dataset, errors, methods, outputs, shown)
-            return _finish(figure, results, methods, notes)
+    methods = reduced or known
+    if not _varied(dataset):
+        return _of_a_point(dataset, reduced)
+    axis, *others = _varied(dataset)
+    errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
+    lines = _lines(errors, methods, others)
+    sampled, factors = _is_sample(axis), set(FACTORS) <= {axis, *others}
+    mapped = not sampled and (factors or len(lines) > max(LINES, len(methods)))
+    shown = [axis] if not mapped else list(FACTORS) if factors else [axis, others[0]]
+    rest = [name for name in others if name not in shown]
+    notes = [f"{dataset.sizes[axis]} samples"] if sampled else []
+    if sampled or mapped:
+        errors = errors.max(rest)
+        lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
+        notes += [f"the largest error over {_listed(rest)}"] if rest else []
+    if mapped:
+        notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
+        figure = _map(dataset, errors, methods, outputs, shown)
+    else:
         places = _sampled(dataset, axis) if sampled else [places_of(dataset, axis)]
-        panels += [(dataset, output, axis, at, lines) for output in outputs for at in places]
-    each = len(panels) // len(results) // len(outputs)
-    columns = each if each > 1 else len(outputs)
-    rows = len(panels) // columns
-    size = (6.7 if columns < 3 else 8.5, 2.5 * rows + 0.8)
-    figure, grid = theme.panels(rows, columns, size)
-    for number, (panel, (dataset, output, axis, at, lines)) in enumerate(
-        zip(grid.flat, panels, strict=True)
-    ):
-        panel.set_title(theme.letter(number))
-        _draw_panel(panel, dataset, output, axis, at, lines)
-        at.scale(panel)
-        # Of panels above each other with the same axis the lowest has its label.
-        if any(below[3].label == at.label for below in panels[number + columns :][:1]):
-            panel.set_xlabel("")
-    return _finish(figure, results, methods, notes)
-
-
-def _finish(
-    figure: Figure, results: Results, methods: Mapping[str, str], notes: Sequence[str]
-) -> Figure:
-    """A line above the panels, how many runs were trained on, and the legend."""
-    held = [labels.trained_runs(dataset).sel(label=list(methods)) for dataset in results.values()]
-    count, size = sum(int(runs.sum()) for runs in held), sum(runs.size for runs in held)
-    trained = f"{count} of {size} runs were in their own training" if count else ""
+        figure = _panels(dataset, axis, places, outputs, lines)
+    # A line above the panels, how many runs were trained on, and the legend.
+    held = labels.trained_runs(dataset).sel(label=list(methods))
+    count = int(held.sum())
+    trained = f"{count} of {held.size} runs were in their own training" if count else ""
     if text := "\n".join(filter(None, (", ".join(notes), trained))):
         figure.suptitle(text, fontsize="medium")
     theme.legend_below(figure, figure.axes)
+    return figure
+
+
+def _panels(
+    dataset: xr.Dataset, axis: str, places: Sequence[Places], outputs: Sequence[str], lines: Lines
+) -> Figure:
+    """A panel for each output, or a row of them where there are several places."""
+    cells = list(itertools.product(outputs, places))
+    columns = len(places) if len(places) > 1 else len(outputs)
+    rows = len(cells) // columns
+    size = (6.7 if columns < 3 else 8.5, 2.5 * rows + 0.8)
+    figure, grid = theme.panels(rows, columns, size)
+    for number, (panel, (output, at)) in enumerate(zip(grid.flat, cells, strict=True)):
+        panel.set_title(theme.letter(number))
+        _draw_panel(panel, dataset, output, axis, at, lines)
+        at.scale(panel)
+        # Of panels above each other the lowest has the label of their axis.
+        if number + columns < len(cells):
+            panel.set_xlabel("")
     return figure
 
 

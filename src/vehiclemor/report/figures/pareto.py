@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from matplotlib.figure import Figure
 
 from vehiclemor.report.figures import theme
-from vehiclemor.report.figures.theme import Results, Style
+from vehiclemor.report.figures.theme import Style
 from vehiclemor.report.unseen import method_rows, protocol_of
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
@@ -24,13 +25,12 @@ GREYS: list[Style] = [
 ]
 
 
-def figure_pareto(results: Results) -> Figure:
+def figure_pareto(dataset: xr.Dataset) -> Figure:
     """Score (worst error over its bound) over the mean time of a whole call, one model.
 
     Each full-order integrator is a line through its tolerances; a cross below the upper edge is a
     reduced model of which a run has failed.  Bars: between the quartiles of the rounds.
     """
-    (dataset,) = results.values()
     rows: Any = pd.DataFrame(method_rows(dataset, protocol_of(dataset)))
     rows["time"] = 1e6 * rows["seconds"]
     rows["bar"] = 0.5 * rows["spread"] * rows["time"]

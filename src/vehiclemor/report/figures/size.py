@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import xarray as xr
 from matplotlib.figure import Figure
 
 from vehiclemor.report.figures import theme
-from vehiclemor.report.figures.theme import Results, Style
+from vehiclemor.report.figures.theme import Style
 from vehiclemor.report.sizes import KINDS, growth, size_rows
 from vehiclemor.study.plans.size import FULL
 
@@ -21,13 +22,12 @@ VEHICLES = {"double_wishbone": "suspension", "independent_suspension_vehicle": "
 VEHICLES |= {"high_fidelity_vehicle": "high-fidelity"}
 
 
-def figure_size(results: Results) -> Figure:
+def figure_size(dataset: xr.Dataset) -> Figure:
     """CPU time of a whole run over the number of coordinates, and how many times reduction gains.
 
     The three models of the paper stand beside the truck.  Hollow marks: the reduced model, the
     first of the study.
     """
-    (dataset,) = results.values()
     figure, axes = theme.panels(1, 2, (7.2, 3.6))
     left, right = axes[0]
     n, kinds = dataset["coordinates_of_mesh"].values, dataset["kind"].values
