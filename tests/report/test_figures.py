@@ -10,10 +10,9 @@ from matplotlib.image import imread
 from tests.report.figure_texts import checked, varied
 from vehiclemor.exceptions import InputError
 from vehiclemor.report.figures.catalogue import find
+from vehiclemor.report.figures.costs import figure_pareto, figure_size
 from vehiclemor.report.figures.errors import figure_errors
-from vehiclemor.report.figures.pareto import figure_pareto
 from vehiclemor.report.figures.result_plot import shown_outputs
-from vehiclemor.report.figures.size import figure_size
 from vehiclemor.report.figures.theme import panels, save_figure, styled
 from vehiclemor.report.sizes import size_rows
 from vehiclemor.study.run import run_studies

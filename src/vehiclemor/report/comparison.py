@@ -1,7 +1,7 @@
 """Comparisons: with the paper, on unseen inputs, of every model, of any study; and costs."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -157,13 +157,15 @@ def study_comparison(
     grid, see `frames.grid_rows`.  `method`, `target`, `bound`: a method of a protocol, and what the
     one that validation has chosen must and does reach, see `unseen`.  Errors are in SI units.
     """
-    rows: list[Row] = []
-    for dataset in run_studies(study, folder, jobs, seed=seed).values():
-        if "mesh" in dataset.dims:
-            rows += size_rows(dataset)
-            continue
-        rows += protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
-    return pd.DataFrame(rows)
+    results = run_studies(study, folder, jobs, seed=seed).values()
+    return pd.DataFrame([row for dataset in results for row in result_rows(dataset)])
+
+
+def result_rows(dataset: xr.Dataset) -> Sequence[Row]:
+    """Rows of one study, by what it is."""
+    if "mesh" in dataset.dims:
+        return list(size_rows(dataset))
+    return protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
 
 
 def timing_of(model: str, folder: Path) -> xr.Dataset:

@@ -1,4 +1,4 @@
-"""Tables and texts: rows in the terminal, in Markdown and in HTML, by one place."""
+"""Tables and texts: rows in the terminal and in HTML, by one place."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-Format = Literal["terminal", "markdown", "html"]
+Format = Literal["terminal", "html"]
 Rows = Sequence[Mapping[str, Any]]
 # Columns of a line where there is no terminal, and the most that a wide one is given.
 WIDTH, WIDEST = 80, 120
@@ -84,8 +84,7 @@ def table(
         Names of those that are shown, or how each of them is printed; all by default.
     to
         `terminal`, `html`: headings and formats of `labels.column`, meanings below; within the
-        width of the terminal, or with all digits in the attribute `value`.  `markdown`: names and
-        four digits.
+        width of the terminal, or with all digits in the attribute `value`.
     group, note
         Columns whose values stand in lines of their own: above their rows, and below each.
     explain
@@ -93,10 +92,6 @@ def table(
     """
     records: Rows = rows if isinstance(rows, Sequence) else rows.to_dict("records")  # type: ignore[assignment]
     names = columns or (records[0] if records else ())
-    if to == "markdown":
-        head = f"| {' | '.join(names)} |\n|{'---|' * len(names)}\n"
-        lines = ([_four_digits(row.get(name)) for name in names] for row in records)
-        return head + "".join(f"| {' | '.join(line)} |\n" for line in lines)
     kinds = columns if isinstance(columns, Mapping) else {name: column(name) for name in names}
     if group:
         places = list(dict.fromkeys(row[group] for row in records))
@@ -104,12 +99,6 @@ def table(
     meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds.values() if kind.meaning]
     below = f"({'; '.join(meanings)}.)" if meanings and explain else ""
     return (_terminal if to == "terminal" else _html)(records, kinds, group, note, below)
-
-
-def _four_digits(value: object) -> str:
-    if isinstance(value, float):
-        return "" if value != value else f"{value:.4g}"
-    return "" if value is None else str(value).replace("|", "\\|")
 
 
 def _html(records: Rows, kinds: Mapping[str, Column], group: str, note: str, below: str) -> str:

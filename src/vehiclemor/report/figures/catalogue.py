@@ -14,7 +14,7 @@ from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
-from vehiclemor.report.figures import pareto, result_plot, runs, size, theme
+from vehiclemor.report.figures import costs, result_plot, runs, theme
 from vehiclemor.report.result_selection import drawn
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import studies_and_files
@@ -23,8 +23,8 @@ from vehiclemor.study.run import run_studies
 
 # What is drawn of a study that has no grid.
 DRAWINGS: Mapping[str, Callable[[xr.Dataset], Figure]] = {
-    "pareto": pareto.figure_pareto,
-    "size": size.figure_size,
+    "pareto": costs.figure_pareto,
+    "size": costs.figure_size,
 }
 # Figures that every model has, of all registered methods: study, what is drawn of it.
 OF_A_MODEL: Mapping[str, tuple[Callable[[str, Path], str], str]] = {

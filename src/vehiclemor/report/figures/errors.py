@@ -35,9 +35,8 @@ OFF: tuple[tuple[Style, float, str], ...] = (
 )
 # Of samples that have no quantity.
 SORTED = "sorted by error"
-FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5, "label": "best approximation"}
-# Columns of maps, cells of a map with their number, and cells that a contour must enclose.
-COLUMNS, WRITTEN, ENCLOSED = 3, 100, 4
+# Columns of maps, and cells of a map with their number.
+COLUMNS, WRITTEN = 3, 100
 # In % of the cells, those whose small errors the colours leave out; part of the colours on which
 # white has more contrast than black.
 LEAST, DARK = 2.0, 120 / 256
@@ -159,7 +158,7 @@ def _sampled(dataset: xr.Dataset, sample: str) -> list[Places]:
 def _draw_panel(
     axis: Axes, dataset: xr.Dataset, output: str, dimension: str, places: Places, lines: Lines
 ) -> None:
-    """Lines of one output; over perturbations the best approximation and the published error."""
+    """Lines of one output; over perturbations the published error."""
     cloud = _is_sample(dimension)
     looks = theme.styles(lines)
     for marker, (name, (text, errors)) in zip(itertools.cycle(theme.MARKERS), lines.items()):
@@ -182,13 +181,9 @@ def _draw_panel(
             edge: Style = {"transform": axis.get_xaxis_transform(), "clip_on": False, **mark}
             if found.any():
                 axis.plot(np.compress(found, places.at), heights, color=look["color"], **edge)
-    if dimension in FACTORS:
-        if "pod" in lines and "floor_rms_error" in dataset:
-            floor = dataset["floor_rms_error"].sel(label="pod", output=output).squeeze(drop=True)
-            if floor.dims == (dimension,) and bool(np.isfinite(floor).any()):
-                axis.plot(places.at, floor, **FLOOR)
-        if published := rms_numbers(str(dataset.attrs["model"])).get(output):
-            axis.axhline(published.value, label="published, nominal", **theme.THIN)
+    published = rms_numbers(str(dataset.attrs["model"])).get(output)
+    if published and dimension in FACTORS:
+        axis.axhline(published.value, label="published, nominal", **theme.THIN)
     axis.set_yscale("log")
     tick_decades(axis.yaxis, *axis.get_ylim())
     # Last in the legend what the axis can't show.
@@ -207,7 +202,7 @@ def _map(
 ) -> Figure:
     """Errors over two dimensions (across and upwards), a column for each method.
 
-    Of few cells each has its number; of many a white line is where the error is the published one.
+    Of few cells each has its number.
     Colours leave out the least errors, as that of the training run, far below all others.
     """
     errors = errors.squeeze([d for d in errors.dims if d not in ("output", "label", *axes)])
@@ -229,13 +224,8 @@ def _map(
             factor, unit = labels.readable_unit(float(np.median(colored)), unit)
         low, high = factor * np.percentile(colored, (LEAST, 100.0), method="higher")
         norm = LogNorm(low, high, clip=True)
-        published = rms_numbers(str(dataset.attrs["model"])).get(output)
         for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):
             _draw_cells(axis, across.at, up.at, factor * found[number], norm, written=written)
-            if published and not written and np.sum(found[number] < published.value) >= ENCLOSED:
-                lines: Style = {"levels": [np.log(published.value)], "linestyles": "solid"}
-                logarithms = np.log(np.maximum(found[number], low))
-                axis.contour(across.at, up.at, logarithms, colors="white", linewidths=1.2, **lines)
             axis.set_title(theme.letter(row * len(methods) + number, text))
         label = labels.error_label(dataset, "RMS error", output, unit)
         extend = "min" if factor * colored.min() < low else None
