@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Iterable
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import xarray as xr
 
@@ -25,7 +24,7 @@ from vehiclemor.study.plans.results import combined, grid_digest
 from vehiclemor.study.plans.size import run_size
 from vehiclemor.study.plans.study_file import MOST_SEED, StudyFile
 from vehiclemor.study.store import combined_path, read_run, result_path, run_path, stored
-from vehiclemor.study.workers import Engine, Workers, cluster
+from vehiclemor.study.workers import Workers, cluster
 
 # Grids of so many points are announced before they are expanded.
 LARGE = 10_000
@@ -46,70 +45,53 @@ def run_studies(
     if jobs > 1 and scheduler:
         raise InputError("jobs: a scheduler has its own workers")
     plans = _plans(study, seed)
+    results: dict[str, xr.Dataset] = {}
     with cluster(scheduler) if scheduler else nullcontext() as elsewhere:
-        return {plan.study: plan.run(folder, jobs, elsewhere) for plan in plans}
+        for plan in plans:
+            if isinstance(plan, Protocol):
+                results[plan.study] = run_protocol(plan, folder, jobs, elsewhere)
+                continue
+            if isinstance(plan, tuple):
+                results[plan[0]] = run_size(*plan, folder)
+                continue
+            keys = list(plan.experiments)
+            workers = Workers(plan.name, folder, jobs, elsewhere)
+            results[plan.name] = stored(
+                combined_path(folder, plan.name),
+                "cells",
+                grid_digest(plan),
+                partial(_combined, plan, workers),
+                partial(map, partial(run_path, folder), keys),
+                content_hash(plan.definition),
+            )
+            tell(plan.name, len(keys), len(keys))
+    return results
 
 
-class Plan(NamedTuple):
-    """A study with all names resolved: how it is run, and which runs are known before that.
-
-    `later` says what follows from these, of a protocol from its validation.
-    """
-
-    study: str
-    definition: StudyFile
-    run: Callable[[Path, int, Engine | None], xr.Dataset]
-    keys: Callable[[], Collection[str]]
-    later: str = ""
-
-
-def _plans(study: str, seed: int | None) -> list[Plan]:
-    """All members of a study or collection."""
+def _plans(study: str, seed: int | None) -> list[Grid | Protocol | tuple[str, StudyFile]]:
+    """Grids, protocols and size studies of a study or collection, all names resolved."""
     if seed is not None:
         count("seed", seed, least=0, most=MOST_SEED)
     files = studies_and_files(study)
     if seed is not None and not any(definition.drawn for _, definition in files.values()):
         raise InputError(f"seed: {study} samples no test runs")
-    return [_plan(name, *found, seed) for name, found in files.items()]
+    plans: list[Grid | Protocol | tuple[str, StudyFile]] = []
+    for name, (path, definition) in files.items():
+        if definition.size:
+            plans.append((name, definition))
+        elif definition.bounds:
+            plans.append(load_protocol(str(path), seed if definition.drawn else None, name))
+        else:
+            large = definition.points >= LARGE
+            text = f"{name}: checking {definition.points} grid points"
+            with telling(text) if large else nullcontext():
+                plans.append(expand(name, definition))
+    return plans
 
 
-def _plan(name: str, path: Path, definition: StudyFile, seed: int | None) -> Plan:
-    if definition.size:
-        return Plan(name, definition, lambda folder, *_: run_size(name, definition, folder), tuple)
-    if definition.bounds:
-        protocol = load_protocol(str(path), seed if definition.drawn else None, name)
-        run = partial(run_protocol, protocol)
-        return Plan(protocol.study, definition, run, partial(_validation_keys, protocol), LATER)
-    large = definition.points >= LARGE
-    text = f"{name}: checking {definition.points} grid points"
-    with telling(text) if large else nullcontext():
-        grid = expand(name, definition)
-    return Plan(name, definition, partial(_run_grid, grid), grid.experiments.keys)
-
-
-def _validation_keys(protocol: Protocol) -> set[str]:
-    validation = protocol.sets["validation"]
-    groups = [entry.experiments(protocol.model, validation) for entry in protocol.entries]
-    return {experiment.key for group in groups for experiment in group}
-
-
-def _run_grid(grid: Grid, folder: Path, jobs: int, elsewhere: Engine | None) -> xr.Dataset:
-    workers, keys = Workers(grid.name, folder, jobs, elsewhere), list(grid.experiments)
-
-    def make() -> xr.Dataset:
-        workers([[experiment] for experiment in grid.experiments.values()])
-        return combined(grid, folder)
-
-    found = stored(
-        combined_path(folder, grid.name),
-        "cells",
-        grid_digest(grid),
-        make,
-        lambda: (run_path(folder, key) for key in keys),
-        content_hash(grid.definition),
-    )
-    tell(grid.name, len(keys), len(keys))
-    return found
+def _combined(grid: Grid, workers: Workers) -> xr.Dataset:
+    workers([[experiment] for experiment in grid.experiments.values()])
+    return combined(grid, workers.folder)
 
 
 @dataclass
@@ -148,13 +130,19 @@ def status_of(study: str, folder: Path, seed: int | None = None) -> dict[str, St
         raise FileError(f"{folder}: not a folder")
     found: dict[str, StudyStatus] = {}
     for plan in _plans(study, seed):
-        result = result_path(folder, plan.study, content_hash(plan.definition))
-        if plan.definition.size:
-            found[plan.study] = StudyStatus(1, done=int(result is not None), result=result)
+        if isinstance(plan, tuple):
+            name, definition = plan
+            result = result_path(folder, name, content_hash(definition))
+            found[name] = StudyStatus(1, done=int(result is not None), result=result)
             continue
-        keys = plan.keys()
-        status = StudyStatus(len(keys), result=result, later=plan.later)
-        found[plan.study] = _status(keys, folder, status)
+        if isinstance(plan, Protocol):
+            validation, name, later = plan.sets["validation"], plan.study, LATER
+            groups = [entry.experiments(plan.model, validation) for entry in plan.entries]
+            keys = {experiment.key for group in groups for experiment in group}
+        else:
+            name, later, keys = plan.name, "", plan.experiments.keys()
+        result = result_path(folder, name, content_hash(plan.definition))
+        found[name] = _status(keys, folder, StudyStatus(len(keys), result=result, later=later))
     return found
 
 
