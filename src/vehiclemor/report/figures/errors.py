@@ -22,7 +22,7 @@ from vehiclemor.report.figures.theme import Places, Style, places_of, tick_decad
 from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
+from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
 # Lines of a panel, and sampled quantities with panels.
 LINES, SAMPLED = 8, 3

@@ -19,7 +19,7 @@ from vehiclemor.arguments import count, quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import write_whole
 from vehiclemor.report.labels import MARK, TRAINED
-from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
+from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
 Style = dict[str, Any]
 FORMATS = ("pdf", "svg", "png")
