@@ -25,7 +25,7 @@ RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
 # the largest value below which the full order stands still.
 REACH, STILL = 0.6, 1e-4
 # Height of a panel in inches; letters of a label beside it in one line.
-HISTORY, ERROR, LINE = 2.0, 1.7, 26
+HISTORY, ERROR, LINE = 2.2, 1.7, 26
 
 
 class Curve(NamedTuple):
