@@ -59,9 +59,7 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
     The inputs are the steering and its derivatives, as many as the model has.
     """
     linear = shape.linearised
-    values, vectors = np.linalg.eig(linear.a.T)
-    left = vectors.T
-    right = np.linalg.inv(left)
+    values, left, right = eigenmodes(linear.a)
     # The many equal eigenvalues of stabilised constraints are defective, but not used.
     controlled = np.abs(left @ linear.b[:, 0]) * np.linalg.norm(right, axis=0)
     steers = controlled > CONTROLLED * controlled.max()
@@ -98,6 +96,15 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         right[:, still].real / scale,
         Transient(values[quiet], left[quiet], double[:, None] * right[:, quiet].T),
     )
+
+
+def eigenmodes(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Eigenvalues (n,), left eigenvectors by rows (n, n), and the inverse of these."""
+    values, vectors = np.linalg.eig(a.T)
+    # Signs and phases are free, and processors find others: one component becomes positive.
+    along = vectors.T @ np.cos(np.arange(len(a)))
+    left = (vectors * (np.abs(along) / along)).T
+    return values, left, np.linalg.inv(left)
 
 
 def real_modes(
@@ -141,9 +148,7 @@ def lateral_modes(shape: VehicleShape) -> tuple[SlowModes, np.ndarray]:
     """All modes that steering moves, and what of the shape (n, inputs) follows inputs at once."""
     linear = shape.linearised
     follow, drive = without_derivatives(linear.a, linear.b)
-    values, vectors = np.linalg.eig(linear.a.T)
-    w = vectors.T
-    v = np.linalg.inv(w)
+    values, w, v = eigenmodes(linear.a)
     motion = apart(values) & (np.abs(values) > APART)
     moved = np.abs(w @ drive) * np.linalg.norm(v, axis=0) / np.maximum(np.abs(values), APART)
     moved[~motion] = 0.0
