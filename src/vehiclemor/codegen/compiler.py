@@ -27,8 +27,7 @@ from numba.np.arrayobj import populate_array
 from vehiclemor.codegen.llvm_kernels import Rows, emit
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.operations import Kernel
-from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.codegen.weighted_sums import DOUBLE, FLAGS, spread
+from vehiclemor.codegen.weighted_sums import DOUBLE
 
 # Straight-line kernels are one long block: with its own limits the compiler finds half of what left
 # and right have in common.
@@ -277,35 +276,6 @@ def _call_of_rows(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return context.get_dummy_value()
 
 
-@intrinsic
-def mixed_rows(typing_context: Any, rows: Any, weights: Any, result: Any) -> Any:
-    """See `loop_types.mixed_rows`; in vectors as long as a cache line."""
-    del typing_context
-    _require_plain(rows, result)
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        kind = ir.VectorType(DOUBLE, LANES)
-        result = context.make_array(sig.args[2])(context, builder, args[2])
-        (width,) = cgutils.unpack_tuple(builder, result.shape)
-        weights = [spread(builder, w, LANES) for w in cgutils.unpack_tuple(builder, args[1])]
-        steps = WORD(0), width, WORD(LANES)
-        with cgutils.for_range_slice(builder, *steps) as (column, _):
-            place, terms = column, []
-            for weight in weights:
-                pointer = builder.gep(_data(context, builder, sig, args, 0), [place])
-                row = builder.load(builder.bitcast(pointer, kind.as_pointer()), align=8)
-                terms.append(builder.fmul(weight, row, flags=FLAGS))
-                place = builder.add(place, width)
-            while len(terms) > 1:
-                first, second, *terms = terms
-                terms.append(builder.fadd(first, second, flags=FLAGS))
-            pointer = builder.bitcast(builder.gep(result.data, [column]), kind.as_pointer())
-            builder.store(terms[0], pointer, align=8)
-        return context.get_dummy_value()
-
-    return types.void(rows, weights, result), generate
-
-
 def inlined_kernel(kernel: Kernel) -> Any:
     """A kernel whose instructions are written where a loop calls it, given its arrays."""
 
@@ -355,5 +325,4 @@ INTRINSICS = {
     "matrix": matrix,
     "call_kernel": call_kernel,
     "call_lanes": call_lanes,
-    "mixed_rows": mixed_rows,
 }

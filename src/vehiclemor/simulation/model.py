@@ -20,15 +20,15 @@ from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.constants import components, constant_derivatives, solved_parameters
-from vehiclemor.simulation.kernel_derivatives import (
+from vehiclemor.simulation.evaluation import (
     CONSTANTS,
     PLACES,
     By,
+    at_samples,
     directional,
     parameter_names,
     partial,
 )
-from vehiclemor.simulation.paths import at_samples
 from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Names, Start, Trajectory
 
 NEEDED_FOR = {

@@ -18,8 +18,8 @@ import numpy as np
 from vehiclemor.codegen.loops import ready
 from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.sample_loops import Pieces
+from vehiclemor.simulation.evaluation import CONSTANTS, STATE, directional, partial
 from vehiclemor.simulation.integrators.structures import Output, Spans
-from vehiclemor.simulation.kernel_derivatives import CONSTANTS, STATE, directional, partial
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Solver, Workspace

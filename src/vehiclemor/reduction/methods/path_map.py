@@ -31,7 +31,7 @@ from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
-from vehiclemor.simulation.kernel_derivatives import By
+from vehiclemor.simulation.evaluation import By
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton.newton_loops import Samples
 from vehiclemor.simulation.run_timer import timed

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.simulation.structures.factors import factored
 from vehiclemor.simulation.structures.model import StructuralModel
+from vehiclemor.simulation.structures.system import factored
 
 # Modes that are looked for at first.
 FIRST_MODES = 16

@@ -25,7 +25,7 @@ from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTo
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
-from vehiclemor.simulation.kernel_derivatives import PLACES, By, chosen, parameter_names, partial
+from vehiclemor.simulation.evaluation import PLACES, By, chosen, parameter_names, partial
 from vehiclemor.simulation.structures.model import (
     FIRST_STEP,
     REASONS,

@@ -18,8 +18,7 @@ from vehiclemor.reduction.vehicle.decoding_loops import BESIDES, Known
 from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, decoding_kernel
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.kernel_derivatives import INPUTS, STATE, partial
-from vehiclemor.simulation.paths import PATH_LOOPS, address_of
+from vehiclemor.simulation.evaluation import INPUTS, PATH_LOOPS, STATE, address_of, partial
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.simulation.workspaces import Run
 from vehiclemor.sizes import require

@@ -15,11 +15,11 @@ from vehiclemor.simulation.integrators.dopri5 import (
     accept,
     begin,
     interpolate,
-    longest_step,
     prepare_curve,
     step,
     work_space,
 )
+from vehiclemor.simulation.integrators.shared import longest_step
 from vehiclemor.simulation.integrators.structures import (
     FINISHED,
     NODE_1,
