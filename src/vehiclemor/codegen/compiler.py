@@ -24,10 +24,10 @@ from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
+from vehiclemor.codegen.llvm_arithmetic import DOUBLE
 from vehiclemor.codegen.llvm_kernels import Rows, emit
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.operations import Kernel
-from vehiclemor.codegen.weighted_sums import DOUBLE
 
 # Straight-line kernels are one long block: with its own limits the compiler finds half of what left
 # and right have in common.

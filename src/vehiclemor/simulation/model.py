@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.derivation import Derivation
-from vehiclemor.codegen.kernels import BareKernel, Kernels
+from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition

@@ -21,7 +21,7 @@ from pydantic import Field
 from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
 from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value
-from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.exceptions import InputError, UnreachableError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost

@@ -12,8 +12,7 @@ import numpy as np
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.operations import Kernel
-from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.codegen.vector_lanes import LANES, padded
 from vehiclemor.reduction.vehicle.decoding_loops import BESIDES, Known
 from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, decoding_kernel
 from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
