@@ -12,7 +12,6 @@ Steps of integrators have statements on whole vectors in their arrays.  A vector
 first place, `_result[7]`; sizes and places are whole numbers.
 
     combine(to, n, a, x, b, y, ...)        to = a x + b y + ...; a, b are floats
-    magnitudes(to, n, x, y)                to = |x| + |y|
     product(to, n, rows, x, columns, kept, a)  to = sum_j rows[j] x[columns[j]] + a x, a x only at
                                            places in kept
     execute(kernels, x, u, constants, to)  the first kernel of a list of addresses
@@ -26,7 +25,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from vehiclemor.codegen.llvm_arithmetic import DOUBLE, FLAGS, VECTOR, arithmetic
+from vehiclemor.codegen.llvm_arithmetic import DOUBLE, FLAGS, VECTOR
 from vehiclemor.codegen.vector_lanes import WIDTH, padded
 
 WORD = ir.IntType(64)
@@ -116,8 +115,6 @@ def write(name: str, builder: Any, arguments: Sequence[Any], factors: Sequence[A
     match name, arguments:
         case "combine", [to, n, *places]:
             _combine(builder, to, n, factors, places)
-        case "magnitudes", [to, n, *terms]:
-            _magnitudes(builder, to, n, terms)
         case "product", [to, n, rows, x, *shape]:
             builder.call(_product(builder.module, n, *shape), [to, rows, x])
         case "execute", [kernels, *pointers]:
@@ -155,14 +152,6 @@ def _combine(builder: Any, to: Any, n: int, factors: Sequence[Any], places: Sequ
             part = builder.fmul(one if kind == DOUBLE else many, part, flags=FLAGS)
             total = part if total is None else builder.fadd(total, part, flags=FLAGS)
         _store(builder, total, to, place)
-
-
-def _magnitudes(builder: Any, to: Any, n: int, terms: Sequence[Any]) -> None:
-    for place, kind in _parts(n):
-        one, other = (
-            arithmetic(builder, "abs", [_load(builder, term, place, kind)]) for term in terms
-        )
-        _store(builder, builder.fadd(one, other, flags=FLAGS), to, place)
 
 
 def _product(

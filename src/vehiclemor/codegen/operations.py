@@ -47,7 +47,7 @@ KINDS = {
 }
 # What NumPy calls otherwise.
 OPERATORS = {"negative": "negate", "absolute": "abs"}
-VECTOR_STATEMENTS = ("combine", "magnitudes", "product", "execute")
+VECTOR_STATEMENTS = ("combine", "product", "execute")
 # Nothing else depends on these, and these have a name whatever they are.
 EFFECTS = ("store", *VECTOR_STATEMENTS)
 NAMED = ("sincos", "batch", "sums", "part", *EFFECTS)

@@ -17,10 +17,10 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import kept, recorded_inputs
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import choice
+from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import check_positive, checked_array, checked_inputs, output_times
 from vehiclemor.simulation.evaluation import By, address_of, chosen
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.newton import newton_loops
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Names, Start, Trajectory
 from vehiclemor.simulation.workspaces import Pool
@@ -37,7 +37,7 @@ CLOSED = 1e-6
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
-KINEMATIC_LOOPS = ("simulation.integrators.dense_solves", "simulation.newton.newton_loops")
+KINEMATIC_LOOPS = ("simulation.integrators.dense_solves", "simulation.newton_loops")
 INLINED_KERNELS = ("residual_jacobian", "newton_step", "tangent_parts", "tangent")
 REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
@@ -257,7 +257,7 @@ class AlgebraicModel(Model):
         kernels = np.array([address_of(self.kernels, name, LANES) for name in names])
         solution = newton_loops.Solution(np.empty((0, n + m)), new_counts())
         buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 2))
-        loop = self.loop("lane_path", "simulation.newton.lane_loops")
+        loop = self.loop("lane_path")
         shared = self._ready_mechanism, samples, kernels, iteration
         call = loop.prepared(*shared, solution, buffer)
         table = call.address("solution.path")

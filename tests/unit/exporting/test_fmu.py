@@ -14,7 +14,7 @@ from tests.unit.exporting.programs import in_use, relative, runge_kutta, steerin
 from vehiclemor.exporting import fmu
 from vehiclemor.exporting.c import START_ALONE, c_files
 from vehiclemor.exporting.export import system_of
-from vehiclemor.exporting.model_description import base_units, variables
+from vehiclemor.exporting.fmu import base_units, variables
 from vehiclemor.simulation.constants import hoisted_constants
 
 fmpy = pytest.importorskip("fmpy")

@@ -321,6 +321,7 @@ def exponential_step(frame: Frame, inputs: int) -> Kernel:
     step.sum("v", (share, "half"), (share_half, "whole"), (share_linear, "p"))
     step.leave("middle", "q")
     step.leave("error", "v")
-    error = step.at("error")
-    step.new("magnitudes", detail=(error, n, error, step.at("middle")))
+    for i in range(n):
+        one, other = (step.entry(*step.at(name, i)) for name in ("error", "middle"))
+        step.store(step.at("error", i)[1], abs(one) + abs(other))
     return step.made("etdrk4_step")
