@@ -245,8 +245,7 @@ class System(ShortRepr):
         self, windows: ControlPeriods, solver: Solver, drive: DrivenBy, output: Output
     ) -> Workspace:
         """The time loop with all its arguments, see `integrators/loop.integrate`."""
-        name = catalogue.ALIASES.get(solver.name, solver.name)
-        chosen = catalogue.integrator(name)
+        name, chosen = solver.name, catalogue.integrator(solver.name)
         full = windows.formulation == "full"
         if catalogue.frozen(name) and not full:
             raise InputError(f"{name} freezes the full model's Jacobian: not for a reduced model")
@@ -262,7 +261,7 @@ class System(ShortRepr):
             drive.spans,
             windows.subspaces,
             self.method(name, self.active if full else np.arange(dim)),
-            catalogue.control_of(solver.name, float(solver.tolerance), longest),
+            catalogue.control_of(name, float(solver.tolerance), longest),
             output,
             buffer,
             np.empty(dim + 8, dtype=np.int64),

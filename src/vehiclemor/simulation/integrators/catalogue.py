@@ -130,14 +130,11 @@ INTEGRATORS = {
         numbers=64,
     ),
 }
-# Older name of an integrator.
-ALIASES = {"explicit": "dopri5"}
 
 
 def integrator(name: str) -> Integrator:
     """An integrator by its name; `InputError` if there is none."""
-    known = ALIASES.get(name, name) if isinstance(name, str) else name
-    return INTEGRATORS[choice("solver", known, INTEGRATORS)]
+    return INTEGRATORS[choice("solver", name, INTEGRATORS)]
 
 
 def frozen(name: str) -> bool:
@@ -152,27 +149,19 @@ def control_of(name: str, tolerance: float, longest: float) -> Ready:
     return ready(own._replace(tolerance=tolerance, longest=longest, most_calls=float(MOST_CALLS)))
 
 
-def _modules(formulation: str, *integrators: str) -> tuple[str, ...]:
+def time_loop(name: str, formulation: str) -> Loop:
+    """The compiled time loop of an integrator and a formulation."""
     # What a formulation doesn't say is as of the full system, or of the state.
     known = ("full", "state") if formulation == "coordinates" else ("full",)
-    return (
+    modules = (
         "simulation.integrators.structures",
         "inputs.polynomial_loops",
         "simulation.integrators.dense_solves",
-        *(f"simulation.formulations.{name}" for name in dict.fromkeys((*known, formulation))),
-        *(f"simulation.integrators.{name}" for name in (*integrators, "loop")),
+        *(f"simulation.formulations.{form}" for form in dict.fromkeys((*known, formulation))),
+        *(f"simulation.integrators.{module}" for module in ("shared", name, "loop")),
     )
-
-
-def rhs_loop(formulation: str) -> Loop:
-    """Compiled right-hand side of a system at one time, see `loop.rhs_at`."""
-    return loops(_modules(formulation), ("rhs_at",))["rhs_at"]
-
-
-def time_loop(name: str, formulation: str) -> Loop:
-    """The compiled time loop of an integrator and a formulation."""
     with first_use(f"the time loop of {name}"):
-        return loops(_modules(formulation, "shared", name), ("integrate",))["integrate"]
+        return loops(modules, ("integrate",))["integrate"]
 
 
 def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int) -> int:
