@@ -227,18 +227,7 @@ def call_kernel(
     """See `loop_types.call_kernel`; the arrays must be as long as the kernel wants them."""
     del typing_context
     _require_plain(x, u, constants, result)
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        address = _address(context, builder, sig, args)
-        pointers = [_data(context, builder, sig, args, k) for k in range(2, 6)]
-        # Steps execute others themselves; a kernel that takes no such argument doesn't see it.
-        pointers.append(builder.bitcast(_data(context, builder, sig, args, 0), DOUBLE.as_pointer()))
-        kind = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers))
-        function = builder.inttoptr(address, kind.as_pointer())
-        builder.call(function, pointers, attrs=("nounwind",))
-        return context.get_dummy_value()
-
-    return types.void(kernels, place, x, u, constants, result), generate
+    return types.void(kernels, place, x, u, constants, result), _call
 
 
 @intrinsic
@@ -255,24 +244,29 @@ def call_lanes(
     """See `loop_types.call_lanes`; the matrices must have as many rows and columns."""
     del typing_context
     _require_plain(path, inputs, constants, result)
-    arguments = kernels, place, path, inputs, constants, result, first
-    return types.void(*arguments), _call_of_rows
+    return types.void(kernels, place, path, inputs, constants, result, first), _call
 
 
-def _call_of_rows(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """Call a kernel: matrices from a row on, the last argument, with the length of their rows."""
-    last = len(args) - 1
-    first = context.cast(builder, args[last], sig.args[last], types.intp)
-    address, pointers, strides = _address(context, builder, sig, args), [], []
-    for k in range(2, last):
-        array = context.make_array(sig.args[k])(context, builder, args[k])
-        pointers.append(array.data)
-        if sig.args[k].ndim == 2:
-            strides.append(cgutils.unpack_tuple(builder, array.shape)[1])
-            pointers[-1] = builder.gep(array.data, [builder.mul(first, strides[-1])])
-    kinds = [DOUBLE.as_pointer()] * len(pointers) + [WORD] * len(strides)
-    function = builder.inttoptr(address, ir.FunctionType(ir.VoidType(), kinds).as_pointer())
-    builder.call(function, pointers + strides, attrs=("nounwind",))
+def _call(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Call a kernel; of matrices from a row on, the last argument, with the lengths of rows."""
+    place = context.cast(builder, args[1], sig.args[1], types.intp)
+    kernels, *arrays = [
+        context.make_array(sig.args[k])(context, builder, args[k]) for k in (0, 2, 3, 4, 5)
+    ]
+    arguments = [array.data for array in arrays]
+    if len(args) > 6:
+        first = context.cast(builder, args[6], sig.args[6], types.intp)
+        for k, array in enumerate(arrays):
+            if sig.args[2 + k].ndim == 2:
+                arguments.append(cgutils.unpack_tuple(builder, array.shape)[1])
+                arguments[k] = builder.gep(array.data, [builder.mul(first, arguments[-1])])
+    else:
+        # Steps execute others themselves; a kernel that takes no such argument doesn't see it.
+        arguments.append(builder.bitcast(kernels.data, DOUBLE.as_pointer()))
+    function = ir.FunctionType(ir.VoidType(), [argument.type for argument in arguments])
+    address = builder.load(builder.gep(kernels.data, [place]))
+    address = builder.inttoptr(address, function.as_pointer())
+    builder.call(address, arguments, attrs=("nounwind",))
     return context.get_dummy_value()
 
 
@@ -307,16 +301,6 @@ def _require_plain(*arrays: Any) -> None:
         plain = isinstance(kind, types.Array) and kind.dtype == types.float64
         if not (plain and kind.layout == "C"):
             raise TypingError(f"a kernel needs C-contiguous arrays of floats, not {kind}")
-
-
-def _address(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """The address of a kernel: that at a place, the second argument, of the list before it."""
-    place = context.cast(builder, args[1], sig.args[1], types.intp)
-    return builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
-
-
-def _data(context: Any, builder: Any, sig: Any, args: Any, place: int) -> Any:
-    return context.make_array(sig.args[place])(context, builder, args[place]).data
 
 
 # What only compiled loops can do: views of a buffer, calls of kernels; stand-ins in `loop_types`.

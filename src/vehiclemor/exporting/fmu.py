@@ -10,12 +10,11 @@ import hashlib
 import logging
 import os
 import platform
-import re
 import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -148,7 +147,9 @@ def model_description(system: ExportedSystem, token: str) -> bytes:
         files = ElementTree.SubElement(kind, "SourceFiles")
         for name in COMPILED:
             ElementTree.SubElement(files, "File", name=name)
-    _units(root, (v.unit for v in every.values()))
+    units = ElementTree.SubElement(root, "UnitDefinitions")
+    for name in dict.fromkeys(v.unit for v in every.values() if v.unit != "1"):
+        ElementTree.SubElement(units, "Unit", name=name)
     times = {"startTime": "0.0", "stopTime": repr(STOP), "stepSize": repr(COMMUNICATION)}
     ElementTree.SubElement(root, "DefaultExperiment", times)
     listed = ElementTree.SubElement(root, "ModelVariables")
@@ -157,17 +158,6 @@ def model_description(system: ExportedSystem, token: str) -> bytes:
     _structure(ElementTree.SubElement(root, "ModelStructure"), every)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
-
-
-def _units(root: ElementTree.Element, names: Iterable[str]) -> None:
-    listed = ElementTree.SubElement(root, "UnitDefinitions")
-    for name in dict.fromkeys(names):
-        if name == "1":
-            continue
-        unit = ElementTree.SubElement(listed, "Unit", name=name)
-        if (powers := base_units(name)) is not None:
-            given = {base: str(power) for base, power in powers.items() if power}
-            ElementTree.SubElement(unit, "BaseUnit", given)
 
 
 def _variable(listed: ElementTree.Element, variable: Variable, reference: int) -> None:
@@ -199,30 +189,3 @@ def _structure(structure: ElementTree.Element, every: Mapping[int, Variable]) ->
             listed = ElementTree.SubElement(structure, name)
             for place in places:
                 ElementTree.SubElement(listed, "Unknown", index=str(place + 1))
-
-
-# Unit -> powers of base units.
-DERIVED = {
-    **{name: {name: 1} for name in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "J": {"kg": 1, "m": 2, "s": -2},
-    "W": {"kg": 1, "m": 2, "s": -3},
-    "Pa": {"kg": 1, "m": -1, "s": -2},
-    "Hz": {"s": -1},
-}
-
-
-def base_units(unit: str) -> dict[str, int] | None:
-    """Powers of base units in a unit such as `N s/m` or `m s-1`; none where a name is unknown."""
-    powers: dict[str, int] = {}
-    numerator, *denominators = unit.split("/")
-    for sign, part in ((1, numerator), *((-1, part) for part in denominators)):
-        for factor in part.split():
-            match = re.fullmatch(r"([A-Za-z]+)(?:\^?(-?\d+))?", factor)
-            if factor == "1":
-                continue
-            if match is None or match[1] not in DERIVED:
-                return None
-            for base, power in DERIVED[match[1]].items():
-                powers[base] = powers.get(base, 0) + sign * power * int(match[2] or 1)
-    return powers

@@ -112,10 +112,6 @@ class AlgebraicModel(Model):
         follows = self.jacobian_of(function, state, u, "state") @ moved
         return self.jacobian_of(function, state, u, by) + follows
 
-    def newton_step(self, q: Any, u: Any) -> np.ndarray:
-        """Newton step Phi_q^-1 Phi by straight-line elimination, shape (n,)."""
-        return self.evaluated("newton_step", q, u)
-
     def residual_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Residuals (samples, n) along a path of coordinates and inputs."""
         return self.values_at("residual", coordinates, inputs, finite=True)
