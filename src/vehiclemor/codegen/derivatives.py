@@ -2,8 +2,9 @@
 
 The derivative of F(x, u, constants) in the directions `_seed_x`, `_seed_u`, ... is a kernel that
 gives dF/dx seed_x + dF/du seed_u + ... (forward mode: A. Griewank, A. Walther, Evaluating
-Derivatives, SIAM 2008, chapter 3).  What does not depend on a seeded argument leaves no operation.
-Of several directions at once values and partial derivatives are computed once.
+Derivatives, SIAM 2008, chapter 3).  The partial derivatives of operations are gathered in scalar
+coefficients; what does not depend on a seeded argument leaves no operation.  Of several directions
+at once values and coefficients are computed once.
 
 Where a function has a kink, such as |x| at 0, it is the derivative on the side of larger arguments;
 the norm of a vector that is zero has the derivative zero.
@@ -13,10 +14,10 @@ from __future__ import annotations
 
 import ctypes
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -63,6 +64,22 @@ SLOPES: dict[str, Callable[[Value, Value], Value]] = {
 WITHOUT = ("sincos", "batch", "sums", "floor", *COMPARISONS)
 
 
+class Coefficient(NamedTuple):
+    """A scalar that a derivative is multiplied by: a value, 1 if there is none."""
+
+    negative: bool = False
+    value: Value | None = None
+
+    @property
+    def opposite(self) -> Coefficient:
+        """With the other sign."""
+        return Coefficient(not self.negative, self.value)
+
+
+# Derivatives that a value's own is a sum of, each with its coefficient.
+Combination = Mapping[Value, Coefficient]
+
+
 def derivative(kernel: Kernel, arguments: Sequence[str]) -> Kernel:
     """The derivative of a kernel along directions of some arguments, such as `_x`; kept on disk.
 
@@ -99,10 +116,11 @@ class _Derivatives(Listing):
         super().__init__()
         self._given, self._seeded = kernel.operations, seeded
         self._values: list[Value] = []
-        # None where a value does not depend on a seeded argument.
-        self._derivatives: list[Value | None] = []
+        self._derivatives: list[Combination] = []
         self._seeds: dict[tuple[str, int], Value] = {}
         self._sums: dict[int, Value] = {}
+        shared = {number for number, count in enumerate(uses(kernel.operations)) if count > 1}
+        self._shared = shared.union(kernel.named)
 
     def add(self, number: int) -> None:
         """An operation of the kernel, the next one, and its derivative."""
@@ -110,12 +128,14 @@ class _Derivatives(Listing):
         along = [self._derivatives[n] for n in arguments]
         if kind in VECTOR_STATEMENTS:
             raise ValueError(f"{kind} has no derivative")
-        found = None
+        found: Combination = {}
         if kind == "store":
-            own = self.new("store", self._or_zero(along[0]), detail=detail)
+            own = self.new("store", self._total(along[0]), detail=detail)
         else:
             own = self.new(kind, *(self._values[n] for n in arguments), detail=detail)
             found = self._derivative(number, own, along)
+        if len(found) > 1 and number in self._shared:
+            found = {self._total(found): Coefficient()}
         self._values.append(own)
         self._derivatives.append(found)
 
@@ -128,89 +148,127 @@ class _Derivatives(Listing):
                 self.named.add(number)
             depths.append(0 if kind in NAMED or number in self.named else depth)
 
-    def _or_zero(self, change: Value | None) -> Value:
-        return self.number(0.0) if change is None else change
-
-    def _derivative(self, number: int, own: Value, along: Sequence[Value | None]) -> Value | None:
+    def _derivative(self, number: int, own: Value, along: Sequence[Combination]) -> Combination:
         kind, arguments, detail = self._given[number]
-        varies = any(change is not None for change in along)
         match kind:
             case "entry" if detail[0] in self._seeded:
                 if detail not in self._seeds:
                     self._seeds[detail] = self.entry(SEED + detail[0], detail[1])
-                return self._seeds[detail]
+                return {self._seeds[detail]: Coefficient()}
             case "part":
                 return self._of_part(arguments[0], own, detail)
             case "sums" if detail[0] in self._seeded:
                 raise ValueError("sums with weights have no derivative along the weights")
-            case "sums" if varies:
-                changes = [self._or_zero(change) for change in along]
+            case "sums" if any(along):
+                changes = [self._total(change) for change in along]
                 self._sums[number] = self.new("sums", *changes, detail=detail)
-        if kind in WITHOUT or not varies:
-            return None
+        if kind in WITHOUT or not any(along):
+            return {}
         return self._of_value(kind, own, [self._values[n] for n in arguments], along)
 
-    def _of_part(self, whole: int, own: Value, place: int) -> Value | None:
+    def _of_part(self, whole: int, own: Value, place: int) -> Combination:
         """Derivative of one of several results."""
         kind, arguments, detail = self._given[whole]
         if kind == "sums":
-            return (
-                self.new("part", self._sums[whole], detail=place) if whole in self._sums else None
-            )
+            if whole not in self._sums:
+                return {}
+            return {self.new("part", self._sums[whole], detail=place): Coefficient()}
         # Results of a batch are one function's of all arguments, then the other's.
         result, lane = divmod(place, LANES) if kind == "batch" else (place, 0)
         change = self._derivatives[arguments[lane]]
-        if change is None:
-            return None
+        if not change:
+            return {}
         if detail == "atan":
-            return SLOPES["atan"](self._values[arguments[lane]], own) * change
+            slope = SLOPES["atan"](self._values[arguments[lane]], own)
+            return self._scaled(change, slope)
         step = LANES if kind == "batch" else 1
-        other = self.new("part", self._values[whole], detail=place + (-step if result else step))
-        return -other * change if result else other * change
+        other = place + step if result == 0 else place - step
+        slope = self.new("part", self._values[whole], detail=other)
+        found = self._scaled(change, slope)
+        return found if result == 0 else _opposite(found)
 
     def _of_value(
-        self, kind: str, own: Value, given: Sequence[Value], along: Sequence[Value | None]
-    ) -> Value | None:
+        self, kind: str, own: Value, given: Sequence[Value], along: Sequence[Combination]
+    ) -> Combination:
         a, b = given[0], given[-1]
         of_a, of_b = along[0], along[-1]
         match kind:
             case "add":
-                return _sum(of_a, of_b)
+                return self._added(of_a, of_b)
             case "subtract":
-                return _sum(of_a, _opposite(of_b))
-            case "multiply":
-                return _sum(_times(b, of_a), _times(a, of_b))
-            case "divide":
-                inverse = 1.0 / b
-                return _sum(_times(inverse, of_a), _times(-own * inverse, of_b))
-            case "power" if of_b is None:
-                return b * function("power", a, b - 1.0) * of_a
-            case "power":
-                raise ValueError("a varying exponent has no derivative: write exp(b log(a))")
-            case "select":
-                return self.new("select", given[0], *map(self._or_zero, along[1:]))
-            case "atan2":
-                inverse = 1.0 / (b * b + a * a)
-                return _sum(_times(b * inverse, of_a), _times(-a * inverse, of_b))
+                return self._added(of_a, _opposite(of_b))
             case "negate":
                 return _opposite(of_a)
+            case "multiply":
+                return self._added(self._scaled(of_a, b), self._scaled(of_b, a))
+            case "divide":
+                inverse = 1.0 / b
+                found = self._scaled(of_a, inverse)
+                if not of_b:
+                    return found
+                return self._added(found, _opposite(self._scaled(of_b, own * inverse)))
+            case "power":
+                if of_b:
+                    raise ValueError("a varying exponent has no derivative: write exp(b log(a))")
+                return self._scaled(of_a, b * function("power", a, b - 1.0))
+            case "select":
+                return self._chosen(given[0], along[1], along[2])
+            case "atan2":
+                inverse = 1.0 / (b * b + a * a)
+                along_a = self._scaled(of_a, b * inverse)
+                return self._added(along_a, _opposite(self._scaled(of_b, a * inverse)))
         if kind not in SLOPES:
             raise ValueError(f"{kind} has no derivative")
-        return SLOPES[kind](a, own) * of_a
+        return self._scaled(of_a, SLOPES[kind](a, own))
+
+    def _chosen(self, test: Value, then: Combination, other: Combination) -> Combination:
+        found = {}
+        for change in {**then, **other}:
+            sides = [self._value(side.get(change)) for side in (then, other)]
+            found[change] = Coefficient(False, self.new("select", test, *sides))
+        return found
+
+    def _value(self, coefficient: Coefficient | None) -> Value:
+        """A coefficient; zero where there is none."""
+        if coefficient is None:
+            return self.number(0.0)
+        if coefficient.value is None:
+            return self.number(-1.0 if coefficient.negative else 1.0)
+        return -coefficient.value if coefficient.negative else coefficient.value
+
+    def _scaled(self, change: Combination, factor: Value) -> Combination:
+        """A derivative times a value."""
+        return {
+            own: Coefficient(c.negative, factor if c.value is None else c.value * factor)
+            for own, c in change.items()
+        }
+
+    def _added(self, a: Combination, b: Combination) -> Combination:
+        total = dict(a)
+        for own, c in b.items():
+            if own not in total:
+                total[own] = c
+            elif total[own] == c.opposite:
+                del total[own]
+            else:
+                total[own] = Coefficient(False, self._value(total[own]) + self._value(c))
+        return total
+
+    def _total(self, change: Combination) -> Value:
+        """The value of a derivative, 0 where it is empty."""
+        total: Value | None = None
+        # What is added comes first, so that nothing begins with a sign.
+        for own, c in sorted(change.items(), key=lambda pair: pair[1].negative):
+            term = own if c.value is None else c.value * own
+            if total is None:
+                total = -term if c.negative else term
+            else:
+                total = total - term if c.negative else total + term
+        return self.number(0.0) if total is None else total
 
 
-def _opposite(change: Value | None) -> Value | None:
-    return None if change is None else -change
-
-
-def _times(factor: Value, change: Value | None) -> Value | None:
-    return None if change is None else factor * change
-
-
-def _sum(one: Value | None, other: Value | None) -> Value | None:
-    if one is None or other is None:
-        return one if other is None else other
-    return one + other
+def _opposite(change: Combination) -> Combination:
+    return {own: c.opposite for own, c in change.items()}
 
 
 @dataclass(frozen=True, eq=False)
