@@ -31,11 +31,6 @@ def test_the_cheapest_that_reaches_the_target_not_by_luck_is_chosen(scan, target
     assert (report.choose(scan, target) or {}).get("tolerance") == tolerance
 
 
-def test_the_front_holds_what_would_be_chosen():
-    front = report.front([SCAN])
-    assert front == [(2e-5, 4.0), (8e-4, 3.0), (5e-2, 1.0)]
-
-
 def case(**seconds):
     curves = {
         label.replace("_", " "): {"delivers": "states", "points": points((1e-3, 1e-4, s))}

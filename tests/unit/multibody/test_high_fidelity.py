@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from tests.unit.programs import pivot_shares
 from vehiclemor.exceptions import GeometryError
+from vehiclemor.multibody.high_fidelity.definition import check
 from vehiclemor.multibody.high_fidelity.equations import CORNER, LOWER_ARMS, PIVOTS
-from vehiclemor.multibody.high_fidelity.equilibrium import check
 from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel

@@ -17,8 +17,8 @@ from tests.oracles.vehicle_lagrange import (
     trail_at_rest,
 )
 from tests.unit.programs import function_of
-from vehiclemor.multibody.components import tilted_wheel, tires
-from vehiclemor.multibody.components.tire_coefficients import FIALA, MAGIC_FORMULA
+from vehiclemor.multibody.components import tires
+from vehiclemor.multibody.quantities import FIALA
 from vehiclemor.symbolic.tape import Tape
 
 ALONG, ACROSS, MOST, LEAST, WIDTH = COEFFICIENTS = [
@@ -39,7 +39,7 @@ def compiled(name: str):
         own = exact(dict(zip(FIALA, COEFFICIENTS, strict=True)))
         forces = tires.fiala(tape, own, load, kappa, slip)
     else:
-        own = exact({name: PARAMETERS[name] for name in MAGIC_FORMULA})
+        own = exact(PARAMETERS)
         sizes = sp.Float(REFERENCE_LOAD, 17), sp.Float(PARAMETERS["R0"], 17)
         forces = tires.magic_formula(tape, own, load, *sizes, kappa, slip, cosine)
     results = [forces.longitudinal, forces.lateral, forces.aligning]
@@ -141,7 +141,7 @@ def test_stiffnesses_are_the_slopes_without_slip(tire, load):
 def test_a_wheel_pushes_and_never_pulls(radius, rate, expected):
     p = exact({"tire_radius": 0.33, "tire_stiffness": 280e3, "tire_damping": 2000.0})
     tape, (r, r_dot) = Tape(), sp.symbols("r r_dot", real=True)
-    load = tilted_wheel.vertical_load(tape, r, r_dot, p)
+    load = tires.vertical_load(tape, r, r_dot, p)
     found = function_of(tape, (r, r_dot), [load], "math")(radius, rate)[0]
     assert found == pytest.approx(expected, abs=1e-9)
     assert found == 0.0 or expected

@@ -8,7 +8,7 @@ from tests.oracles.taylor import axial, euler_321, times, turned
 from tests.unit.programs import function_of
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
-from vehiclemor.symbolic.joints import STILL, along, carried, free_rate, successive
+from vehiclemor.symbolic.mechanics import STILL, along, carried, free_rate, successive
 from vehiclemor.symbolic.tape import Tape
 
 TENSOR = np.array([[2.0, 0.3, -0.2], [0.3, 3.0, 0.4], [-0.2, 0.4, 4.5]])
@@ -50,7 +50,7 @@ def test_motions_are_the_derivatives_of_positions(seed, in_space):
     # By the package.
     free = [free_rate(6 + k, rate) for k, rate in enumerate(NU[6:])]
     moving = m.MovingFrame(
-        g.vector(NU[:3]), g.vector(NU[3:6]), 0, exact(upwards) if in_space else None
+        g.vector(NU[:3]), g.vector(NU[3:6]), exact(upwards) if in_space else None
     )
     on_arm = g.rotate_about_axis(tape, exact(lever), exact(axis), JOINTS[1])
     carrier = g.euler_321(tape, *JOINTS[2:])
@@ -118,14 +118,14 @@ SPEEDS = real("u v w p q r rate spin")
 def test_a_free_body_with_a_slider_and_a_rotor_keeps_its_momenta(as_rotor, rng):
     """The motor that drives the rotor changes the energy and nothing else."""
     (slid, torque), tape = real("slid torque"), Tape()
-    frame = m.MovingFrame(g.vector(SPEEDS[:3]), g.vector(SPEEDS[3:6]), first=0)
+    frame = m.MovingFrame(g.vector(SPEEDS[:3]), g.vector(SPEEDS[3:6]))
     of_rotor = ACROSS * np.eye(3) + (ABOUT - ACROSS) * np.outer(AXLE, AXLE)
     motor = exact(AXLE) * torque
     turning = frame.turning(tape, STILL)
     if as_rotor:
         tensor = tensor_of(TENSOR + of_rotor)
-        own = m.Rotor(7, SPEEDS[7], exact(AXLE), sp.Float(ABOUT), torque)
-        further = {"rotor": own, "acceleration": turning.bias}
+        own = m.Rotor(7, SPEEDS[7], exact(AXLE), sp.Float(ABOUT), torque, turning.bias)
+        further = {"rotor": own}
         rotation, bodies = m.with_inertia(tape, tensor, turning), []
     else:
         tensor, further = tensor_of(TENSOR), {"moment": motor * -1}
@@ -138,7 +138,8 @@ def test_a_free_body_with_a_slider_and_a_rotor_keeps_its_momenta(as_rotor, rng):
     bodies.append(m.Body(sp.Float(MASS), frame.origin(tape), m.ZERO, rotation, tensor, **further))
     now = exact(PLACE) + m.UNIT[2] * slid
     moved = frame.point(tape, now, along(free_rate(6, SPEEDS[6]), m.UNIT[2]))
-    bodies.append(m.Body(sp.Float(SLIDER), moved, m.ZERO))
+    point = tensor_of(np.zeros((3, 3)))
+    bodies.append(m.Body(sp.Float(SLIDER), moved, m.ZERO, frame.rotation(tape, point), point))
     equations = function_of(tape, [*SPEEDS, slid, torque], list(m.kane(tape, 8, bodies)))
 
     def momenta(nu: np.ndarray, slid: float) -> tuple[np.ndarray, np.ndarray, float]:
@@ -177,11 +178,11 @@ def test_a_point_mass_has_the_energy_of_its_turning(rng):
 
 def test_a_rotor_is_spun_by_its_moment_less_what_its_carrier_turns_it():
     tape, torque, turned = Tape(), sp.Symbol("torque", real=True), [2, -3, 5]
-    frame = m.MovingFrame(g.vector(SPEEDS[:3]), g.vector(SPEEDS[3:6]), first=0)
-    tensor, own = tensor_of(TENSOR), m.Rotor(6, SPEEDS[7], exact(AXLE), sp.Float(ABOUT), torque)
+    frame = m.MovingFrame(g.vector(SPEEDS[:3]), g.vector(SPEEDS[3:6]))
+    own = m.Rotor(6, SPEEDS[7], exact(AXLE), sp.Float(ABOUT), torque, exact(turned))
+    tensor = tensor_of(TENSOR)
     rotation = m.with_inertia(tape, tensor, frame.turning(tape, STILL))
-    loads = m.ZERO, own, exact(turned)
-    body = m.Body(sp.Float(MASS), frame.origin(tape), m.ZERO, rotation, tensor, *loads)
+    body = m.Body(sp.Float(MASS), frame.origin(tape), m.ZERO, rotation, tensor, rotor=own)
     _, force = m.kane(tape, 7, [body])
     (found,) = function_of(tape, [*SPEEDS, torque], force[6:])(*[0.7] * 9)
     assert found == pytest.approx(0.7 - ABOUT * AXLE @ turned, rel=1e-14)

@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.exceptions import GeometryError
-from vehiclemor.multibody.structure import Structure
+from vehiclemor.multibody.definition import Structure
 from vehiclemor.simulation.evaluation import address_of
 from vehiclemor.simulation.structures import time_loops as compiled
 from vehiclemor.simulation.structures.sparse_loops import Blocks, Columns
