@@ -14,7 +14,7 @@ from vehiclemor.codegen import loops as module
 from vehiclemor.codegen.compiler import compiled_loops, inlined_kernel
 from vehiclemor.codegen.kernels import Kernels, MachineCode
 from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, declared_arguments
-from vehiclemor.codegen.loops import Loop, address_of_array, cache_lines, ready
+from vehiclemor.codegen.loops import Loop, address_of_array, ready
 
 
 class Pair(NamedTuple):
@@ -92,14 +92,6 @@ def test_prepared_arguments_serve_many_runs_and_their_words_can_be_replaced(loop
     run()
     np.testing.assert_allclose(results[1], 2.0 * results[0], rtol=1e-14)
     assert run.words[run.address("bundle.rows") + 1] == len(bundle.rows)
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (7, 3), (1251, 64)])
-def test_matrices_begin_with_a_cache_line(shape):
-    for _ in range(5):
-        matrix = cache_lines(*shape)
-        assert (matrix.shape, matrix.ctypes.data % 64) == (shape, 0)
-        assert matrix.flags.carray
 
 
 def test_a_later_module_takes_the_place_of_an_earlier_one(bundle):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from vehiclemor.codegen.schedule import Batch, schedule
+from vehiclemor.codegen.lowering import Batch, schedule
 from vehiclemor.symbolic.program import Function
 
 

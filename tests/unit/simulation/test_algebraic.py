@@ -109,7 +109,7 @@ TIMES = np.array([0.0, 0.5])
         ),
         *(
             (call, arguments, named)
-            for call in ("residual", "jacobian", "newton_step")
+            for call in ("residual", "jacobian")
             for *arguments, named in (
                 (np.zeros(7), np.zeros(2), r"\bq\b.*\(8,\)"),
                 (np.zeros(8), np.zeros(3), r"\bu\b.*\(2,\)"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vehiclemor.simulation.integrators.mirror_image import partners, signs
+from vehiclemor.simulation.integrators.step_kernels import partners, signs
 
 
 def test_partners_are_told_by_names():

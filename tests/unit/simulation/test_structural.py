@@ -12,10 +12,9 @@ from scipy.sparse.linalg import spsolve
 import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
-from vehiclemor.simulation.structures.factors import blocks_of, factored
 from vehiclemor.simulation.structures.model import Periods, relative_error, wrong_matrices
 from vehiclemor.simulation.structures.sparse_loops import solve
-from vehiclemor.simulation.structures.system import DAMPED, weights_of
+from vehiclemor.simulation.structures.system import DAMPED, blocks_of, factored, weights_of
 
 TRUCK, HEIGHTS = "flexible_truck", ("road_FL", "road_FR", "road_RL", "road_RR")
 # Nothing takes energy away, and the tire, which is one-sided and damped, is gone.

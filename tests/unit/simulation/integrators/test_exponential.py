@@ -12,7 +12,7 @@ from scipy.linalg import block_diag, expm
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import maneuver
 from vehiclemor.simulation.control_periods import whole_space
-from vehiclemor.simulation.integrators.exponential_functions import (
+from vehiclemor.simulation.integrators.etdrk4 import (
     exponential_tables,
     phi_functions,
 )
