@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -149,7 +148,5 @@ def _write_folder(path: Path, files: dict[str, str]) -> Path:
         make_folder(temporary)
         for name, text in files.items():
             (temporary / name).write_text(text, encoding="utf-8")
-        if path.exists():
-            shutil.rmtree(path)
 
     return write_whole(path, write)

@@ -6,6 +6,7 @@ of eigenvalue zero.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -98,7 +99,7 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
     )
 
 
-def eigenmodes(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def eigenmodes(a: np.ndarray) -> tuple[Any, Any, Any]:
     """Eigenvalues (n,), left eigenvectors by rows (n, n), and the inverse of these."""
     values, vectors = np.linalg.eig(a.T)
     # Signs and phases are free, and processors find others: one component becomes positive.
