@@ -128,7 +128,6 @@ amplitude_factor = { first = 0.5, last = 0.9, count = 60 }
 def test_what_can_not_be_run_is_told_before_the_first_cell(tmp_path, model, text, words):
     methods = () if "methods" in text else ("full_order",)
     path = small_study(tmp_path, f"{text}\n", *methods, model=model)
-    with pytest.raises(FileError, match=words) as error:
+    with pytest.raises(FileError, match=words):
         vm.run_study(path, results=tmp_path / "results")
-    assert "\n" not in str(error.value)
     assert not (tmp_path / "results").exists()

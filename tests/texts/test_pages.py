@@ -56,6 +56,16 @@ def test_files_scripts_and_environments_that_a_page_names_are_there(path):
             tomllib.loads(block.content)
 
 
+def test_functions_that_the_page_on_the_method_names_are_in_their_files():
+    page = (DOCS / "method.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\|.*\| `([\w/]+\.py)` \| (`.*`) \|$", page, re.MULTILINE)
+    assert len(rows) > 8
+    for file, functions in rows:
+        source = (ROOT / "src" / "vehiclemor" / file).read_text(encoding="utf-8")
+        for name in re.findall(r"`([\w.]+)`", functions):
+            assert re.search(rf"(def|class) {name.split('.')[-1]}\b", source), (file, name)
+
+
 # Parsed and not run, here: what takes long.  Their options are checked, and the names of studies.
 @PAGES
 def test_commands_can_be_parsed(path):

@@ -88,6 +88,15 @@ def test_tangent_kernels_are_the_products_of_the_jacobian(model, rng):
 
 
 @pytest.mark.parametrize(
+    ("result", "size", "named"),
+    [(1, 2, "1"), (sp.nan, 1, "nan"), (sp.zoo, 1, "zoo"), (sp.I, 1, "I"), (y, 1, "y")],
+)
+def test_results_that_are_none_are_named(result, size, named):
+    with pytest.raises(ValueError, match=rf"\b{named}\b"):
+        assemble(Tape(), {"x": [x]}, [], {"f": ([result], (size,))})
+
+
+@pytest.mark.parametrize(
     ("expression", "named"),
     [
         (sp.sin(x + y), "sin"),

@@ -107,30 +107,6 @@ def test_range_weight_makes_every_moving_state_as_wide_as_the_others(model):
     np.testing.assert_allclose(np.ptp(scaled, axis=0), 1.0)
 
 
-def test_weighted_basis_spans_what_pymor_finds(model):
-    from pymor.algorithms.pod import pod as pymor_pod
-    from pymor.operators.numpy import NumpyMatrixOperator
-
-    window, rank = 3, 3
-    reduced = fitted(model, inner_product="energy", snapshots=8, rank=rank)
-    times = np.linspace(*reduced.spaces.edges[window : window + 2], 8)
-    snapshots = model.simulate(lane_change, None, times).coordinates
-    weight = model.mass_matrix(model.start())
-    operator = NumpyMatrixOperator(weight)
-    centred = operator.source.from_numpy((snapshots - snapshots.mean(axis=0)).T)
-    modes, values = pymor_pod(centred, product=operator, modes=rank)
-    found = modes.to_numpy()
-    projector = found @ found.T @ weight
-    basis = reduced.bases[window]
-    np.testing.assert_allclose(basis.singular_values[:rank], values, rtol=1e-4)
-    mine = basis.vectors @ basis.vectors.T @ weight
-    # What the third mode holds is small beside rounding of the first: compare on the snapshots.
-    centred_rows = snapshots - snapshots.mean(axis=0)
-    scale = np.abs(centred_rows).max(axis=0)
-    difference = centred_rows @ (mine - projector).T / scale
-    assert np.abs(difference).max() < 1e-6
-
-
 def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
     reduced = fitted(model)
     whole = in_windows(STATE, [0.0, 25.0])
