@@ -7,13 +7,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from sphinx.application import Sphinx
-from sphinx.util import logging as sphinx_logging
 
 DOCS = Path(__file__).parent
-# Beside this file are two modules; the numbers of the pages are in `paper`.
-sys.path[:0] = [str(DOCS), str(DOCS.parent / "paper")]
-
-from numbers_by_name import render  # noqa: E402
+# Beside this file are two modules.
+sys.path.insert(0, str(DOCS))
 
 import vehiclemor  # noqa: E402
 
@@ -78,13 +75,8 @@ html_static_path = ["_static", str(FONTS / "STIXTwoMath-Regular.ttf")]
 html_math_renderer = "mathml"
 
 
-def with_numbers(_: Sphinx, name: str, source: list[str]) -> None:
-    """Put measured numbers into a page; in tables no line breaks within 4.9e-7."""
-    if "{{" in source[0]:
-        try:
-            source[0] = render(source[0], name=name)
-        except KeyError as error:
-            sphinx_logging.getLogger(__name__).warning("%s", error, location=name)
+def unbroken(_: Sphinx, _name: str, source: list[str]) -> None:
+    """In tables no line breaks within 4.9e-7."""
     rows = re.compile(r"^\|.*", re.MULTILINE)
     source[0] = rows.sub(lambda row: re.sub(r"(?<=\de)-(?=\d+ )", "\u2011", row[0]), source[0])
 
@@ -108,5 +100,5 @@ def write_file_reference(app: Sphinx) -> None:
 
 def setup(app: Sphinx) -> None:
     """Tell Sphinx of the functions above."""
-    app.connect("source-read", with_numbers)
+    app.connect("source-read", unbroken)
     app.connect("builder-inited", write_file_reference)

@@ -1,6 +1,6 @@
 """Numbers of README, pages and paper by name, from stored results: `paper/numbers.json`.
 
-Usage: python paper/measured_numbers.py [--results DIR] [--readme] [--list PATTERN]
+Usage: python paper/measured_numbers.py [--results DIR] [--texts] [--list PATTERN]
 
 A name is a place in a table: `predictive.double_wishbone.path_map.misses`.  Nothing is computed
 anew.  Numbers whose file the results folder lacks stay as they are, and the script says which.
@@ -35,7 +35,7 @@ from vehiclemor.files import write_text
 from vehiclemor.registry import component, names
 from vehiclemor.report.printed_numbers import TIMING
 
-README, SOURCE = (FILE.parents[1] / name for name in ("README.md", "docs/README.md.in"))
+ROOT = FILE.parents[1]
 # Last part of a name -> its unit; an error has that of its output.
 UNITS = {"us": "us", "offline_us": "us", "ns_per_sample": "ns", "median": "s"}
 UNITS |= {"growth_rate": "1/s", "growth_largest": "1/s"}
@@ -97,11 +97,19 @@ def measured(results: Path, known: dict[str, Any]) -> dict[str, Any]:
     return dict(sorted(numbers.items()))
 
 
+def texts(root: Path, numbers: dict[str, Any]) -> Iterator[tuple[Path, str]]:
+    """Each text with numbers, as it should be: from `docs/NAME.md.in`; README stands above."""
+    for source in sorted((root / "docs").glob("*.md.in")):
+        folder = root if source.stem == "README.md" else source.parent
+        text = source.read_text(encoding="utf-8")
+        yield folder / source.stem, render(text, numbers, source.name)
+
+
 def main() -> None:
-    """Write the numbers and README, or list names."""
+    """Write the numbers and the texts with numbers, or list names."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
-    parser.add_argument("--readme", action="store_true", help="only render README")
+    parser.add_argument("--texts", action="store_true", help="only put numbers into the texts")
     parser.add_argument("--list", metavar="PATTERN", help="only list names that match")
     wanted = parser.parse_args()
     known = load() if FILE.exists() else {}
@@ -109,11 +117,12 @@ def main() -> None:
         for name in filter(re.compile(wanted.list).search, known):
             print(f"{name} = {known[name]['value']:g} {known[name]['unit']}")
         return
-    if not wanted.readme:
+    if not wanted.texts:
         known = measured(wanted.results, known)
         rows = (f"{json.dumps(name)}: {json.dumps(entry)}" for name, entry in known.items())
         write_text(FILE, "{\n" + ",\n".join(rows) + "\n}\n")
-    write_text(README, render(SOURCE.read_text(encoding="utf-8"), known, SOURCE.name))
+    for path, text in texts(ROOT, known):
+        write_text(path, text)
 
 
 if __name__ == "__main__":

@@ -1,17 +1,18 @@
 """Small reference results of the models, and how they are made.
 
-`python -m tests.reference.results MODEL` writes its file in `data/reference` anew.  Do that only
+`python -m tests.reference.results MODEL` writes its file beside this one anew.  Do that only
 when a change of results is meant, and say so in the commit and the changelog.
 """
 
 import json
 import sys
+from pathlib import Path
 
 import numpy as np
 
 import vehiclemor as vm
-from vehiclemor.resources import data_folder
 
+FOLDER = Path(__file__).parent
 MECHANISM = "double_wishbone"
 STRONGEST = {"method": "full_order", "preset": "strongest"}
 PAPER = {"method": "full_order", "preset": "paper"}
@@ -88,7 +89,7 @@ def current(name: str) -> dict:
 
 def main() -> None:
     name = sys.argv[1]
-    path = data_folder() / "reference" / f"{name}.json"
+    path = FOLDER / f"{name}.json"
     path.write_text(json.dumps(current(name), indent=1) + "\n")
 
 

@@ -5,13 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from tests.reference.results import MECHANISM, RUNS, current
-from vehiclemor.resources import data_folder
+from tests.reference.results import FOLDER, MECHANISM, RUNS, current
 
 
 @pytest.mark.parametrize("name", RUNS)
 def test_results_are_those_of_the_reference(name):
-    known = json.loads((data_folder() / "reference" / f"{name}.json").read_text())
+    known = json.loads((FOLDER / f"{name}.json").read_text())
     now = current(name)
     assert now.keys() == known.keys()
     assert now["operations"] == known["operations"]

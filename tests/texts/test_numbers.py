@@ -1,4 +1,4 @@
-"""Texts take measured numbers by name; README is current, and a missing name is an error."""
+"""Texts take measured numbers by name; they are current, and a missing name is an error."""
 
 import json
 import re
@@ -12,10 +12,15 @@ from numbers_by_name import load, render, shown
 NUMBERS = load()
 
 
-def test_readme_is_rendered_and_keeps_its_commands():
-    source = measured_numbers.SOURCE.read_text(encoding="utf-8")
-    readme = measured_numbers.README.read_text(encoding="utf-8")
-    assert readme == render(source), "run `python paper/measured_numbers.py --readme`"
+def test_texts_hold_their_numbers():
+    texts = dict(measured_numbers.texts(measured_numbers.ROOT, NUMBERS))
+    assert {"README.md", "findings.md"} <= {path.name for path in texts}
+    for path, text in texts.items():
+        assert path.read_text(encoding="utf-8") == text, "run `paper/measured_numbers.py --texts`"
+
+
+def test_readme_is_short_and_keeps_its_commands():
+    readme = (measured_numbers.ROOT / "README.md").read_text(encoding="utf-8")
     assert len(readme.splitlines()) <= 90
     # Continuous integration runs them.
     blocks = re.findall(r"^```sh\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
@@ -66,9 +71,9 @@ def test_the_script_reads_what_is_stored_and_keeps_the_rest(results, monkeypatch
     assert "benchmark.json: missing; 1 numbers stay" in capsys.readouterr().err
 
     monkeypatch.setattr(measured_numbers, "FILE", results / "numbers.json")
-    monkeypatch.setattr(measured_numbers, "README", results / "README.md")
-    monkeypatch.setattr(measured_numbers, "SOURCE", results / "source.in")
-    (results / "source.in").write_text('a step takes {{ n("in_use.gv_step", "d") }} us\n')
+    monkeypatch.setattr(measured_numbers, "ROOT", results)
+    (results / "docs").mkdir()
+    (results / "docs/README.md.in").write_text('a step takes {{ n("in_use.gv_step", "d") }} us\n')
     monkeypatch.setattr("sys.argv", ["measured_numbers.py", "--results", str(results)])
     measured_numbers.main()
     assert (results / "README.md").read_text() == "a step takes 12 us\n"
