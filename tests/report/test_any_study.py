@@ -17,6 +17,7 @@ from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import component
 from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
+from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.result_plot import plot_result
 from vehiclemor.report.figures.theme import styled
@@ -223,6 +224,17 @@ def test_comparison_names_every_method(folder, capsys):
     # More accurate with a tighter tolerance, whatever the model.
     scores = [unseen[f"full order {t}"]["score"] for t in ("1e-3", "1e-6")]
     assert scores[1] < scores[0]
+
+
+def test_figures_are_those_of_every_model(folder, tmp_path, capsys, monkeypatch):
+    # One picture of each figure is enough here.
+    monkeypatch.setattr(theme, "FORMATS", ("png",))
+    names = [f"{kind}-{CAR}" for kind in ("histories", "errors", "map", "pareto")]
+    arguments = ["--results", str(folder), "--out", str(tmp_path), "--only", ",".join(names)]
+    assert main(["figures", *arguments]) == 0
+    written = capsys.readouterr().out.split()
+    assert written == [str(tmp_path / f"figure-{name}.png") for name in names]
+    assert all(np.fromfile(path, dtype=np.uint8).size > 10_000 for path in written)
 
 
 def test_a_plug_ins_method_stands_beside_the_others(tmp_path, monkeypatch):

@@ -76,8 +76,10 @@ def test_kernels_are_the_specified_residual_and_its_derivatives(model, program, 
         np.testing.assert_allclose(model.residual(q, u), expected, rtol=0, atol=2e-15)
         values = dict(zip([*names["q"], *names["u"]], [*q, *u], strict=True)) | parameters
         np.testing.assert_allclose(run(program, "residual", values), expected, rtol=0, atol=2e-15)
-        exact = complex_step.jacobian(kernel, (q, u, model.constants), 0)
-        np.testing.assert_allclose(model.jacobian(q, u), exact, rtol=0, atol=2e-15)
+        for place, by in enumerate(("state", "inputs")):
+            exact = complex_step.jacobian(kernel, (q, u, model.constants), place)
+            jacobian = model.jacobian(q, u, by, "residual")
+            np.testing.assert_allclose(jacobian, exact, rtol=0, atol=2e-15)
 
 
 def test_tangent_kernels_are_the_products_of_the_jacobian(model, rng):

@@ -177,32 +177,19 @@ def test_paths_of_another_shape_or_not_finite_are_refused(each_model, function):
         call(bad, inputs)
 
 
+NO_TIMES = [], [0.0, 2.0, 1.0], [0.0, 1e3], [-1.0, 0.0], [0.0, np.nan], [[0, 1]], 1, "a"
+NO_STARTS = np.zeros(3), np.zeros((2, 8)), [np.nan] * 28, "abc", 1.0
+
+
 @pytest.mark.parametrize(
-    ("argument", "wrong", "named"),
-    [
-        *(
-            ("times", times, "output times")
-            for times in (
-                [],
-                [0.0, 2.0, 1.0],
-                [0.0, 1e3],
-                [-1.0, 0.0],
-                [0.0, np.nan],
-                [[0, 1]],
-                1,
-                "a",
-            )
-        ),
-        *(
-            ("start", start, "start")
-            for start in (np.zeros(3), np.zeros((2, 8)), [np.nan] * 28, "abc", 1.0)
-        ),
-    ],
+    ("argument", "values", "named"),
+    [("times", NO_TIMES, "output times"), ("start", NO_STARTS, "start")],
 )
-def test_times_and_starts_that_are_none_are_refused(each_model, argument, wrong, named):
+def test_times_and_starts_that_are_none_are_refused(each_model, argument, values, named):
     maneuver = component("maneuver", each_model.definition.maneuver)
-    with pytest.raises(InputError, match=named):
-        each_model.simulate(maneuver, **{argument: wrong})
+    for wrong in values:
+        with pytest.raises(InputError, match=named):
+            each_model.simulate(maneuver, **{argument: wrong})
 
 
 def test_a_reduced_mechanism_that_diverges_tells_its_counts(model, nominal):
