@@ -43,12 +43,18 @@ def trust_of(times: np.ndarray, used: np.ndarray, names: Sequence[str]) -> Trust
 
     What is no number is beyond it.
     """
+    return trust_in(ranges_of(times, used, names))
+
+
+def ranges_of(
+    times: np.ndarray, used: np.ndarray, names: Sequence[str]
+) -> dict[str, tuple[float, float]]:
+    """How much a run uses of each range, and since when (s) it is beyond it."""
     used = np.abs(used)
     largest = np.fmax.reduce(used, axis=0, initial=0.0)
     beyond = ~(used <= 1.0)
     since = np.where(beyond.any(axis=0), times[beyond.argmax(axis=0)], np.inf)
-    found = zip(largest.tolist(), since.tolist(), strict=True)
-    return trust_in(dict(zip(names, found, strict=True)))
+    return dict(zip(names, zip(largest.tolist(), since.tolist(), strict=True), strict=True))
 
 
 def trust_in(ranges: Mapping[str, tuple[float, float]]) -> Trust:
@@ -60,6 +66,12 @@ def trust_in(ranges: Mapping[str, tuple[float, float]]) -> Trust:
     # Of what was zero in training no multiple tells anything.
     times = f", in the run up to {indicator:.3g} times" if indicator < 1e6 else ""
     return Trust(indicator, until, f"{name} is beyond its known range{times}")
+
+
+def largest_samples(maneuvers: Sequence[Maneuver]) -> np.ndarray:
+    """Largest magnitudes (1, inputs) of inputs of kinematic models, at output times."""
+    values = [np.abs(maneuver.at(maneuver.times)).max(axis=0) for maneuver in maneuvers]
+    return EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
 
 
 def largest_inputs(maneuvers: Sequence[Maneuver]) -> np.ndarray:
@@ -108,7 +120,7 @@ class InputRange:
     # Middle of the initial speeds in m/s, and how far they lie from it.
     speed: float
     reach: float
-    # Duration of the longest run in s; a kinematic model has no memory, and any is known.
+    # Duration of the longest run in s; any is known of a model without memory.
     longest: float
     # Inputs of the training runs (runs, samples, inputs) at equidistant times of the first, where
     # the model follows the times of its training; else none.
@@ -127,11 +139,12 @@ class InputRange:
         """How far a run with an initial speed in m/s goes in the range."""
         maneuver = maneuver.for_inputs(model.inputs)
         if model.kind == "ae":
-            return self.trust_of_inputs(model.inputs, maneuver.at(maneuver.times), maneuver.times)
-        of_inputs = self._bands if model.kind == "structural" else self._extents
-        ranges = of_inputs(model.inputs, maneuver)
-        off = abs(speed - self.speed) / self.reach
-        ranges["initial speed"] = off, 0.0 if off > 1.0 else np.inf
+            ranges = self._samples(model.inputs, maneuver.at(maneuver.times), maneuver.times)
+        else:
+            of_inputs = self._bands if model.kind == "structural" else self._extents
+            ranges = of_inputs(model.inputs, maneuver)
+            off = abs(speed - self.speed) / self.reach
+            ranges["initial speed"] = off, 0.0 if off > 1.0 else np.inf
         lasts = maneuver.duration / self.longest
         ranges["duration"] = lasts, self.longest if lasts > 1.0 else np.inf
         if self.histories is not None:
@@ -174,12 +187,15 @@ class InputRange:
         beyond = np.flatnonzero(nearest > 1.0)
         return float(nearest.max()), float(times[beyond[0]]) if len(beyond) else np.inf
 
-    def trust_of_inputs(
-        self, names: Sequence[str], inputs: np.ndarray, times: np.ndarray | None = None
-    ) -> Trust:
+    def trust_of_inputs(self, names: Sequence[str], inputs: np.ndarray) -> Trust:
         """How far inputs (samples, inputs) go in the range, each for itself."""
-        times = np.zeros(len(inputs)) if times is None else times
-        return trust_of(times, inputs / self._sizes[0], [f"input {name}" for name in names])
+        return trust_in(self._samples(names, inputs, np.zeros(len(inputs))))
+
+    def _samples(
+        self, names: Sequence[str], inputs: np.ndarray, times: np.ndarray
+    ) -> dict[str, tuple[float, float]]:
+        """How far samples of inputs go in magnitude."""
+        return ranges_of(times, inputs / self._sizes[0], [f"input {name}" for name in names])
 
 
 def input_range(
@@ -194,14 +210,13 @@ def input_range(
     low, high = min(speeds), max(speeds)
     middle = 0.5 * (low + high)
     reach = EDGE * (max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0)
-    if model.kind == "ae":
-        values = [np.abs(m.at(m.times)).max(axis=0) for m in maneuvers]
-        largest = EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
-        return InputRange(largest, middle, reach, np.inf)
     longest = max(maneuver.duration for maneuver in maneuvers)
     histories = None
     if follows_time:
         times = np.linspace(0.0, longest, maneuvers[0].samples)
         histories = np.array([maneuver.at(times) for maneuver in maneuvers])
-    largest_of = largest_bands if model.kind == "structural" else largest_inputs
-    return InputRange(largest_of(maneuvers), middle, reach, longest * EDGE, histories)
+    largest_of = {"ae": largest_samples, "structural": largest_bands}.get(
+        model.kind, largest_inputs
+    )
+    lasts = np.inf if model.kind == "ae" and not follows_time else EDGE * longest
+    return InputRange(largest_of(maneuvers), middle, reach, lasts, histories)

@@ -126,6 +126,15 @@ def test_bounds_of_inputs_hold_between_output_times_in_full_order_too():
     assert "holds from -1.066 to 1.066 rad" in many["message"].values[0]
 
 
+def test_pod_of_the_suspension_tells_that_an_input_is_another():
+    pod = vm.reduce("double_wishbone", "pod", rank=3, training="nominal")
+    assert pod.simulate("sine_travel").status == "ok"
+    for factors in ({"frequency": 1.2}, {"amplitude": 0.9}):
+        run = pod.simulate(vm.maneuver("sine_travel", **factors))
+        assert run.status == "untrusted"
+        assert "difference from the inputs of training runs" in run.message
+
+
 def test_pod_tells_when_it_leaves_its_training_run():
     car = vm.model(CAR)
     pod = vm.reduce(car, "pod", rank=3, training="nominal")

@@ -59,7 +59,7 @@ def test_the_full_model_answers_as_the_model_itself(full):
 def test_the_order_of_named_columns_changes_no_trust():
     t = np.linspace(0.0, 2.0, 101)
     u = np.column_stack([0.1 * np.sin(t), 0.01 * np.cos(t)])
-    trained = vm.reduce(WISHBONE, "pod", training=[vm.Signal.from_samples(t, 1.01 * u)])
+    trained = vm.reduce(WISHBONE, "fixed_basis", training=[vm.Signal.from_samples(t, 1.01 * u)])
     steered = np.column_stack([0.0 * t, 0.02 * np.sin(t)])
     named = trained.inputs[::-1]
     one = trained.simulate(vm.Signal.from_samples(t, steered))
@@ -70,7 +70,7 @@ def test_the_order_of_named_columns_changes_no_trust():
     assert trained.simulate(first).trust.indicator < 1.0
     again = vm.reduce(
         WISHBONE,
-        "pod",
+        "fixed_basis",
         training=[vm.Signal.from_samples(t, 1.01 * u[:, ::-1], inputs=named)],
     )
     np.testing.assert_array_equal(again.input_range.largest, trained.input_range.largest)
