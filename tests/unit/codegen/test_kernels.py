@@ -16,8 +16,9 @@ from vehiclemor.codegen import kernels as module
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.lowering import kernels_of
 from vehiclemor.codegen.operations import COUNTED, Kernel
+from vehiclemor.codegen.schedule import Batch, schedule
 from vehiclemor.multibody.double_wishbone.definition import DEFINITION
-from vehiclemor.symbolic.program import Program, assemble
+from vehiclemor.symbolic.program import Function, Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 x, y, p = sp.symbols("x y p", real=True)
@@ -132,6 +133,19 @@ def product(x, u, constants, result):
 
 
 DOUBLE, PRODUCT = times(2.0), kernel(product, columns=2)
+
+
+def test_the_same_quantity_of_all_wheels_stands_side_by_side_in_one_batch():
+    a, b, slips, angles, assignments = *sp.symbols("a b"), [], [], []
+    for wheel in range(4):
+        x, slip, angle = (sp.Symbol(f"{name}{wheel}") for name in ("x", "slip", "angle"))
+        # What common subexpressions leave behind: signs and orders of operands differ.
+        assignments += [(slip, a - x if wheel % 2 else a + x), (angle, b / (x * x + 1))]
+        slips, angles = [*slips, slip], [*angles, angle]
+    results = tuple(sp.atan(s) * sp.atan(t) for s, t in zip(slips, angles, strict=True))
+    steps = schedule(Function(tuple(assignments), results, (4,)))
+    (batch,) = [step for step in steps if isinstance(step, Batch)]
+    assert {batch.arguments[:4], batch.arguments[4:]} == {tuple(slips), tuple(angles)}
 
 
 @pytest.fixture
