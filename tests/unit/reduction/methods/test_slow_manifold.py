@@ -16,7 +16,7 @@ from vehiclemor.reduction.vehicle.features import feature_columns
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_features import SlowFeatures, add_fiala
 from vehiclemor.reduction.vehicle.slow_modes import slow_modes
-from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets_of
+from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets_of
 from vehiclemor.simulation.build import build
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
@@ -216,6 +216,27 @@ def test_symmetric_modes_are_modes_that_steering_does_not_move(car):
     np.testing.assert_allclose(left @ a, modes.rates[k:, k:] @ left, atol=1e-4)
     np.testing.assert_allclose(left @ right, np.eye(4), atol=1e-6)
     assert np.abs(modes.input_matrix[k:]).max() < 1e-6 * np.abs(modes.input_matrix[:k]).max()
+
+
+def test_sensitivities_are_the_differences_of_runs(vehicle):
+    reduced = replace(fitted(vehicle, steps=0), solver="dopri5", tolerance=1e-9)
+    run = TrainingRun(vehicle, lane_change, "equilibrium")
+    target = targets_of(reduced, [run], [run.at(lane_change.times)])[0]
+    term, k = 16, reduced.features.states
+    free = [([term], 0), ([term], k)]
+    path = reduced.path(lane_change, "equilibrium")
+    weights = np.ones((len(target.compared), k + 3))
+    found = _sensitivities(reduced, target, path, free, weights)
+    for place, (_, column) in enumerate(free):
+        changed = reduced.coefficients.copy()
+        width = 1e-3 * np.abs(changed[:, column]).max()
+        changed[term, column] += width
+        other = replace(reduced, coefficients=changed).path(lane_change, "equilibrium")
+        difference = (other - path)[target.compared] / width
+        size = np.abs(difference).max(axis=0)
+        wrong = np.abs(found[:, :, place] - difference).max(axis=0)
+        # The variational equations are solved with the output times as steps.
+        assert np.all(wrong <= 0.05 * size + 1e-8)
 
 
 def test_gauss_newton_steps_bring_reduced_runs_nearer_to_the_training_runs(vehicle):
