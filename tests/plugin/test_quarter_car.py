@@ -15,7 +15,9 @@ from scipy.linalg import expm
 import vehiclemor as vm
 from vehiclemor import registry
 from vehiclemor.cli import main
+from vehiclemor.contracts import check_method
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.labels import main_outputs, of_kind, tabled_outputs, timing_cases
@@ -245,3 +247,15 @@ def test_a_write_that_ends_early_leaves_nothing(here, monkeypatch, error):
     with suppress(KeyboardInterrupt):
         assert main(["new-plugin", "my_car"]) != 0
     assert not list(here.iterdir())
+
+
+def test_a_vehicle_is_near_its_modes_at_small_amplitude():
+    check_method("quarter_car_modes", "independent_suspension_vehicle")
+    model = vm.model("independent_suspension_vehicle")
+    small = replace(lane_change, amplitude_factor=1e-3, duration=10.0, samples=1001)
+    full = model.simulate(small, tolerance=1e-9)
+    run = fitted(model, fastest=1e4).simulate(small, model.starts[0])
+    for name in ("yaw_rate", "roll", "lateral_position"):
+        column = model.outputs.index(name)
+        error = np.abs(run.outputs[:, column] - full.outputs[:, column]).max()
+        assert error < 2e-3 * np.abs(full.outputs[:, column]).max()

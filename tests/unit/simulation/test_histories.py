@@ -10,6 +10,7 @@ import pytest
 
 import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, InputError
+from vehiclemor.inputs.steering import lane_change
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.registry import component
 from vehiclemor.simulation import run_timer
@@ -19,6 +20,7 @@ from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.system import Solver
 from vehiclemor.simulation.trajectory import (
     ALGEBRAIC_COUNTS,
+    DYNAMIC_COUNTS,
     trajectory_dataset,
 )
 from vehiclemor.study.result import variables
@@ -45,6 +47,18 @@ def test_dataset_is_labelled_with_names_and_units(model, full):
         assert set(dataset[name][f"{label}_unit"].values) == {"m", "rad"}
     own = dataset["outputs"].sel(output="second_euler_angle")["output_unit"]
     assert str(own.item()) == "rad"
+
+
+def test_speeds_and_counts_of_a_dynamic_model_are_written():
+    vehicle = build("independent_suspension_vehicle")
+    run = vehicle.simulate(lane_change, times=[0.0, 0.5, 2.0])
+    dataset, name = trajectory_dataset(vehicle, run), vehicle.speeds[2]
+    speed = dataset["speeds"].sel(speed=name)
+    np.testing.assert_array_equal(speed, run.speeds[:, 2])
+    np.testing.assert_array_equal(run.states, np.hstack((run.coordinates, run.speeds)))
+    assert str(speed["speed_unit"].item()) == "m/s"
+    assert {count: int(dataset[count]) for count in DYNAMIC_COUNTS} == run.counts
+    assert not set(dataset.variables) & (set(ALGEBRAIC_COUNTS) - set(DYNAMIC_COUNTS))
 
 
 def test_measures_of_an_error():
