@@ -299,20 +299,15 @@ def in_use(dataset: xr.Dataset) -> Iterator[Entry]:
 
 
 def benchmark(rows: dict[str, Any]) -> Iterator[Entry]:
-    """Medians of benchmarks; of other libraries what they count and how far they are off."""
+    """Medians of benchmarks."""
     for row in rows["benchmarks"]:
         case = re.split(r"/test_|\.py::test_|[\[\]]", row["fullname"])[1:]
         yield slug("benchmark", *case, "median"), row["stats"]["median"]
-        if "other_libraries" in case:
-            yield from ((slug("benchmark", *case, k), v) for k, v in row["extra_info"].items())
 
 
 def peers(cases: dict[str, Any]) -> Iterator[Entry]:
     """Times of each tool at each error, per run or step, and over those of the fastest here."""
     report = SimpleNamespace(**runpy.run_path(str(PEERS)))
-    cases = dict(cases)
-    for who, row in cases.pop("other-vehicles")["rows"].items():
-        yield slug("peers", "other-vehicles", who, "seconds"), row["seconds"]
     for name, case in cases.items():
         for kind, target in product(report.kinds(case), case["targets"]):
             curves = {k: c["points"] for k, c in case["curves"].items() if c["delivers"] == kind}

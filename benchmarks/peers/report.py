@@ -1,39 +1,13 @@
-"""Tables and figures of what was measured: whoever is faster stands first."""
+"""Tables of what was measured: whoever is faster stands first."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.report.figures import theme
-
 OURS = "ours"
 HEADER = ("who", "CPU time", "spread", "over ours", "at tolerance", "error", "rhs calls")
-BLUE, RED, GREEN, PINK, ORANGE, CYAN = theme.COLORS
-DOTTED = (0, (1, 1))
-# Beginning of a label -> color, line and its width.
-LINES: dict[str, tuple[str, Any, float]] = {
-    "ours": ("black", "-", 2.2),
-    "ours ros34pw2": ("black", DOTTED, 1.4),
-    "ours exponential_adams": ("black", "--", 1.4),
-    "ours newton": ("black", "--", 1.4),
-    "ours newton_lanes": ("black", "-", 2.2),
-    "CVODE in C": (RED, "--", 1.4),
-    "CVODE in C, bare rhs": (RED, "-", 2.2),
-    "CasADi": (BLUE, "--", 1.4),
-    "CasADi CVODES, C code": (BLUE, "-", 1.4),
-    "CasADi Runge-Kutta": (BLUE, DOTTED, 1.4),
-    "scikit-sundae CVODE": (GREEN, "-", 1.4),
-    "scikit-sundae IDA": (GREEN, "--", 1.4),
-    "SciPy": (PINK, "-", 1.4),
-    "JAX": (ORANGE, "-", 1.4),
-    "Exudyn": (CYAN, "-", 1.4),
-}
-# Errors are drawn down to this part of the tightest target; smaller ones stand there.
-SEEN = 0.02
-
 # What times are divided by, where it is nothing.
 ONCE = (1, "")
 
@@ -52,17 +26,6 @@ def choose(points: Points, target: float) -> Mapping[str, Any] | None:
             break
         good.append(point)
     return min(good, key=lambda p: p["seconds"], default=None)
-
-
-def front(scans: Iterable[Points], least: float = 0.0) -> list[tuple[float, float]]:
-    """Errors, the smallest `least`, and the least seconds in which a scan keeps them."""
-    scans, found = list(scans), []
-    for error in sorted({max(p["error"], least) for points in scans for p in points}):
-        chosen = [point for points in scans if (point := choose(points, error))]
-        seconds = min((point["seconds"] for point in chosen), default=np.inf)
-        if seconds < (found[-1][1] if found else np.inf):
-            found.append((error, seconds))
-    return found
 
 
 def rows(case: Mapping[str, Any], target: float, delivers: str) -> list[tuple[str, ...]]:
@@ -153,50 +116,3 @@ def absent(case: Mapping[str, Any]) -> list[str]:
     """A row for each peer that is not there, or that can't do it."""
     missing = case["missing"].items()
     return [*table(("not measured", "why"), missing), ""] if missing else []
-
-
-def context_text(case: Mapping[str, Any]) -> str:
-    """Other vehicles and scenes, for scale alone."""
-    lines = [f"## {case['title']}", "", f"{case['clock']}; {case['about']}", ""]
-    by_time = sorted(case["rows"].items(), key=lambda pair: pair[1]["seconds"])
-    body = [(k, time_text(r["seconds"]), r["what"]) for k, r in by_time]
-    lines += table(("who", "CPU time for a simulated second", "what"), body)
-    return "\n".join([*lines, "", *absent(case)])
-
-
-def drawn(case: Mapping[str, Any]) -> dict[str, list[tuple[float, float]]]:
-    """Work-precision lines of what is delivered first; those of SciPy as the best of them."""
-    scans: dict[str, list[Points]] = {}
-    for label, curve in case["curves"].items():
-        if curve["delivers"] == kinds(case)[0]:
-            name = "SciPy, the best" if label.startswith("SciPy") else label
-            scans.setdefault(name, []).append(curve["points"])
-    least = SEEN * min(case["targets"])
-    return {label: front(points, least) for label, points in scans.items()}
-
-
-def draw(panel: Any, case: Mapping[str, Any]) -> None:
-    """Lines of one comparison."""
-    for label, points in drawn(case).items():
-        x, y = np.array(points).reshape(-1, 2).T
-        known = max((k for k in LINES if label.startswith(k)), key=len)
-        color, dashes, width = LINES[known]
-        style = {"color": color, "linestyle": dashes, "linewidth": width}
-        milliseconds = 1e3 * y / case.get("per", ONCE)[0]
-        panel.loglog(x, milliseconds, label=label, marker=".", markersize=4, **style)
-    panel.invert_xaxis()
-    theme.tick_decades(panel.yaxis, *panel.get_ylim())
-    panel.set_xlabel(f"error ({case['unit']})")
-
-
-def figure(cases: Mapping[str, Mapping[str, Any]], path: Path) -> None:
-    """Work-precision of the comparisons of one model, a panel each, as PNG and PDF."""
-    with theme.styled():
-        made, panels = theme.panels(1, len(cases), (3.3 * max(len(cases), 1.4), 3.7))
-        for number, (case, panel) in enumerate(zip(cases.values(), panels[0], strict=True)):
-            draw(panel, case)
-            panel.set_title(theme.letter(number, case["panel"]) if len(cases) > 1 else "")
-        panels[0, 0].set_ylabel("CPU time (ms)")
-        theme.legend_below(made, made.axes)
-        for kind in ("png", "pdf"):
-            theme.save_figure(made, path.with_name(f"{path.name}.{kind}"))

@@ -8,7 +8,6 @@ What is stored in DIR/peers.json is not measured again unless asked for.
 import argparse
 import datetime
 import json
-import time
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
@@ -16,13 +15,10 @@ from typing import Any
 import clock
 import report
 
-from vehiclemor.files import make_folder, write_text
+from vehiclemor.files import write_text
 from vehiclemor.provenance import machine
 
-PACKAGES = (
-    "vehiclemor numpy numba scipy casadi scikit-sundae exudyn mujoco jax diffrax "
-    "commonroad-vehicle-models"
-)
+PACKAGES = "vehiclemor numpy numba scipy casadi scikit-sundae exudyn jax diffrax"
 # Kind of a case -> files of the peers that can do it.
 PEERS = {
     "run": ("ours", "c_cvode", "sundae", "casadi_ode", "scipy_peer"),
@@ -30,7 +26,6 @@ PEERS = {
     "batch": ("ours", "c_cvode", "jax_diffrax"),
     "mechanism": ("ours", "casadi_ode", "scipy_peer", "exudyn_models"),
     "structure": ("ours", "scipy_peer", "exudyn_models"),
-    "context": ("mujoco_scene", "commonroad"),
 }
 NO_TIRES = "no Magic Formula and no Fiala tire: its car would be another one"
 # Kind or case -> peers, and tools that a user would think of, and why they are no row.
@@ -46,8 +41,6 @@ CANNOT = {
         "jax_diffrax": "XLA had not compiled this car after two minutes, at 4 GB"
     },
 }
-CONTEXT = "other-vehicles"
-PANELS = {"run": "a run", "steps": "a step of 10 ms", "batch": "a run of a batch"}
 
 
 def compared(name: str) -> dict[str, Any]:
@@ -58,7 +51,6 @@ def compared(name: str) -> dict[str, Any]:
     curves, missing = clock.collected(peers, case.kind, case)
     return {
         "title": case.title,
-        "panel": PANELS.get(case.kind, case.title),
         "unit": case.unit,
         "targets": case.targets,
         "per": case.per,
@@ -68,18 +60,6 @@ def compared(name: str) -> dict[str, Any]:
     }
 
 
-def others() -> dict[str, Any]:
-    """Time a simulated second of scenes of other tools: no comparison, since nothing is equal."""
-    scenes, missing = clock.collected(PEERS["context"], "context")
-    found = {}
-    for label, (call, simulated, what) in scenes.items():
-        call()
-        seconds = [clock.seconds_of(call, clock.SHORT, time.process_time) for _ in range(3)]
-        found[label] = {"seconds": min(seconds) / simulated, "what": what}
-    title = "Other vehicles, for scale alone: none of them is one of ours"
-    return {"title": title, "clock": "CPU time of the process", "rows": found, "missing": missing}
-
-
 def stored(path: Path) -> dict[str, Any]:
     """What was measured before; empty if there is nothing."""
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
@@ -87,30 +67,16 @@ def stored(path: Path) -> dict[str, Any]:
 
 def measure(name: str) -> dict[str, Any]:
     """Measure a case, where and by what is noted."""
-    found = others() if name == CONTEXT else compared(name)
     date = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
     known = {package.name: package.version for package in distributions()}
     versions = {name: known[name] for name in PACKAGES.split() if name in known}
-    return found | {"about": f"{machine()}; {date}", "versions": versions}
-
-
-def tell(cases: dict[str, Any], results: Path) -> None:
-    """Write and print the tables of what is stored, and draw a figure for each model."""
-    compared = {name: case for name, case in cases.items() if name != CONTEXT}
-    texts = [report.summary(compared), *map(report.case_text, compared.values())]
-    texts += [report.context_text(cases[CONTEXT])] if CONTEXT in cases else []
-    write_text(results / "peers.md", "\n\n".join(texts) + "\n")
-    print("\n\n".join(texts))
-    make_folder(results / "figures")
-    for model in dict.fromkeys(name.split("-")[0] for name in compared):
-        of_model = {k: c for k, c in compared.items() if k.split("-")[0] == model}
-        report.figure(of_model, results / "figures" / f"peers-{model}")
+    return compared(name) | {"about": f"{machine()}; {date}", "versions": versions}
 
 
 def main() -> None:
-    """Measure what is not stored, then print and draw all."""
+    """Measure what is not stored, then write and print the tables of all."""
     parser = argparse.ArgumentParser(description="the full order beside other tools")
-    names = [*clock.cases(), CONTEXT]
+    names = [*clock.cases()]
     parser.add_argument("--results", type=Path, default=Path("results"))
     parser.add_argument("--again", action="store_true", help="measure what is stored once more")
     parser.add_argument("--only", nargs="*", choices=names, default=names, metavar="CASE")
@@ -122,7 +88,10 @@ def main() -> None:
             content = stored(path) | {name: measure(name)}
             write_text(path, json.dumps(content, indent=1) + "\n")
     content = stored(path)
-    tell({name: content[name] for name in names if name in content}, given.results)
+    cases = {name: content[name] for name in names if name in content}
+    text = "\n\n".join([report.summary(cases), *map(report.case_text, cases.values())])
+    write_text(given.results / "peers.md", text + "\n")
+    print(text)
 
 
 if __name__ == "__main__":

@@ -31,9 +31,20 @@ def test_the_cheapest_that_reaches_the_target_not_by_luck_is_chosen(scan, target
     assert (report.choose(scan, target) or {}).get("tolerance") == tolerance
 
 
-def test_the_front_holds_what_would_be_chosen():
-    front = report.front([SCAN])
-    assert front == [(2e-5, 4.0), (8e-4, 3.0), (5e-2, 1.0)]
+def case(**seconds):
+    curves = {
+        label.replace("_", " "): {"delivers": "states", "points": points((1e-3, 1e-4, s))}
+        for label, s in seconds.items()
+    }
+    about = {"title": "a car", "unit": "m", "targets": [1e-3], "clock": "CPU time", "about": ""}
+    return about | {"curves": curves, "missing": {"other": "not installed (No module)"}}
+
+
+def test_a_peer_that_is_faster_stands_first_and_is_said_so():
+    rows = report.rows(case(ours_slow=2e-3, ours=1e-3, peer=4e-4, late=3e-2), 1e-3, "states")
+    assert [row[0] for row in rows] == ["peer", "ours", "ours slow", "late"]
+    assert [row[3] for row in rows] == ["0.4: FASTER THAN OURS", "1", "2", "30"]
+    assert rows[0][1] == "400 us"
 
 
 def test_a_missing_peer_is_a_row_and_one_that_fails_too(monkeypatch, tmp_path):

@@ -11,9 +11,8 @@ import numpy as np
 import sympy as sp
 from scipy.sparse import csc_array, diags_array
 
-from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.definition import ModelDefinition, Structure
 from vehiclemor.multibody.quantities import Quantity
-from vehiclemor.multibody.structure import Structure
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape

@@ -23,28 +23,24 @@ def checked_maneuver(maneuver: str | Maneuver, definition: ModelDefinition) -> M
         maneuver = component("maneuver", maneuver)
     if not isinstance(maneuver, Maneuver):
         raise InputError(f"{quoted(maneuver)} is not a maneuver, as vm.maneuver(name) gives one")
-    if not isinstance(maneuver, Signal):
-        _check_inputs(maneuver, definition)
-        return maneuver
-    if definition not in maneuver.kept:
-        complete = maneuver.for_inputs(tuple(quantity.name for quantity in definition.inputs))
-        _check_bounds(complete, definition)
-        maneuver.kept[definition] = complete.kept[definition] = complete
-    return maneuver.kept[definition]
+    return _checked(maneuver, definition)
 
 
-# A maneuver is checked once for all its runs.
-@lru_cache(maxsize=64)
-def _check_inputs(maneuver: Maneuver, definition: ModelDefinition) -> None:
+# A maneuver is checked once for all its runs, and so is a signal that has been completed.
+@kept
+def _checked(maneuver: Maneuver, definition: ModelDefinition) -> Maneuver:
     names = tuple(quantity.name for quantity in definition.inputs)
-    if maneuver.inputs != names:
+    complete = maneuver.for_inputs(names)
+    if complete.inputs != names:
         raise InputError(
             f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "
             f"{definition.name} needs {', '.join(names)}"
         )
-    _check_bounds(maneuver, definition)
+    _check_bounds(complete, definition)
+    return complete
 
 
+@kept
 def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
     anything = -np.inf, np.inf
     ranges = [definition.validity.get(q.name, anything) for q in definition.inputs]

@@ -16,8 +16,13 @@ from vehiclemor.exceptions import FileError, InputError, one_line
 SEPARATORS = ",;\t| "
 
 
-def csv_columns(path: Path, separator: str) -> dict[str, np.ndarray]:
-    """Columns (n,) of a CSV file by the names in its first line; `FileError` if it is none."""
+def csv_samples(
+    path: Path, separator: str, time: str, inputs: str | Sequence[str] | Mapping[str, str]
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Times (n,), inputs (n, inputs) and their names, of columns of a CSV file, else of all.
+
+    `FileError` if it is no such file, `InputError` if there is no such column.
+    """
     import pandas as pd
 
     if not isinstance(separator, str) or len(separator) != 1:
@@ -38,27 +43,15 @@ def csv_columns(path: Path, separator: str) -> dict[str, np.ndarray]:
     other = [character for character in SEPARATORS if character in str(names[0])]
     if len(names) == 1 and other:
         raise FileError(f"{path}: one column, {quoted(names[0])}: is separator={other[0]!r} meant?")
-    return {str(name): table[name].to_numpy() for name in table.columns}
-
-
-def chosen_columns(
-    path: str | Path,
-    columns: Mapping[str, np.ndarray],
-    time: str,
-    inputs: str | Sequence[str] | Mapping[str, str],
-) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Times (n,), inputs (n, inputs) and their names, of the columns that are named, else of all.
-
-    `InputError` if there is no such column.
-    """
-    chosen = inputs or [name for name in columns if name != time]
+    table.columns = table.columns.astype(str)
+    chosen = inputs or [name for name in table if name != time]
     named = chosen if isinstance(chosen, Mapping) else {name: name for name in listed(chosen)}
     for name in listed([time, *named.values()]):
-        if name not in columns:
-            known = ", ".join(columns)
+        if name not in table:
+            known = ", ".join(table)
             raise InputError(f"{path}: there is no column {quoted(name)} among {known}")
-    values = np.column_stack([columns[name] for name in named.values()] or [np.empty(0)])
-    return columns[time], values, [*named]
+    values = np.column_stack([table[name] for name in named.values()] or [np.empty(0)])
+    return table[time].to_numpy(), values, [*named]
 
 
 def listed(inputs: Any) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ Chebyshev points of equal pieces (L. N. Trefethen, Approximation Theory and Appr
 input's largest value.  A signal brings its own.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from functools import cache, lru_cache, wraps
 from itertools import pairwise
 from typing import NamedTuple, TypeVar
@@ -17,9 +17,8 @@ from vehiclemor.arguments import loop_array
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.piecewise import polynomial_loops
-from vehiclemor.inputs.sample_loops import Pieces
-from vehiclemor.inputs.signal import Signal
+from vehiclemor.inputs.polynomial_loops import Pieces
+from vehiclemor.inputs.signal import Signal, polynomial_loops
 
 Made = TypeVar("Made")
 ACCURACY = 1e-11
@@ -29,18 +28,18 @@ DEGREE = 5
 KEPT = 512
 
 
-def kept(make: Callable[[Maneuver], Made]) -> Callable[[Maneuver], Made]:
+def kept(make: Callable[..., Made]) -> Callable[..., Made]:
     """The function, its results kept: of a signal as long as it lives, of others the last ones."""
     of_maneuver = lru_cache(maxsize=KEPT)(make)
 
     @wraps(make)
-    def found(maneuver: Maneuver) -> Made:
+    def found(maneuver: Maneuver, *further: Hashable) -> Made:
         if not isinstance(maneuver, Signal):
-            return of_maneuver(maneuver)
-        held = maneuver.kept.get(make)
-        if held is None:
-            held = maneuver.kept[make] = make(maneuver)
-        return held
+            return of_maneuver(maneuver, *further)
+        key = make, *further
+        if key not in maneuver.kept:
+            maneuver.kept[key] = make(maneuver, *further)
+        return maneuver.kept[key]
 
     return found
 

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
+from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.exceptions import InputError, blamed, one_line
-from vehiclemor.inputs.columns import chosen_columns, csv_columns, listed
+from vehiclemor.inputs.columns import csv_samples, listed
 from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
-from vehiclemor.inputs.piecewise import HOLDS, at, derivative, scaled, through
-from vehiclemor.inputs.sample_loops import Pieces
+from vehiclemor.inputs.polynomial_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
 from vehiclemor.registry import choice
 
+# What lies between samples, and the degree of its polynomials.
+HOLDS = {"linear": 1, "zero": 0, "cubic": 3}
 # Time (s) between output times, as of the registered maneuvers of vehicles.
 OUTPUT_STEP = 0.02
 # Time (s) between the samples that are taken of a function.
@@ -102,7 +105,11 @@ class Signal(Maneuver):
             inputs = self.pieces.coefficients.shape[1]
             orders = np.array([_order(name, self.inputs) for name in self.inputs] or [0] * inputs)
             amplitudes = amplitude * frequency**orders
-            self.kept["polynomials"] = scaled(self.pieces, frequency, amplitudes)
+            self.kept["polynomials"] = self.pieces._replace(
+                edges=self.pieces.edges / frequency,
+                starts=self.pieces.starts / frequency,
+                coefficients=self.pieces.coefficients * amplitudes[:, None],
+            )
         return self.kept["polynomials"]
 
     @property
@@ -216,8 +223,8 @@ class Signal(Maneuver):
         **further
             As of `from_samples`.
         """
-        columns = csv_columns(file_path("path", path), separator)
-        times, values, names = chosen_columns(path, columns, time, inputs)
+        path = file_path("path", path)
+        times, values, names = csv_samples(path, separator, time, inputs)
         return cls.from_samples(times, values, hold, inputs=names, **further)
 
 
@@ -300,3 +307,75 @@ def _order(name: str, inputs: Sequence[str]) -> int:
     """How often one of the inputs has been derived from the lowest of them."""
     lower = _integral(name)
     return 1 + _order(lower, inputs) if lower in inputs else 0
+
+
+@cache
+def polynomial_loops() -> dict[str, Loop]:
+    """Loops over polynomials of time."""
+    return loops(("inputs.polynomial_loops",), ("sampled", "extent"))
+
+
+@cache
+def _through() -> Loop:
+    return loops(("inputs.polynomial_loops",), ("through",))["through"]
+
+
+def derivative(pieces: Pieces) -> Pieces:
+    """By time; jumps have none."""
+    if len(pieces.starts):
+        lengths = np.diff(pieces.starts, append=pieces.edges[-1])
+    else:
+        counts = np.diff(pieces.first)
+        lengths = np.repeat(np.diff(pieces.edges) / counts, counts)
+    rates = np.zeros_like(pieces.coefficients)
+    rates[:, :, :-1] = pieces.coefficients[:, :, 1:] * np.arange(1.0, rates.shape[2])
+    return pieces._replace(coefficients=rates / lengths[:, None, None])
+
+
+def at(pieces: Pieces, times: np.ndarray) -> np.ndarray:
+    """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
+    order, values = np.argsort(times), np.empty((len(times), pieces.coefficients.shape[1]))
+    increasing = np.empty_like(values)
+    polynomial_loops()["sampled"](pieces, times[order], increasing)
+    values[order] = increasing
+    return values
+
+
+def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
+    """Polynomials of each run through samples (runs, n, inputs) by one of `HOLDS`.
+
+    One piece for each interval; segments end at kinks, at jumps, and where nothing moves for long.
+    Runs with the same segments share all but their coefficients, which are of one array.
+    `InputError` if times (n,) don't increase, or something isn't finite.
+    """
+    runs, n, inputs = samples.shape
+    coefficients = np.empty((runs * (n - 1), inputs, HOLDS[hold] + 1))
+    rows, counts = np.empty((runs, n), dtype=np.int64), np.empty(runs, dtype=np.int64)
+    even = _through()(times, samples, np.empty((ROWS, n)), coefficients, rows, counts)
+    if even < 0:
+        raise InputError(f"samples of a signal: {_wrong(even, times, samples)}")
+    starts, own = np.empty(0) if even else times[:-1].copy(), n - 1
+    shared: dict[bytes, Pieces] = {}
+    found = []
+    for run, count in enumerate(counts.tolist()):
+        first = rows[run, :count]
+        key, part = first.tobytes(), coefficients[run * own : (run + 1) * own]
+        if key not in shared:
+            shared[key] = Pieces(times[first], first.copy(), starts, part)
+        found.append(shared[key]._replace(coefficients=part))
+    return found
+
+
+def _wrong(status: int, times: np.ndarray, samples: np.ndarray) -> str:
+    """What is wrong by what the loop has returned."""
+    if status == DISORDERED and np.isfinite(times).all():
+        row = int(np.argmax(times[1:] <= times[:-1]))
+        now, before = times[row + 1], times[row]
+        return f"times must increase, t[{row + 1}] = {now:.6g} s follows {before:.6g} s"
+    run = NOT_FINITE - status
+    given = times if status == DISORDERED else samples[run]
+    finite = np.isfinite(given).reshape(len(given), -1).all(axis=1)
+    if finite.all():
+        return "the polynomials through them are not finite"
+    where = f" of run {run}" if len(samples) > 1 and status != DISORDERED else ""
+    return f"{'t' if status == DISORDERED else 'u'}[{finite.argmin()}]{where} is not finite"

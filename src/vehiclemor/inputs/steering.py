@@ -98,83 +98,69 @@ def _multisine(times: np.ndarray, frequency: float) -> np.ndarray:
     return MULTISINE_SIZE * _product(ramp(t / ONSET, ONSET), waves)
 
 
-def _pulse_corners(frequency: float) -> tuple[float, ...]:
-    return BEGIN, BEGIN + LANE_CHANGE_LENGTH / frequency
-
-
-def _step_corners(frequency: float) -> tuple[float, ...]:
-    return BEGIN, BEGIN + STEP_RAMP / frequency
-
-
-def _periodic_corners(frequency: float) -> tuple[float, ...]:
-    del frequency
-    return BEGIN, BEGIN + ONSET
-
-
 def _steered(
-    name: str, summary: str, shape: Shape, corners: Callable, duration: float = DURATION
-) -> Maneuver:
-    """Steering angle of the 14-DOF vehicle."""
+    name: str,
+    summary: str,
+    shape: Shape,
+    corners: Callable[[float], tuple[float, ...]],
+    duration: float = DURATION,
+    rack_summary: str = "",
+) -> tuple[Maneuver, Maneuver]:
+    """Steering angle of the 14-DOF vehicle; the rack and its rates instead, no longer than 10 s."""
 
-    def signal(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    def angle(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         return amplitude * LANE_CHANGE_AMPLITUDE * shape(times, frequency)[:, :1]
 
-    samples = round(duration * RATE) + 1
-    maneuver = Maneuver(name, summary, signal, ("delta",), duration, samples, corners)
-    return replace(maneuver, linear_in_amplitude=True)
-
-
-def _racked(steered: Maneuver, shape: Shape, summary: str = "") -> Maneuver:
-    """Displacement, velocity and acceleration of the rack instead; no longer than 10 s."""
-
-    def signal(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    def rack(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         return amplitude * RACK_AMPLITUDE * shape(times, frequency)
 
-    duration = min(steered.duration, DURATION)
-    return replace(
+    samples = round(duration * RATE) + 1
+    steered = Maneuver(name, summary, angle, ("delta",), duration, samples, corners)
+    steered = replace(steered, linear_in_amplitude=True)
+    duration = min(duration, DURATION)
+    return steered, replace(
         steered,
-        name=f"rack_{steered.name}",
-        summary=summary or f"{steered.summary}, of the rack",
-        signal=signal,
+        name=f"rack_{name}",
+        summary=rack_summary or f"{summary}, of the rack",
+        signal=rack,
         inputs=("s", "s_dot", "s_ddot"),
         duration=duration,
         samples=round(duration * RATE) + 1,
     )
 
 
-def _straight(times: np.ndarray, frequency: float) -> np.ndarray:
-    """No steering."""
+def _onset(frequency: float) -> tuple[float, ...]:
+    """Corners of a periodic signal."""
     del frequency
-    return np.zeros((len(times), 3))
+    return BEGIN, BEGIN + ONSET
 
 
-lane_change = _steered(
+lane_change, rack_lane_change = _steered(
     "lane_change",
     "single lane change of 3.5 m at 20 m/s, a steering pulse of 2.5 s from 1 s on, 25 s",
     _pulse,
-    _pulse_corners,
+    lambda frequency: (BEGIN, BEGIN + LANE_CHANGE_LENGTH / frequency),
     LANE_CHANGE_DURATION,
-)
-rack_lane_change = _racked(
-    lane_change,
-    _pulse,
     "single lane change of 3.5 m at 20 m/s, a pulse of the rack of 2.5 s from 1 s on, 10 s",
 )
-straight_ahead = _steered(
-    "straight_ahead", "no steering, 25 s", _straight, smooth, LANE_CHANGE_DURATION
+straight_ahead, rack_straight_ahead = _steered(
+    "straight_ahead",
+    "no steering, 25 s",
+    lambda times, _: np.zeros((len(times), 3)),
+    smooth,
+    LANE_CHANGE_DURATION,
+    "rack held in the middle, 10 s",
 )
-rack_straight_ahead = _racked(straight_ahead, _straight, "rack held in the middle, 10 s")
-STEP_SUMMARY = "step of the steering to 4 m/s^2 at 20 m/s within 0.2 s, 5 s"
-step_steer = _steered("step_steer", STEP_SUMMARY, _step, _step_corners, STEP_DURATION)
-rack_step_steer = _racked(step_steer, _step)
-sine_sweep = _steered(
-    "sine_sweep", "steering swept from 0.2 to 1.6 Hz, 10 s", _sweep, _periodic_corners
+step_steer, rack_step_steer = _steered(
+    "step_steer",
+    "step of the steering to 4 m/s^2 at 20 m/s within 0.2 s, 5 s",
+    _step,
+    lambda frequency: (BEGIN, BEGIN + STEP_RAMP / frequency),
+    STEP_DURATION,
 )
-rack_sine_sweep = _racked(sine_sweep, _sweep)
-multisine = _steered(
-    "multisine",
-    "steering at five frequencies from 0.15 to 1.4 Hz, 10 s",
-    _multisine,
-    _periodic_corners,
+sine_sweep, rack_sine_sweep = _steered(
+    "sine_sweep", "steering swept from 0.2 to 1.6 Hz, 10 s", _sweep, _onset
 )
-rack_multisine = _racked(multisine, _multisine)
+multisine, rack_multisine = _steered(
+    "multisine", "steering at five frequencies from 0.15 to 1.4 Hz, 10 s", _multisine, _onset
+)

@@ -17,8 +17,10 @@ from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr
 
 if TYPE_CHECKING:
-    from vehiclemor.multibody.structure import Structure
     from vehiclemor.symbolic.program import Program
+
+    # Of SciPy's arrays no types are known.
+    csc_array = Any
 
 # Algebraic equations; ordinary differential equations; those with constraints; sparse matrices.
 KINDS = ("ae", "ode", "dae", "structural")
@@ -31,17 +33,40 @@ Values = Mapping[str, Any]
 Derivative = Callable[[list[float], np.ndarray, np.ndarray], np.ndarray]
 
 
-def _anything(values: Values) -> None:
-    del values
-
-
-def _nothing(values: Values, derivative: Derivative) -> dict[str, float]:
-    del values, derivative
-    return {}
-
-
 def _unset(values: Values) -> Any:
     raise NotImplementedError(f"not declared for this kind of model: {sorted(values)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Matrices of a structure with n coordinates, p ports and some outputs.
+
+        M q'' + (W W' + d K) q' + K q = load + B f(w, w', u),   w = B' q
+
+    Springs, dampers and tires act between few points.  Their forces f are the law of the ports,
+    which is declared as other equations are.  Outputs are those of the motion about the static
+    state, but for the forces: y = Cq (q - q0) + Cv q' + Ca q'' + Cf f.
+    """
+
+    # M and K (n, n), symmetric; K without what acts at the ports.
+    mass: csc_array
+    stiffness: csc_array
+    damping_time: float  # d in s, of damping that is proportional to K.
+    # W (n, k): few linear dampers, by their deflections times the root of their rates.
+    dampers: csc_array
+    ports: csc_array  # B (n, p): deflections of the ports are w = B' q.
+    load: np.ndarray  # Weight (n,) in N and N m.
+    # Cq, Cv, Ca (outputs, n) and Cf (outputs, p).
+    outputs: tuple[csc_array, csc_array, csc_array, csc_array]
+
+    def held(self, stiffness: np.ndarray) -> csc_array:
+        """K (n, n) with springs of these stiffnesses (p,) at the ports."""
+        return self.stiffness + self.ports @ (stiffness[:, None] * self.ports.T)
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self.load)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,13 +176,13 @@ class ModelDefinition(ShortRepr):
     structure: Callable[[Values], Structure] = _unset
     online: tuple[str, ...] = ()
     parameter_file: Path | None = None
-    check: Callable[[Values], None] = _anything
+    check: Callable[[Values], None] = lambda _: None
     design_coordinates: Callable[[Values], np.ndarray] = _unset
     travel_limit: float = 0.5
     stops: Mapping[str, float] = field(default_factory=dict)
     starts: Callable[[Values], dict[str, np.ndarray]] = _unset
     solved: tuple[str, ...] = ()
-    solve_equilibrium: Callable[[Values, Derivative], dict[str, float]] = _nothing
+    solve_equilibrium: Callable[[Values, Derivative], dict[str, float]] = lambda *_: {}
     cyclic: tuple[str, ...] = ()
     planar: tuple[str, ...] = ()
     heading_pairs: tuple[tuple[str, str], ...] = ()

@@ -1,9 +1,14 @@
-"""Named quantities of models: coordinates, speeds, inputs and outputs, without any symbols."""
+"""Quantities of models and what their parameters share, without any symbols."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
+import numpy as np
+
+from vehiclemor.exceptions import GeometryError
 from vehiclemor.parameters import Declared
 from vehiclemor.resources import data_folder
 from vehiclemor.toml_files import toml_content
@@ -26,6 +31,15 @@ TIRE_LOADS = tuple(f"Fz_{wheel}" for wheel in WHEELS)
 # Bounds beyond which the models mean nothing: of the longitudinal speed, and of the attitude.
 FORWARD = (0.5, math.inf)
 UPRIGHT = {"roll": (-1.2, 1.2), "pitch": (-1.2, 1.2)}
+# How the start `dropped` differs from straight running.
+DROP = ("drop_height", "drop_pitch")
+# Coefficients of the Fiala tire.
+FIALA = (
+    *("longitudinal_slip_stiffness", "cornering_stiffness", "largest_friction"),
+    *("smallest_friction", "tire_width"),
+)
+# Share by which a published moment of inertia may break the triangle inequality.
+ROUNDED = 0.01
 
 
 def declared(model: str) -> dict[str, Any]:
@@ -34,3 +48,22 @@ def declared(model: str) -> dict[str, Any]:
     parameters = {name: Declared(**entry) for name, entry in content.pop("parameters").items()}
     tables = {kind: tuple(Quantity(*row) for row in rows) for kind, rows in content.items()}
     return tables | {"parameters": parameters}
+
+
+def equations_of(package: str) -> Callable[[], Any]:
+    """What derives by the module `equations` of a package; SymPy is imported when it is called."""
+    return lambda: import_module(f"vehiclemor.multibody.{package}.equations").derive()
+
+
+def check_moments(name: str, moments: np.ndarray) -> None:
+    """Raise `GeometryError` if no body has these principal moments of inertia (3,) in kg m^2.
+
+    The largest is at most the sum of the others, but for rounding: published moments of flat and
+    thin bodies are rounded.
+    """
+    smallest, middle, largest = np.sort(moments)
+    if smallest <= 0.0 or largest > (smallest + middle) * (1.0 + ROUNDED):
+        raise GeometryError(
+            f"{name}: no body has the principal moments of inertia {smallest:.4g}, "
+            f"{middle:.4g}, {largest:.4g} kg m^2 (the largest is at most the sum of the others)"
+        )

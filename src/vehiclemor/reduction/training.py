@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.multibody.vehicle_parameters import DROP
+from vehiclemor.multibody.quantities import DROP
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory

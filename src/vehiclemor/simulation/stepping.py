@@ -17,7 +17,7 @@ import numpy as np
 
 from vehiclemor.codegen.loops import ready
 from vehiclemor.exceptions import ConvergenceError
-from vehiclemor.inputs.sample_loops import Pieces
+from vehiclemor.inputs.polynomial_loops import Pieces
 from vehiclemor.simulation.integrators.structures import Output, Spans
 from vehiclemor.simulation.kernel_derivatives import CONSTANTS, STATE, directional, partial
 from vehiclemor.simulation.system import REASONS, System

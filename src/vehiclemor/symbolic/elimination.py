@@ -55,8 +55,10 @@ def eliminate_symmetric(
     matrix: Sequence[Sequence[sp.Expr]],
     right_side: Sequence[sp.Expr],
     order: Sequence[int],
-) -> list[sp.Expr]:
+) -> dict[int, sp.Expr]:
     """Solve matrix x = right_side for a symmetric positive definite matrix by sparse L D L^T.
+
+    Rows and columns that the order of elimination leaves out take no part.
 
     In the order of elimination unknowns that couple to few others come first: eliminating them
     leaves the Schur complement of the rest.  No pivot can vanish, whatever the order: Golub and Van
@@ -84,4 +86,4 @@ def eliminate_symmetric(
     for pivot in reversed(order):
         known = sp.Add(*[factor * solution[j] for j, factor in factors[pivot].items()])
         solution[pivot] = tape.let(b[pivot] * inverses[pivot] - known)
-    return [solution[column] for column in range(len(b))]
+    return solution

@@ -49,8 +49,6 @@ class Vector:
 
 
 Rotation = tuple[Vector, Vector, Vector]
-# An angle in rad, or its cosine and sine where no angle is known.
-Angle = sp.Expr | tuple[sp.Expr, sp.Expr]
 
 
 def vector(components: Iterable[sp.Expr | float]) -> Vector:
@@ -99,17 +97,7 @@ def euler_321(tape: Tape, yaw: sp.Expr, pitch: sp.Expr, roll: sp.Expr) -> Rotati
     )
 
 
-def cosine(tape: Tape, angle: Angle) -> sp.Expr:
-    """Cosine of an angle, named on the tape."""
-    return angle[0] if isinstance(angle, tuple) else tape.let(sp.cos(angle))
-
-
-def sine(tape: Tape, angle: Angle) -> sp.Expr:
-    """Sine of an angle, named on the tape."""
-    return angle[1] if isinstance(angle, tuple) else tape.let(sp.sin(angle))
-
-
-def rotate_about_axis(tape: Tape, a: Vector, axis: Vector, angle: Angle) -> Vector:
+def rotate_about_axis(tape: Tape, a: Vector, axis: Vector, angle: sp.Expr) -> Vector:
     """Rotate a vector about a unit axis by an angle (Rodrigues' formula).
 
     The part along the axis and the two vectors that span the circle are named on the tape, so that
@@ -118,5 +106,5 @@ def rotate_about_axis(tape: Tape, a: Vector, axis: Vector, angle: Angle) -> Vect
     along = named(tape, axis * tape.let(axis @ a))
     across = named(tape, a - along)
     quarter_turn = named(tape, axis.cross(a))
-    c, s = cosine(tape, angle), sine(tape, angle)
+    c, s = tape.let(sp.cos(angle)), tape.let(sp.sin(angle))
     return named(tape, along + across * c + quarter_turn * s)

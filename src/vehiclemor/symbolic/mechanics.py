@@ -2,7 +2,7 @@
 
 Every velocity is linear in the speeds; its columns (partial velocities) follow from geometry, so
 nothing is differentiated.  All vectors are components in one moving frame, the chassis.  What moves
-in the frame has motions relative to it: see `joints.py`.
+in the frame, by joints that turn or slide, has motions relative to it.
 
 T. R. Kane, D. A. Levinson, Dynamics: Theory and Applications (McGraw-Hill 1985), chapters 4 to 6.
 """
@@ -34,6 +34,9 @@ class Motion:
     bias: Vector
 
 
+STILL = Motion(ZERO, {}, ZERO)
+
+
 @dataclass(frozen=True)
 class Rotor:
     """A body of revolution that spins in another body, to which its mass and tensor are counted."""
@@ -44,34 +47,33 @@ class Rotor:
     axis: Vector  # Unit axis, fixed in the body.
     inertia: sp.Expr  # Moment of inertia about the axis in kg m^2.
     moment: sp.Expr  # Applied moment about the axis in N m.
+    # Angular acceleration of the other body where the derivatives of all speeds are zero.
+    acceleration: Vector
 
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body or point mass with its resultant loads."""
+    """A rigid body with its resultant loads."""
 
     mass: sp.Expr  # Mass in kg.
     centre: Motion  # Motion of the centre of mass.
     force: Vector  # Resultant applied force, gravity included, in N.
     # Angular velocity; its `bias` is the rate of the angular momentum about the centre of mass
-    # where the derivatives of all speeds are zero.  None for a point mass.
-    rotation: Motion | None = None
-    inertia: Tensor | None = None  # Tensor about the centre of mass (three rows) in kg m^2.
+    # where the derivatives of all speeds are zero.
+    rotation: Motion
+    inertia: Tensor  # Tensor about the centre of mass (three rows) in kg m^2.
     # Resultant applied moment about the centre of mass in N m; that on a rotor included.
     moment: Vector = ZERO
     rotor: Rotor | None = None  # What spins in it.
-    # Angular acceleration where the derivatives of all speeds are zero; a rotor needs it.
-    acceleration: Vector | None = None
 
 
 @dataclass(frozen=True)
 class MovingFrame:
-    """A body-fixed frame; its origin's velocity and its angular velocity are speeds themselves."""
+    """A body-fixed frame; its origin's velocity and angular velocity are the first six speeds."""
 
     # Components in the frame.
     velocity: Vector
     angular_velocity: Vector
-    first: int  # Number of the first of its six speeds.
     # Acceleration of the origin where the derivatives of all speeds are zero; None where the first
     # three speeds are the components of its velocity in this frame.  Gravity can be counted here,
     # as an acceleration upwards.
@@ -82,14 +84,14 @@ class MovingFrame:
         bias = self.acceleration
         if bias is None:
             bias = g.named(tape, self.angular_velocity.cross(self.velocity))
-        return Motion(self.velocity, {self.first + i: UNIT[i] for i in range(3)}, bias)
+        return Motion(self.velocity, dict(enumerate(UNIT)), bias)
 
     def point(self, tape: Tape, place: Vector, relative: Motion | None = None) -> Motion:
         """Motion of a point at a place in the frame, and of its motion relative to the frame."""
         origin, turn = self.origin(tape), self.angular_velocity
         velocity = self.velocity + turn.cross(place)
         columns = dict(origin.columns)
-        columns |= {self.first + 3 + i: UNIT[i].cross(place) for i in range(3)}
+        columns |= {3 + i: UNIT[i].cross(place) for i in range(3)}
         lever = g.named(tape, turn.cross(place))
         bias = origin.bias + turn.cross(lever)
         if relative is not None:
@@ -102,7 +104,7 @@ class MovingFrame:
     def turning(self, tape: Tape, relative: Motion) -> Motion:
         """Angular velocity of a body that turns relative to the frame; biases are accelerations."""
         turn = self.angular_velocity
-        columns = {self.first + 3 + i: UNIT[i] for i in range(3)} | dict(relative.columns)
+        columns = {3 + i: UNIT[i] for i in range(3)} | dict(relative.columns)
         bias = turn.cross(relative.value) + relative.bias
         return Motion(g.named(tape, turn + relative.value), columns, g.named(tape, bias))
 
@@ -114,13 +116,67 @@ class MovingFrame:
         It may spin about an axis of symmetry: (number of the speed, the speed, axis).
         """
         turn = self.angular_velocity
-        value, columns = turn, {self.first + 3 + i: UNIT[i] for i in range(3)}
+        value, columns = turn, {3 + i: UNIT[i] for i in range(3)}
         if spin is not None:
             number, speed, axis = spin
             value = g.named(tape, turn + axis * speed)
             columns[number] = axis
         momentum = g.named(tape, product(inertia, value))
         return Motion(value, columns, g.named(tape, turn.cross(momentum)))
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Rate of a joint coordinate, and its derivative as a linear function of others."""
+
+    value: sp.Expr  # The rate.
+    # Number of a speed -> factor of its derivative in the derivative of this rate.
+    columns: Mapping[int, sp.Expr]
+    bias: sp.Expr  # Derivative of this rate where those of all speeds are zero.
+
+
+def free_rate(number: int, speed: sp.Expr) -> Rate:
+    """Rate that is a speed itself."""
+    return Rate(speed, {number: sp.Integer(1)}, sp.Integer(0))
+
+
+def along(rate: Rate, direction: Vector) -> Motion:
+    """Translation along, or rotation about, a direction that is fixed in the frame."""
+    columns = {k: direction * factor for k, factor in rate.columns.items()}
+    return Motion(direction * rate.value, columns, direction * rate.bias)
+
+
+def successive(tape: Tape, rates: Sequence[Rate], axes: Sequence[Vector]) -> Motion:
+    """Rotation about several axes, each carried by those before it, such as Euler angles.
+
+    Unit axes stand in their present directions, as components in the frame.
+    """
+    value, bias = ZERO, ZERO
+    columns: dict[int, Vector] = {}
+    for rate, axis in zip(rates, axes, strict=True):
+        part = along(rate, axis)
+        swept = value.cross(part.value)
+        bias = g.named(tape, bias + part.bias + swept)
+        value = g.named(tape, value + part.value)
+        for k, column in part.columns.items():
+            columns[k] = columns.get(k, ZERO) + column
+    return Motion(value, {k: g.named(tape, c) for k, c in columns.items()}, bias)
+
+
+def carried(tape: Tape, base: Motion, rotation: Motion, lever: Vector) -> Motion:
+    """Motion of a point of a body, from that of another of its points and from its rotation.
+
+    The lever leads from the other point to this one.
+    """
+    turn = rotation.value
+    swept = g.named(tape, turn.cross(lever))
+    value = g.named(tape, base.value + swept)
+    bias = base.bias + rotation.bias.cross(lever) + turn.cross(swept)
+    columns = dict(base.columns)
+    for k, column in rotation.columns.items():
+        columns[k] = columns.get(k, ZERO) + column.cross(lever)
+    columns = {k: g.named(tape, column) for k, column in columns.items()}
+    return Motion(value, columns, g.named(tape, bias))
 
 
 def with_inertia(tape: Tape, inertia: Tensor, turning: Motion) -> Motion:
@@ -151,18 +207,17 @@ def kane(
     mass: list[list[sp.Expr]] = [[sp.Integer(0)] * speeds for _ in range(speeds)]
     force: list[sp.Expr] = [sp.Integer(0)] * speeds
     for body in bodies:
-        free = body.force - body.centre.bias * body.mass
-        loads = [(body.centre.columns, g.named(tape, free))]
+        velocities, turns = body.centre.columns, body.rotation.columns
+        free = g.named(tape, body.force - body.centre.bias * body.mass)
+        turning = body.moment - body.rotation.bias
+        if body.rotor is not None:
+            turning = turning - _add_rotor(tape, body.rotor, body.rotation, mass, force)
+        loads = [(velocities, free), (turns, g.named(tape, turning))]
         # Columns beside their images: mass times velocity, inertia times angular velocity.
-        columns = body.centre.columns
-        images = [(columns, {k: column * body.mass for k, column in columns.items()})]
-        if body.rotation is not None and body.inertia is not None:
-            columns = body.rotation.columns
-            images.append((columns, {k: product(body.inertia, c) for k, c in columns.items()}))
-            turning = body.moment - body.rotation.bias
-            if body.rotor is not None:
-                turning = turning - _add_rotor(tape, body, mass, force)
-            loads.append((columns, g.named(tape, turning)))
+        images = [
+            (velocities, {k: column * body.mass for k, column in velocities.items()}),
+            (turns, {k: product(body.inertia, column) for k, column in turns.items()}),
+        ]
         for columns, weighted in images:
             for k, image in weighted.items():
                 for j, other in columns.items():
@@ -176,22 +231,20 @@ def kane(
     return full, [tape.let(f) for f in force]
 
 
-def _add_rotor(tape: Tape, body: Body, mass: list[list[sp.Expr]], force: list[sp.Expr]) -> Vector:
+def _add_rotor(
+    tape: Tape, rotor: Rotor, rotation: Motion, mass: list[list[sp.Expr]], force: list[sp.Expr]
+) -> Vector:
     """Add the row of a rotor; the rate of its momentum that is due to the body's turning."""
-    rotor, rotation = body.rotor, body.rotation
-    assert rotor is not None
-    assert rotation is not None
-    assert body.acceleration is not None
     momentum = g.named(tape, rotor.axis * rotor.inertia)
     for k, column in rotation.columns.items():
         mass[max(rotor.number, k)][min(rotor.number, k)] += momentum @ column
     mass[rotor.number][rotor.number] += rotor.inertia
-    force[rotor.number] += rotor.moment - (momentum @ body.acceleration)
+    force[rotor.number] += rotor.moment - (momentum @ rotor.acceleration)
     spin = g.named(tape, momentum * rotor.speed)
     return rotation.value.cross(spin)
 
 
-def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: g.Angle) -> Tensor:
+def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: sp.Expr) -> Tensor:
     """Tensor R T R^T of a body that has turned about a unit axis by an angle.
 
     A polynomial in sine and cosine whose coefficients, where tensor and axis are parameters, are
@@ -207,7 +260,7 @@ def turned_tensor(tape: Tape, tensor: Tensor, axis: Vector, angle: g.Angle) -> T
         columns = [g.named(tape, product(tensor, g.vector(row))) for row in right]
         return [[tape.let(g.vector(row) @ column) for column in columns] for row in left]
 
-    sine, cosine = g.sine(tape, angle), g.cosine(tape, angle)
+    sine, cosine = tape.let(sp.sin(angle)), tape.let(sp.cos(angle))
     both, square = tape.let(sine * cosine), tape.let(sine * sine)
     still, full = sandwich(along, along), sandwich(across, across)
     turned, first = sandwich(quarter, quarter), sandwich(along, across)

@@ -11,7 +11,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import eigsh, splu
 
 from vehiclemor.exceptions import GeometryError, InputError
-from vehiclemor.multibody.flexible_truck import beams, frame, shells
+from vehiclemor.multibody.flexible_truck import frame
 from vehiclemor.multibody.flexible_truck.definition import DEFINITION
 from vehiclemor.parameters import load_parameters
 from vehiclemor.simulation.build import compiled
@@ -86,7 +86,7 @@ def frequencies(stiffness, mass, count):
 @pytest.mark.parametrize("rows", [[1, 5], [2, 4]])
 def test_slender_beams_have_the_frequencies_of_euler_and_bernoulli(held, roots, rows):
     section, length, count = frame.Section(0.01, 0.02, 0.001, webs=2), 10.0, 32
-    both = beams.matrices(np.full(count, length / count), section, STEEL)
+    both = frame.beam_matrices(np.full(count, length / count), section, STEEL)
     whole = np.zeros((2, 2 * count + 2, 2 * count + 2))
     own = np.ix_([0, 1], [*rows, *(row + 6 for row in rows)], [*rows, *(row + 6 for row in rows)])
     for k in range(count):
@@ -100,7 +100,7 @@ def test_slender_beams_have_the_frequencies_of_euler_and_bernoulli(held, roots, 
 
 def test_a_short_beam_bends_and_shears_and_a_shaft_twists_as_in_closed_form():
     section, length, load = frame.Section(0.2, 0.07, 0.006, webs=1), 0.8, 1e3
-    stiff = beams.matrices(np.array([length]), section, STEEL)[0][0, 6:, 6:]
+    stiff = frame.beam_matrices(np.array([length]), section, STEEL)[0][0, 6:, 6:]
     moved = np.linalg.solve(stiff, np.array([0, load, load, load, 0, 0.0]))
     shear_modulus, second_moments = STEEL[0] / 2.6, (section.upright, section.sideways)
     for row, inertia, area in zip((2, 1), second_moments, section.shear_areas, strict=True):
@@ -111,8 +111,8 @@ def test_a_short_beam_bends_and_shears_and_a_shaft_twists_as_in_closed_form():
 
 def test_a_rail_stays_straight_under_a_load_at_its_centroid_and_its_shear_centre():
     section = frame.Section(0.243, 0.0765, 0.007, webs=1)
-    moves = beams.at_nodes(section.centroid, section.shear_centre)
-    stiff = beams.matrices(np.array([2.0]), section, STEEL)[0][0]
+    moves = frame.at_nodes(section.centroid, section.shear_centre)
+    stiff = frame.beam_matrices(np.array([2.0]), section, STEEL)[0][0]
     flexibility = np.linalg.inv((moves.T @ stiff @ moves)[6:, 6:])
     arms = frame.levers(np.array([[0, section.centroid, 0], [0, section.shear_centre, 0]]))
     axial, lifting = arms[0].T @ [1e5, 0, 0, 0, 0, 0], arms[1].T @ [0, 0, 1e3, 0, 0, 0]
@@ -125,7 +125,7 @@ def test_a_simply_supported_plate_of_shells_has_the_frequencies_of_kirchhoff():
     a, b, thin, count = 1.0, 0.7, 0.004, 40
     x, y = np.meshgrid(np.linspace(0, a, count + 1), np.linspace(0, b, count + 1), indexing="ij")
     nodes, (own,) = frame.joined([np.stack([x, y, 0 * x], axis=-1)])
-    mass, stiffness = shells.assembled(nodes, [(own, thin)], STEEL)
+    mass, stiffness = frame.shell_matrices(nodes, [(own, thin)], STEEL)
     assert mass[2::6, 2::6].sum() == pytest.approx(STEEL[2] * a * b * thin)
     x, y, _ = nodes.T
     at_x, at_y = (x < 1e-9) | (x > a - 1e-9), (y < 1e-9) | (y > b - 1e-9)
@@ -180,9 +180,8 @@ def test_a_rigid_frame_gives_the_frequencies_of_seven_coordinates(mesh):
 
 def rigid_motions(v):
     """Motions (n, 6) of all that is sprung about its centre, from the mesh's nodes."""
-    mesh, size = (shells, v["shell_size"]) if v["shell_size"] else (beams, v["elements_per_bay"])
     centre = np.array([-v["sprung_distance"], 0.0, v["sprung_height"]])
-    nodes = mesh.frame(frame.Layout(v), size if mesh is shells else int(size)).nodes
+    nodes = frame.meshed(frame.Layout(v), v).nodes
     cab = np.array([[v["cab_place"], 0.0, v["cab_height"]]])
     of_nodes, of_cab = frame.levers(nodes - centre), frame.levers(cab - centre)
     return np.concatenate([*of_nodes, of_cab[0, [2, 4, 3]], np.zeros((4, 6))])
@@ -285,8 +284,7 @@ def test_strains_are_those_of_a_bent_ladder(mesh, tolerance):
     """Both rails under opposite moments at two stations: strain = moment z / (E I)."""
     v = values(**mesh)
     ladder = frame.Layout(v)
-    size, parts = v["shell_size"], int(v["elements_per_bay"])
-    meshed = shells.frame(ladder, size) if size else beams.frame(ladder, parts)
+    meshed = frame.meshed(ladder, v)
     pitch = meshed.sections[4::6]
     load = pitch[[4, 5, 22, 23]].T @ np.array([1e4, 1e4, -1e4, -1e4])
     # Soft springs take away rigid motions.

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vehiclemor.exceptions import GeometryError
-from vehiclemor.multibody.high_fidelity.equilibrium import check
+from vehiclemor.multibody.high_fidelity.definition import check
 from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel

@@ -15,8 +15,8 @@ from tests.oracles.vehicle_lagrange import (
     magic_formula,
 )
 from tests.unit.programs import function_of
-from vehiclemor.multibody.components import tilted_wheel, tires
-from vehiclemor.multibody.components.tire_coefficients import FIALA, MAGIC_FORMULA
+from vehiclemor.multibody.components import tires
+from vehiclemor.multibody.quantities import FIALA
 from vehiclemor.symbolic.tape import Tape
 
 ALONG, ACROSS, MOST, LEAST, _ = COEFFICIENTS = [
@@ -37,7 +37,7 @@ def compiled(name: str):
         own = exact(dict(zip(FIALA, COEFFICIENTS, strict=True)))
         forces = tires.fiala(tape, own, load, kappa, slip)
     else:
-        own = exact({name: PARAMETERS[name] for name in MAGIC_FORMULA})
+        own = exact(PARAMETERS)
         sizes = sp.Float(REFERENCE_LOAD, 17), sp.Float(PARAMETERS["R0"], 17)
         forces = tires.magic_formula(tape, own, load, *sizes, kappa, slip, cosine)
     results = [forces.longitudinal, forces.lateral, forces.aligning]
@@ -109,7 +109,7 @@ def test_an_unloaded_tire_has_no_force(tire, kappa, slip):
 def test_a_wheel_pushes_and_never_pulls(radius, rate, expected):
     p = exact({"tire_radius": 0.33, "tire_stiffness": 280e3, "tire_damping": 2000.0})
     tape, (r, r_dot) = Tape(), sp.symbols("r r_dot", real=True)
-    load = tilted_wheel.vertical_load(tape, r, r_dot, p)
+    load = tires.vertical_load(tape, r, r_dot, p)
     found = function_of(tape, (r, r_dot), [load], "math")(radius, rate)[0]
     assert found == pytest.approx(expected, abs=1e-9)
     assert found == 0.0 or expected

@@ -11,10 +11,10 @@ from tests.unit.python_system import python_system
 from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
-from vehiclemor.inputs.piecewise import at
+from vehiclemor.inputs.polynomial_loops import Pieces
 from vehiclemor.inputs.polynomials import ACCURACY, recorded_inputs
 from vehiclemor.inputs.polynomials import signal_of as ready_signal_of
-from vehiclemor.inputs.sample_loops import Pieces
+from vehiclemor.inputs.signal import at
 from vehiclemor.registry import component
 from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.system import Solver

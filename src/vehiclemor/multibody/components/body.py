@@ -1,15 +1,16 @@
-"""What vehicles share: the free chassis with its coordinates, and wheels in contact with a road.
+"""The free chassis that vehicles share, with its coordinates.
 
 Chassis frame: origin at the centre of mass of the sprung body, x forward, y left, z up (ISO 8855).
 The speeds are components in this frame.  The road is the plane z = 0.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import sympy as sp
 
 from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
 from vehiclemor.symbolic.tape import Tape
@@ -20,8 +21,18 @@ def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
     return [sp.Symbol(quantity.name, real=True) for quantity in quantities]
 
 
+def parameters(
+    declared: Mapping[str, Declared], further: Iterable[str] = ()
+) -> dict[str, sp.Symbol]:
+    """A symbol for each parameter, three for a point, and for each further name."""
+    flat: list[str] = []
+    for name, parameter in declared.items():
+        flat += [name] if parameter.size == 1 else [f"{name}_{axis}" for axis in "xyz"]
+    return {name: sp.Symbol(f"p_{name}", real=True) for name in (*flat, *further)}
+
+
 def outputs(q: Sequence[sp.Symbol], nu: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """The outputs `CHASSIS_OUTPUTS`."""
+    """Outputs of the chassis: place, yaw, pitch, roll, three velocities and the yaw rate."""
     return [q[0], q[1], q[3], q[4], q[5], nu[0], nu[1], nu[2], nu[5]]
 
 
@@ -134,54 +145,3 @@ def in_coordinates(
             columns[i][j] = mass[i][j]
     right = turned(free)
     return [e for j in range(n) for e in [*(columns[k][j] for k in range(n)), right[j]]]
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Wheel on the road, chassis components."""
-
-    # Height of the wheel centre above the road in m and its rate in m/s.
-    height: sp.Expr
-    rise: sp.Expr
-    # Unit vectors along and across the wheel in the road plane.
-    heading: Vector
-    leftward: Vector
-    # kappa, alpha in rad (sliding to the left is positive), cos alpha.
-    slip_ratio: sp.Expr
-    slip_angle: sp.Expr
-    cos_slip_angle: sp.Expr
-
-
-def contact(
-    tape: Tape,
-    chassis: Attitude,
-    height: sp.Expr,  # Height of the chassis origin above the road.
-    # Wheel centre and spin axis in the chassis frame.
-    place: Vector,
-    axle: Vector,
-    # Velocity of the wheel centre and complete angular velocity of the wheel.
-    velocity: Vector,
-    rotation: Vector,
-    slip_speed: sp.Expr,  # Speed (m/s) below which slip is regularised.
-) -> Contact:
-    """Contact of a rigid wheel whose effective radius is the height of its centre."""
-    up = chassis.road_normal
-    above = tape.let(height + tape.let(up @ place))
-    along = g.named(tape, axle.cross(up))
-    inverse = tape.let(1 / g.length(tape, along))
-    heading = g.named(tape, along * inverse)
-    leftward = g.named(tape, up.cross(heading))
-    arm = g.named(tape, up * -above)
-    sliding = g.named(tape, velocity + rotation.cross(arm))
-    forward = tape.let(heading @ velocity)
-    speed = tape.let(sp.sqrt(tape.let(forward**2 + slip_speed**2)))
-    lateral = tape.let(tape.let(leftward @ sliding) / speed)
-    return Contact(
-        above,
-        tape.let(up @ velocity),
-        heading,
-        leftward,
-        tape.let(-tape.let(heading @ sliding) / speed),
-        tape.let(sp.atan(lateral)),
-        tape.let(1 / sp.sqrt(tape.let(1 + lateral**2))),
-    )

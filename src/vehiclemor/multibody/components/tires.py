@@ -1,4 +1,4 @@
-"""Tire forces as symbolic expressions, for any set of coefficients.
+"""Wheels on the road as symbolic expressions: contact, vertical load, tire forces.
 
 Fiala: E. Fiala, Seitenkraefte am rollenden Luftreifen, VDI-Zeitschrift 96 (1954), in the form of
 MSC Adams/Tire and of the MapleSim Tire Library: friction falls with the combined slip.
@@ -14,6 +14,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from vehiclemor.multibody.components.body import Attitude
+from vehiclemor.symbolic import geometry as g
+from vehiclemor.symbolic.geometry import Vector
+from vehiclemor.symbolic.mechanics import Body, kane
 from vehiclemor.symbolic.tape import Tape
 
 # Keeps 0/0 from a wheel without load and slip; nothing else notices it.
@@ -29,26 +33,56 @@ class TireForces:
     aligning: sp.Expr
 
 
-def tire_outputs(
-    tires: Sequence[TireForces],
-    loads: Sequence[sp.Expr],
-    slip_ratios: Sequence[sp.Expr],
-    slip_angles: Sequence[sp.Expr],
-) -> list[sp.Expr]:
-    """The outputs `TIRE_OUTPUTS` of four wheels."""
+@dataclass(frozen=True)
+class WheelOnRoad:
+    """What the road does to a wheel, chassis components."""
+
+    tire: TireForces
+    load: sp.Expr  # Vertical force in N, not negative.
+    # kappa and the tangent of the slip angle (sliding to the left is positive).
+    slip_ratio: sp.Expr
+    tan_slip: sp.Expr
+    # Force on the wheel in N and its moment about the wheel centre in N m.
+    force: Vector
+    moment: Vector
+
+
+@dataclass(frozen=True)
+class Corner:
+    """Bodies of a corner with what acts on them."""
+
+    bodies: tuple[Body, ...]
+    spring: sp.Expr  # Generalised force of the spring-damper on the coordinate that it acts on.
+    wheel: WheelOnRoad
+
+
+def kane_with_corners(
+    tape: Tape, chassis: Body, corners: Sequence[Corner], springs: Sequence[int], speeds: int
+) -> tuple[list[list[sp.Expr]], list[sp.Expr]]:
+    """Mass matrix and forces of all bodies; springs act on the coordinates of these numbers."""
+    bodies = [chassis, *(part for corner in corners for part in corner.bodies)]
+    mass, force = kane(tape, speeds, bodies)
+    for number, corner in zip(springs, corners, strict=True):
+        force[number] = tape.let(force[number] + corner.spring)
+    return mass, force
+
+
+def tire_outputs(tape: Tape, corners: Sequence[Corner]) -> list[sp.Expr]:
+    """Outputs of the tires: forces, loads, moments, slip ratios and slip angles."""
+    wheels = [corner.wheel for corner in corners]
     return [
-        *(tire.longitudinal for tire in tires),
-        *(tire.lateral for tire in tires),
-        *loads,
-        *(tire.aligning for tire in tires),
-        *slip_ratios,
-        *slip_angles,
+        *(wheel.tire.longitudinal for wheel in wheels),
+        *(wheel.tire.lateral for wheel in wheels),
+        *(wheel.load for wheel in wheels),
+        *(wheel.tire.aligning for wheel in wheels),
+        *(wheel.slip_ratio for wheel in wheels),
+        *(tape.let(sp.atan(wheel.tan_slip)) for wheel in wheels),
     ]
 
 
 def magic_formula(
     tape: Tape,
-    coefficients: Mapping[str, sp.Expr],  # `MAGIC_FORMULA` name -> value.
+    c: Mapping[str, sp.Expr],  # Coefficients, dimensionless, by their published names.
     # Vertical force and F_z0 in N.
     load: sp.Expr,
     reference_load: sp.Expr,
@@ -59,7 +93,7 @@ def magic_formula(
     cos_slip_angle: sp.Expr,
 ) -> TireForces:
     """Forces at combined slip; zero where the load is zero."""
-    c, let = coefficients, tape.let
+    let = tape.let
     d = let((load - reference_load) / reference_load)
     kappa, alpha = slip_ratio, slip_angle
 
@@ -106,7 +140,7 @@ def _arc(tape: Tape, x: sp.Expr, curvature: sp.Expr) -> sp.Expr:
 
 def fiala(
     tape: Tape,
-    coefficients: Mapping[str, sp.Expr],  # `FIALA` name -> value.
+    c: Mapping[str, sp.Expr],  # Coefficients `FIALA`.
     load: sp.Expr,  # Vertical force in N.
     # kappa, and the tangent of the slip angle.
     slip_ratio: sp.Expr,
@@ -117,7 +151,7 @@ def fiala(
     Each force grows with its own slip until the contact slides; the slips act on each other through
     the friction coefficient alone.
     """
-    c, let = coefficients, tape.let
+    let = tape.let
     combined = let(sp.sqrt(let(slip_ratio**2 + tan_slip**2)))
     sliding = let(minimum(tape, combined, sp.Integer(1)))
     fall = let(c["largest_friction"] - c["smallest_friction"])
@@ -146,3 +180,92 @@ def maximum(tape: Tape, a: sp.Expr, b: sp.Expr) -> sp.Expr:
 def minimum(tape: Tape, a: sp.Expr, b: sp.Expr) -> sp.Expr:
     """The smaller of two values, without a branch."""
     return tape.let((a + b - sp.Abs(tape.let(a - b))) / 2)
+
+
+def upright_wheel(
+    tape: Tape,
+    chassis: Attitude,
+    height: sp.Expr,  # Height of the chassis origin above the road.
+    # Wheel centre and spin axis in the chassis frame.
+    place: Vector,
+    axle: Vector,
+    # Velocity of the wheel centre and complete angular velocity of the wheel.
+    velocity: Vector,
+    rotation: Vector,
+    p: Mapping[str, sp.Expr],  # Parameters of the vehicle.
+) -> WheelOnRoad:
+    """A wheel whose effective radius is the height of its centre, with the Magic Formula.
+
+    The vertical load has no arm.
+    """
+    let, up = tape.let, chassis.road_normal
+    above = let(height + let(up @ place))
+    along = g.named(tape, axle.cross(up))
+    inverse = let(1 / g.length(tape, along))
+    heading = g.named(tape, along * inverse)
+    leftward = g.named(tape, up.cross(heading))
+    arm = g.named(tape, up * -above)
+    sliding = g.named(tape, velocity + rotation.cross(arm))
+    forward = let(heading @ velocity)
+    speed = let(sp.sqrt(let(forward**2 + p["slip_speed"] ** 2)))
+    lateral = let(let(leftward @ sliding) / speed)
+    rise = let(up @ velocity)
+    ratio, angle = let(-let(heading @ sliding) / speed), let(sp.atan(lateral))
+    slips = ratio, angle, let(1 / sp.sqrt(let(1 + lateral**2)))
+
+    pressed = let(p["tire_stiffness"] * (p["tire_radius"] - above) - p["tire_damping"] * rise)
+    load = let((pressed + sp.Abs(pressed)) / 2)
+    reference_load = let(p["nominal_load"] * p["load_scale"])
+    tire = magic_formula(tape, p, load, reference_load, p["tire_radius"], *slips)
+    shear = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral)
+    moment = arm.cross(shear) + up * tire.aligning
+    force = g.named(tape, shear + up * load)
+    return WheelOnRoad(tire, load, ratio, lateral, force, g.named(tape, moment))
+
+
+def tilted_wheel(
+    tape: Tape,
+    up: Vector,  # Road normal.
+    height: sp.Expr,  # Height of the wheel centre above the road.
+    axle: Vector,  # Unit spin axis.
+    # Velocity of the wheel centre, angular velocity of the carrier without the spin.
+    velocity: Vector,
+    turning: Vector,
+    spin: sp.Expr,  # Spin of the wheel on its carrier in rad/s.
+    p: Mapping[str, sp.Expr],  # Parameters of the vehicle.
+) -> WheelOnRoad:
+    """A wheel with camber and Fiala's tire.
+
+    The contact point is where the wheel's plane, through its centre and across its spin axis, meets
+    the road; the loaded radius is also the effective rolling radius.
+    """
+    let = tape.let
+    across = g.named(tape, axle.cross(up))
+    # The length of axle x up is the cosine of the camber angle.
+    inverse = let(1 / g.length(tape, across))
+    heading = g.named(tape, across * inverse)
+    leftward = g.named(tape, up.cross(heading))
+    down = g.named(tape, axle.cross(heading))
+    radius = let(height * inverse)
+    arm = g.named(tape, down * radius)
+    sliding = g.named(tape, velocity + turning.cross(arm))
+    forward, lateral = let(sliding @ heading), let(sliding @ leftward)
+    rise = let(sliding @ up)
+
+    load = vertical_load(tape, radius, rise * inverse, p)
+    per_speed = let(1 / maximum(tape, let(sp.Abs(forward)), p["slip_speed"]))
+    ratio, tan_slip = let(let(spin * radius - forward) * per_speed), let(lateral * per_speed)
+    tire = fiala(tape, p, load, ratio, tan_slip)
+    force = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral + up * load)
+    moment = g.named(tape, arm.cross(force) + up * tire.aligning)
+    return WheelOnRoad(tire, load, ratio, tan_slip, force, moment)
+
+
+def vertical_load(tape: Tape, radius: sp.Expr, rate: sp.Expr, p: Mapping[str, sp.Expr]) -> sp.Expr:
+    """Vertical force of a wheel that pushes and never pulls, from its loaded radius and rate."""
+    let = tape.let
+    pressed = let(p["tire_radius"] - radius)
+    elastic = let(let(p["tire_stiffness"] / 2) * (pressed + sp.Abs(pressed)))
+    damping = let(-p["tire_damping"] * let(rate))
+    total = let(elastic + minimum(tape, elastic, damping))
+    return let((total + sp.Abs(total)) / 2)

@@ -8,7 +8,7 @@ the opposite of its force.  A tire lifts its axle.  Springs, dampers and stops a
 import sympy as sp
 
 from vehiclemor.multibody.components import body
-from vehiclemor.multibody.flexible_truck.vehicle import DECLARED, ENDS
+from vehiclemor.multibody.flexible_truck.definition import DECLARED, ENDS
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
@@ -23,16 +23,14 @@ def derive() -> Program:
     w = body.symbols(DECLARED["ports"])
     rates = [sp.Symbol(f"{symbol.name}_rate", real=True) for symbol in w]
     u = body.symbols(DECLARED["inputs"])
-    p = {name: sp.Symbol(f"p_{name}", real=True) for name in DECLARED["parameters"]}
-    driver = [sp.Symbol(f"p_driver_{axis}", real=True) for axis in "xyz"]
-    parameters = [s for name in p for s in (driver if name == "driver" else [p[name]])]
+    p = body.parameters(DECLARED["parameters"])
     forces = [-_spring(tape, p, ENDS[k // 2], w[k]) for k in range(4)]
     forces += [-_damper(tape, p, rates[4 + k]) for k in range(4)]
     forces += [_tire(tape, p, u[k] - w[8 + k], u[4 + k] - rates[8 + k]) for k in range(4)]
     slopes = tape.jacobian(forces, [*w, *rates])
     table = [x for k, f in enumerate(forces) for x in (f, slopes[k][k], slopes[k][len(w) + k])]
     return assemble(
-        tape, {"x": [*w, *rates], "u": u}, parameters, {"port_forces": (table, (len(w), 3))}
+        tape, {"x": [*w, *rates], "u": u}, list(p.values()), {"port_forces": (table, (len(w), 3))}
     )
 
 

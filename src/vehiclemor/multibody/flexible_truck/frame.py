@@ -1,12 +1,15 @@
-"""The ladder frame as its meshes share it: sections, stations, and what a mesh hands on."""
+"""The ladder frame, meshed by space beams or by flat shells: 6 coordinates a node."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from vehiclemor.exceptions import InputError
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -15,6 +18,12 @@ if TYPE_CHECKING:
 BAY = 0.7
 # Nodes nearer than this (m) are one.
 SAME = 1e-6
+# Deflection and slope at the first end, then at the second, of a beam of length 1.
+BENDING = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+SHEAR = np.array([[0, 0, 0, 0], [0, 1, 0, -1], [0, 0, 0, 0], [0, -1, 0, 1]])
+INERTIA = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
+# From axes x, y, z to those of a beam along y.
+ALONG_Y = np.kron(np.eye(4), [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 class Section:
@@ -138,3 +147,213 @@ def strains(lines: np.ndarray, corners: csc_array, bays: list[tuple[float, float
         ends = [by_line[4 * line : 4 * line + 4] for line in (front, rear)]
         rows.append((ends[0] - ends[1]) / (lines[front] - lines[rear]))
     return csc_array(vstack(rows))
+
+
+def beam_matrices(
+    lengths: np.ndarray, section: Section, material: tuple[float, float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and mass (elements, 12, 12) of beams along x with upright webs, z up.
+
+    Rows: displacements x, y, z and rotations about them at the first end, then at the second.
+    Timoshenko's stiffness with St. Venant's torsion, consistent mass of the cubic shape functions
+    (Przemieniecki, *Theory of Matrix Structural Analysis*, 1968, 5.6 and 11.4).  Left out: warping,
+    which stiffens open sections in torsion, and the rotary inertia of bending.
+    """
+    modulus, poisson_ratio, density = material
+    shear_modulus = modulus / (2.0 * (1.0 + poisson_ratio))
+    stiffness, mass = np.zeros((2, len(lengths), 12, 12))
+    length = lengths[:, None, None]
+    polar = section.upright + section.sideways
+    for row, rigidity, inertia in (
+        (0, modulus * section.area, density * section.area),
+        (3, shear_modulus * section.torsion, density * polar),
+    ):
+        own = (slice(None), *np.ix_([row, row + 6], [row, row + 6]))
+        stiffness[own] = rigidity / length * [[1, -1], [-1, 1]]
+        mass[own] = inertia * length / 6.0 * [[2, 1], [1, 2]]
+    # A slope about y lowers the far end.
+    for rows, second_moment, shear_area, sign in (
+        ([2, 4, 8, 10], section.upright, section.shear_areas[0], -1.0),
+        ([1, 5, 7, 11], section.sideways, section.shear_areas[1], 1.0),
+    ):
+        own = (slice(None), *np.ix_(rows, rows))
+        rigidity = modulus * second_moment
+        shear = 12.0 * rigidity / (shear_modulus * shear_area * length**2)
+        slopes = np.where([False, True, False, True], sign * length, 1.0)
+        scale = slopes * slopes.swapaxes(1, 2)
+        stiffness[own] = rigidity / (length**3 * (1.0 + shear)) * scale * (BENDING + shear * SHEAR)
+        mass[own] = density * section.area * length / 420.0 * scale * INERTIA
+    return stiffness, mass
+
+
+def at_nodes(axial: float, across: float) -> np.ndarray:
+    """Motion (12, 12) of a beam's line by that of its nodes.
+
+    `axial` and `across` are the places y in m, relative to the nodes, of the points whose
+    displacement is along the beam, and across it.
+    """
+    end, shear = levers(np.array([[0.0, axial, 0.0], [0.0, across, 0.0]]))
+    end[2] = shear[2]
+    return np.kron(np.eye(2), end)
+
+
+def frame_of_beams(layout: Layout, elements_per_bay: int) -> Frame:
+    """Ladder frame of beams with so many elements a bay, and as many a cross member.
+
+    Axial forces act at the centroid, transverse ones at the shear centre; the nodes stand on the
+    webs.  Half a cross member's width of the rails at either end is left out.
+    """
+    from scipy.sparse import block_diag, csc_array, diags_array, eye_array
+
+    k, rail, height, stations = elements_per_bay, layout.rail, layout.height, layout.stations
+    lines = divided(stations, np.full(len(stations) - 1, k))
+    widths = divided(layout.sides[::-1], np.array([k]))
+    # Rails run forward, cross members to the left.
+    grids = [np.array([(x, y, height) for x in lines[::-1]]) for y in layout.sides]
+    grids += [np.array([(stations[n], y, height) for y in widths]) for n in layout.crossings]
+    nodes, numbers = joined(grids)
+    coordinates = eye_array(6 * len(nodes)).tocsr()
+    stiffness, mass, ends = [], [], []
+    for line, (places, own) in enumerate(zip(grids, numbers, strict=True)):
+        lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        section, bent, moved = layout.cross, ALONG_Y, ALONG_Y
+        if line < 2:
+            # Flanges point inward.
+            inward = -np.sign(layout.sides[line])
+            centre, shear = inward * rail.centroid, inward * rail.shear_centre
+            section, bent, moved = rail, at_nodes(centre, shear), at_nodes(centre, centre)
+        elastic, inertia = beam_matrices(lengths, section, layout.material)
+        stiffness += list(bent.T @ elastic @ bent)
+        mass += list(moved.T @ inertia @ moved)
+        ends += list(pairwise(own))
+    chosen = coordinates[np.add.outer(6 * np.ravel(ends), np.arange(6)).ravel()]
+    webs = np.stack([own[::-1] for own in numbers[:2]], axis=1)
+    along = 6 * np.repeat(webs, 2)
+    up = diags_array(np.tile([0.5, -0.5], webs.size) * rail.height)
+    return Frame(
+        mass=csc_array(chosen.T @ block_diag(mass) @ chosen),
+        stiffness=csc_array(chosen.T @ block_diag(stiffness) @ chosen),
+        nodes=nodes,
+        sections=csc_array(coordinates[np.add.outer(6 * webs[::k], np.arange(6)).ravel()]),
+        strains=strains(
+            lines,
+            csc_array(coordinates[along] + up @ coordinates[along + 4]),
+            [(stations[n], stations[n + 1]) for n in layout.gauged],
+        ),
+    )
+
+
+def shell_matrices(
+    nodes: np.ndarray,
+    plates: Sequence[tuple[np.ndarray, float]],
+    material: tuple[float, float, float],
+) -> tuple[csc_array, csc_array]:
+    """Mass and stiffness (n, n) of plates, `Quad4` of pyfe3d; `InputError` where it is missing.
+
+    Turning about a plate's normal is stiff but has no inertia: the mass matrix is singular.
+
+    A plate is the numbers of its nodes (rows, columns) and its thickness in m.
+    """
+    from scipy.sparse import coo_array, csc_array
+
+    try:
+        from pyfe3d import INT, Quad4, Quad4Data, Quad4Probe
+        from pyfe3d.shellprop_utils import isotropic_plate
+    except ImportError as error:
+        raise InputError(
+            'shell_size needs pyfe3d; install it by: pip install "vehiclemor[shells]"'
+        ) from error
+    modulus, poisson_ratio, density = material
+    data, probe, flat = Quad4Data(), Quad4Probe(), np.ascontiguousarray(nodes).ravel()
+    count = sum((len(own) - 1) * (own.shape[1] - 1) for own, _ in plates)
+    sizes = data.KC0_SPARSE_SIZE, data.M_SPARSE_SIZE
+    entries = [(np.zeros(n, INT), np.zeros(n, INT), np.zeros(n)) for n in np.multiply(sizes, count)]
+    number = 0
+    for own, thickness in plates:
+        plate = isotropic_plate(thickness=thickness, E=modulus, nu=poisson_ratio, rho=density)
+        corners = 6 * np.stack([own[:-1, :-1], own[1:, :-1], own[1:, 1:], own[:-1, 1:]], axis=-1)
+        for four in corners.reshape(-1, 4).tolist():
+            element = Quad4(probe)
+            element.c1, element.c2, element.c3, element.c4 = four
+            element.init_k_KC0, element.init_k_M = number * sizes[0], number * sizes[1]
+            element.update_rotation_matrix(flat)
+            element.update_probe_xe(flat)
+            element.update_KC0(*entries[0], plate)
+            element.update_M(*entries[1], plate)
+            number += 1
+    shape = (6 * len(nodes),) * 2
+    stiffness, mass = (csc_array(coo_array((v, (i, j)), shape)) for i, j, v in entries)
+    for matrix in (stiffness, mass):
+        matrix.eliminate_zeros()
+    return csc_array((mass + mass.T) / 2.0), csc_array((stiffness + stiffness.T) / 2.0)
+
+
+def frame_of_shells(layout: Layout, size: float) -> Frame:
+    """Ladder frame of shells with elements of about some size (m).
+
+    Rails and cross members are plates along the middle lines of their sections, joined where these
+    meet.
+    """
+    from scipy.sparse import csc_array, eye_array, vstack
+
+    def meshed(corners: list[float]) -> np.ndarray:
+        return divided(corners, np.maximum(1, np.round(np.abs(np.diff(corners)) / size)))
+
+    def drawn(lines: np.ndarray, section: np.ndarray) -> np.ndarray:
+        """Nodes (lines, points, 3) of a section (points, 2) drawn along x."""
+        return np.array([[(x, y, z + layout.height) for y, z in section] for x in lines])
+
+    rail, cross, up = layout.rail, layout.cross, layout.rail.height / 2.0
+    # Places x (stations, 2) of the cross members' webs, twice the same where there is none.
+    webs = np.stack([layout.stations, layout.stations], axis=1)
+    webs[layout.crossings] += np.array([0.5, -0.5]) * cross.width
+    lines = meshed(np.unique(webs)[::-1].tolist())
+    outer, tip = layout.sides[0], layout.sides[0] - rail.width
+    inward, upward, between = meshed([outer, tip]), meshed([-up, up]), meshed([tip, -tip])
+    whole = np.concatenate([inward[:-1], between, -inward[-2::-1]])
+    flanges = [[(y, z) for y in inward[1:]] for z in (-up, up)]
+    section = np.array([*flanges[0][::-1], *((outer, z) for z in upward), *flanges[1]])
+    grids = [drawn(lines, section * [sign, 1.0]) for sign in (1.0, -1.0)]
+    for front, rear in webs[layout.crossings]:
+        pair = [drawn(whole, np.array([(x, z) for z in upward])) for x in (front, rear)]
+        grids += [web[..., [1, 0, 2]] for web in pair]
+        inner = lines[(lines < front + SAME) & (lines > rear - SAME)]
+        grids += [drawn(inner, np.array([(y, z) for y in between])) for z in (up, -up)]
+    nodes, numbers = joined(grids)
+    thickness = [rail.thickness] * 2 + [cross.thickness] * (len(grids) - 2)
+    mass, stiffness = shell_matrices(
+        nodes, list(zip(numbers, thickness, strict=True)), layout.material
+    )
+    coordinates = eye_array(6 * len(nodes)).tocsr()
+    # The motion of a section is that of a rigid one which fits its nodes best, weighted by their
+    # share of the middle line; in a cross member's plane the nodes are those of both its webs.
+    spans = np.linalg.norm(np.diff(section, axis=0), axis=1)
+    shares = np.append(spans, 0.0) + np.append(0.0, spans)
+    roots = np.sqrt(np.repeat(np.tile(shares, 2), 3))[:, None]
+    sections = []
+    for x, pair in zip(layout.stations, webs, strict=True):
+        near = np.abs(lines[:, None] - pair).argmin(axis=0)
+        for own, y in zip(numbers, layout.sides, strict=False):
+            ring = own[near].ravel()
+            rigid = levers(nodes[ring] - [x, y, layout.height])[:, :3].reshape(-1, 6)
+            moved = coordinates[np.add.outer(6 * ring, np.arange(3)).ravel()]
+            sections.append(csc_array(np.linalg.pinv(roots * rigid) * roots.T) @ moved)
+    # Upper corner, then the lower one.
+    corners = np.stack([own[:, [-len(inward), len(inward) - 1]] for own in numbers[:2]], axis=1)
+    return Frame(
+        mass,
+        stiffness,
+        nodes,
+        csc_array(vstack(sections)),
+        strains(
+            lines,
+            csc_array(coordinates[6 * corners.ravel()]),
+            [(webs[n, 1], webs[n + 1, 0]) for n in layout.gauged],
+        ),
+    )
+
+
+def meshed(layout: Layout, values: Mapping[str, Any]) -> Frame:
+    """Ladder frame of shells of `shell_size`, or of beams where this is 0."""
+    size, parts = values["shell_size"], int(values["elements_per_bay"])
+    return frame_of_shells(layout, size) if size else frame_of_beams(layout, parts)

@@ -1,4 +1,4 @@
-"""Corners of the high-fidelity vehicle: double wishbones in front, trailing arms behind.
+"""The high-fidelity vehicle and its corners: double wishbones in front, trailing arms behind.
 
 Each corner gives its bodies with their loads for any rates of its joint coordinates: where these
 are speeds of their own the result is the unconstrained system, where they follow from the lower
@@ -11,21 +11,94 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from vehiclemor.multibody.components import tilted_wheel
-from vehiclemor.multibody.components.tires import TireForces
-from vehiclemor.multibody.double_wishbone.linkage import Arm, Linkage
-from vehiclemor.multibody.high_fidelity.linkage_motions import LinkageMotions
-from vehiclemor.multibody.high_fidelity.parts import SIDES, Vehicle
+from vehiclemor.multibody.components import body
+from vehiclemor.multibody.components import linkage as links
+from vehiclemor.multibody.components.tires import Corner, WheelOnRoad, tilted_wheel
+from vehiclemor.multibody.double_wishbone.definition import POINTS
+from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SOLVED, SPINS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
 from vehiclemor.symbolic.geometry import Vector
-from vehiclemor.symbolic.joints import STILL, Rate, along, carried
-from vehiclemor.symbolic.mechanics import Body, Motion, Rotor, Tensor
+from vehiclemor.symbolic.mechanics import STILL, Body, Motion, Rate, Rotor, Tensor, along, carried
 from vehiclemor.symbolic.tape import Tape
 
 Parameters = Mapping[str, sp.Expr]
-# Of the corners in order.
+# Of the corners in order: FL, FR, RL, RR; 1 on the left, -1 on the right.
 ENDS = ("front", "front", "rear", "rear")
+SIDES = (1, -1, 1, -1)
+FRONT_POINTS = (
+    *POINTS,
+    *("front_spring_chassis_point", "front_spring_arm_point"),
+    *("upper_arm_centre", "lower_arm_centre", "carrier_centre"),
+)
+REAR_POINTS = (
+    *("rear_arm_pivot", "rear_arm_centre", "rear_spring_chassis_point", "rear_spring_arm_point"),
+)
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """The chassis, the design points, and the front linkages in any position."""
+
+    attitude: body.Attitude
+    # Moving frame of the chassis, its origin the centre of mass; its first three speeds are
+    # velocities in space, and gravity is counted as an acceleration upwards.
+    frame: m.MovingFrame
+    points: tuple[dict[str, Vector], ...]  # Design points of the four corners, chassis frame.
+    linkages: tuple[links.Linkage, ...]
+    # Coordinates and their rates; displacement, velocity and acceleration of the rack.
+    q: Sequence[sp.Symbol]
+    rates: Sequence[sp.Symbol]
+    rack: Sequence[sp.Symbol]
+    p: Parameters
+
+    @property
+    def speeds(self) -> list[sp.Expr]:
+        """The six speeds of the chassis."""
+        return [*self.frame.velocity, *self.frame.angular_velocity]
+
+    def motions(self, tape: Tape, rates: Sequence[Rate], k: int) -> links.LinkageMotions:
+        """Motions of the front left (0) or right (1) corner for rates of all coordinates."""
+        q, own = [self.q[j] for j in CORNER[k]], [rates[j] for j in CORNER[k]]
+        return links.linkage_motions(tape, self.linkages[k], q, own, self.rack[1:])
+
+
+def vehicle(tape: Tape) -> tuple[Vehicle, list[sp.Symbol]]:
+    """The vehicle, and the symbols of its parameters in order."""
+    q, rates, rack = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds", "inputs"))
+    p = body.parameters(DECLARED["parameters"], SOLVED)
+    attitude = body.attitude(tape, q)
+    speeds = body.speeds(tape, attitude, rates)
+    frame = m.MovingFrame(
+        g.vector(speeds[:3]),
+        g.vector(speeds[3:6]),
+        acceleration=g.named(tape, attitude.road_normal * p["gravity"]),
+    )
+    points = _design_points(tape, p)
+    linkages = tuple(
+        links.assembled(tape, [q[j] for j in CORNER[k]], rack[0], points[k], SIDES[k])
+        for k in range(2)
+    )
+    return Vehicle(attitude, frame, points, linkages, q, rates, rack, p), list(p.values())
+
+
+def _design_points(tape: Tape, p: Parameters) -> tuple[dict[str, Vector], ...]:
+    """Design points of the four corners, chassis frame."""
+
+    def vector(name: str) -> Vector:
+        return g.vector([p[f"{name}_{axis}"] for axis in "xyz"])
+
+    origin = vector("chassis_centre")
+    front = g.named(tape, vector("front_frame_origin") - origin)
+    rear = g.named(tape, vector("rear_wheel_centre") - origin)
+    left = {name: g.named(tape, vector(name) + front) for name in FRONT_POINTS}
+    behind = {name: g.named(tape, vector(name) + rear) for name in REAR_POINTS}
+    behind["rear_wheel_centre"] = rear
+
+    def mirrored(points: dict[str, Vector]) -> dict[str, Vector]:
+        return {name: Vector(x, -y, z) for name, (x, y, z) in points.items()}
+
+    return left, mirrored(left), behind, mirrored(behind)
 
 
 class _WheelCarrier(NamedTuple):
@@ -44,23 +117,9 @@ class _WheelCarrier(NamedTuple):
     axle: Vector  # Spin axis of the wheel.
 
 
-@dataclass(frozen=True)
-class Corner:
-    """Bodies of a corner with what acts on them."""
-
-    bodies: tuple[Body, ...]
-    # Generalised force of the spring-damper on the arm that carries it in N m.
-    spring_moment: sp.Expr
-    # Wheel on the road.
-    contact: tilted_wheel.TiltedContact
-    tire: TireForces
-
-
-def front_corner(
-    tape: Tape, v: Vehicle, k: int, linkage: Linkage, motions: LinkageMotions
-) -> Corner:
+def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) -> Corner:
     """Arms, wheel carrier with its wheel, and tie rod of the left (k = 0) or right (1) corner."""
-    frame, points, p = v.frame, v.points[k], v.p
+    frame, points, p, linkage = v.frame, v.points[k], v.p, v.linkages[k]
 
     def arm(name: str, turn: Motion) -> Body:
         part = linkage.upper if name == "upper" else linkage.lower
@@ -86,15 +145,7 @@ def front_corner(
         m.with_inertia(tape, tensor, frame.turning(tape, motions.rod)),
         tensor,
     )
-    mass, centre, tensor = _with_wheel(
-        tape,
-        p["carrier_mass"],
-        points["carrier_centre"],
-        diagonal(p, "carrier_inertia"),
-        points["wheel_centre"],
-        p,
-        "front",
-    )
+    mass, centre, tensor = _with_wheel(tape, v, k, "carrier", diagonal(p, "carrier_inertia"))
     wheeled = _WheelCarrier(
         mass,
         m.rotated_tensor(tape, tensor, linkage.carrier),
@@ -105,22 +156,16 @@ def front_corner(
         linkage.carrier_lever(tape, points["wheel_centre"]),
         g.column(linkage.carrier, 1),
     )
-    carrier, contact, tire = _wheeled_body(tape, v, k, wheeled)
+    carrier, wheel = _wheeled_body(tape, v, k, wheeled)
     lever = linkage.lower.lever(tape, points["front_spring_arm_point"])
-    moment = _spring(
-        tape,
-        linkage.lower.rear + lever - points["front_spring_chassis_point"],
-        carried(tape, STILL, motions.lower, lever),
-        v,
-        k,
-    )
+    moment = _spring(tape, v, k, linkage.lower.rear, lever, motions.lower)
     bodies = (arm("upper", motions.upper), arm("lower", motions.lower), carrier, rod)
-    return Corner(bodies, moment, contact, tire)
+    return Corner(bodies, moment, wheel)
 
 
 def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner:
     """Trailing arm with its wheel, left (k = 2) or right (3); it turns about the lateral axis."""
-    points, side, p, number = v.points[k], SIDES[k], v.p, v.numbers.arms[k]
+    points, side, p, number = v.points[k], SIDES[k], v.p, ARMS[k]
     pivot, axis, angle = points["rear_arm_pivot"], m.UNIT[1], v.q[number]
     turn = along(rates[number], axis)
 
@@ -135,15 +180,7 @@ def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner
         Vector(side * xy, yy, side * yz),
         Vector(xz, side * yz, zz),
     )
-    mass, centre, tensor = _with_wheel(
-        tape,
-        p["rear_arm_mass"],
-        points["rear_arm_centre"],
-        arm_tensor,
-        points["rear_wheel_centre"],
-        p,
-        "rear",
-    )
+    mass, centre, tensor = _with_wheel(tape, v, k, "rear_arm", arm_tensor)
     to_centre = g.rotate_about_axis(tape, g.named(tape, centre - pivot), axis, angle)
     wheeled = _WheelCarrier(
         mass,
@@ -155,23 +192,14 @@ def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner
         lever("rear_wheel_centre"),
         axis,
     )
-    arm, contact, tire = _wheeled_body(tape, v, k, wheeled)
-    to_spring = lever("rear_spring_arm_point")
-    moment = _spring(
-        tape,
-        pivot + to_spring - points["rear_spring_chassis_point"],
-        carried(tape, STILL, turn, to_spring),
-        v,
-        k,
-    )
-    return Corner((arm,), moment, contact, tire)
+    arm, wheel = _wheeled_body(tape, v, k, wheeled)
+    moment = _spring(tape, v, k, pivot, lever("rear_spring_arm_point"), turn)
+    return Corner((arm,), moment, wheel)
 
 
-def _wheeled_body(
-    tape: Tape, v: Vehicle, k: int, part: _WheelCarrier
-) -> tuple[Body, tilted_wheel.TiltedContact, TireForces]:
+def _wheeled_body(tape: Tape, v: Vehicle, k: int, part: _WheelCarrier) -> tuple[Body, WheelOnRoad]:
     """A carrier or arm together with its wheel, and the wheel on the road."""
-    frame, axle, spin = v.frame, part.axle, v.numbers.spins[k]
+    frame, axle, spin = v.frame, part.axle, SPINS[k]
     levers = (part.to_centre, part.to_wheel)
     places = [g.named(tape, part.base + lever) for lever in levers]
     centre, wheel = (
@@ -179,15 +207,14 @@ def _wheeled_body(
         for point, lever in zip(places, levers, strict=True)
     )
     turning = frame.turning(tape, part.turn)
-    height = tape.let(v.q[2] + tape.let(v.up @ places[1]))
-    contact = tilted_wheel.tilted_contact(
-        tape, v.up, height, axle, wheel.value, turning.value, v.rates[spin], v.p
+    height = tape.let(v.q[2] + tape.let(v.attitude.road_normal @ places[1]))
+    on_road = tilted_wheel(
+        tape, v.attitude.road_normal, height, axle, wheel.value, turning.value, v.rates[spin], v.p
     )
-    tire = tilted_wheel.tire_on(tape, contact, v.p)
-    force, moment = contact.loads(tape, tire)
+    force, moment = on_road.force, on_road.moment
     arm = g.named(tape, places[1] - places[0])
     inertia = v.p[f"{ENDS[k]}_wheel_spin_inertia"]
-    rotor = Rotor(spin, v.rates[spin], axle, inertia, tape.let(moment @ axle))
+    rotor = Rotor(spin, v.rates[spin], axle, inertia, tape.let(moment @ axle), turning.bias)
     body = Body(
         part.mass,
         centre,
@@ -196,37 +223,30 @@ def _wheeled_body(
         part.tensor,
         g.named(tape, moment + arm.cross(force)),
         rotor,
-        turning.bias,
     )
-    return body, contact, tire
+    return body, on_road
 
 
-def _spring(tape: Tape, gap: Vector, motion: Motion, v: Vehicle, k: int) -> sp.Expr:
-    """Generalised force of a spring-damper from the chassis to a moving point of an arm.
-
-    The gap leads from the chassis to the arm, the motion is of the end on the arm.
-    """
+def _spring(tape: Tape, v: Vehicle, k: int, pivot: Vector, lever: Vector, turn: Motion) -> sp.Expr:
+    """Generalised force of a spring-damper from the chassis to an arm on a pivot, at a lever."""
     p, end = v.p, ENDS[k]
-    gap = g.named(tape, gap)
+    motion = carried(tape, STILL, turn, lever)
+    gap = g.named(tape, pivot + lever - v.points[k][f"{end}_spring_chassis_point"])
     length = g.length(tape, gap)
     direction = g.named(tape, gap * tape.let(1 / length))
     rate = tape.let(direction @ motion.value)
     compression = tape.let(p[f"{end}_free_length"] - length)
     force = tape.let(p[f"{end}_stiffness"] * compression - p[f"{end}_damping"] * rate)
-    return tape.let(force * tape.let(direction @ motion.columns[v.numbers.arms[k]]))
+    return tape.let(force * tape.let(direction @ motion.columns[ARMS[k]]))
 
 
 def _with_wheel(
-    tape: Tape,
-    mass: sp.Expr,
-    centre: Vector,
-    tensor: Tensor,
-    wheel_centre: Vector,
-    p: Parameters,
-    end: str,
+    tape: Tape, v: Vehicle, k: int, name: str, tensor: Tensor
 ) -> tuple[sp.Expr, Vector, Tensor]:
     """Mass, centre of mass and tensor of a carrier with its wheel, at the design position."""
-    wheel = p[f"{end}_wheel_mass"]
+    p, points, end = v.p, v.points[k], ENDS[k]
+    mass, centre, wheel = p[f"{name}_mass"], points[f"{name}_centre"], p[f"{end}_wheel_mass"]
+    wheel_centre = points["wheel_centre" if end == "front" else "rear_wheel_centre"]
     total = tape.let(mass + wheel)
     weighted = centre * mass + wheel_centre * wheel
     both = g.named(tape, weighted * (1 / total))
@@ -249,7 +269,7 @@ def diagonal(p: Parameters, name: str) -> Tensor:
     return g.vector((x, 0, 0)), g.vector((0, y, 0)), g.vector((0, 0, z))
 
 
-def _arm_tensor(tape: Tape, v: Vehicle, k: int, arm: Arm, name: str) -> Tensor:
+def _arm_tensor(tape: Tape, v: Vehicle, k: int, arm: links.Arm, name: str) -> Tensor:
     """Tensor of a control arm at the design position, from that in its own axes."""
     axis = arm.axis(tape)
     lever = g.named(tape, v.points[k][f"{name}_ball_joint"] - arm.rear)

@@ -6,56 +6,36 @@ that of the lower arm, so that Kane's equations remain in 14 accelerations and n
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import sympy as sp
 
-from vehiclemor.multibody.components import body
-from vehiclemor.multibody.double_wishbone import linkage
-from vehiclemor.multibody.high_fidelity import assembly, corners, linkage_motions, parts
-from vehiclemor.multibody.high_fidelity.equilibrium import DECLARED
+from vehiclemor.multibody.components import body, linkage
+from vehiclemor.multibody.components.tires import Corner, kane_with_corners, tire_outputs
+from vehiclemor.multibody.high_fidelity import corners
+from vehiclemor.multibody.high_fidelity.corners import Vehicle
+from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SPINS
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
-from vehiclemor.symbolic.elimination import eliminate
-from vehiclemor.symbolic.joints import Rate, free_rate
+from vehiclemor.symbolic.elimination import eliminate, eliminate_symmetric
+from vehiclemor.symbolic.mechanics import Rate, free_rate
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
-# Places of the front corners' coordinates, and of the arms that carry the springs.
-CORNER = (range(6, 13), range(13, 20))
-LOWER_ARMS = (10, 17)
-NUMBERS = parts.Numbers(len(DECLARED["coordinates"]), (*LOWER_ARMS, 20, 21), (22, 23, 24, 25))
+LOWER_ARMS = ARMS[:2]
+# Order of elimination: each but the last six couples to these and to one other.
+ORDER = (*SPINS, *ARMS, *range(6))
 # Pivots (closure, coordinate of the six without the lower arm's) at the design position.
 PIVOTS = ((3, 4), (5, 5), (0, 1), (1, 2), (2, 3), (4, 0))
-
-
-@dataclass(frozen=True)
-class _Mechanism:
-    """The vehicle, its front linkages in any position, and displacement and motion of the rack."""
-
-    vehicle: parts.Vehicle
-    linkages: tuple[linkage.Linkage, ...]
-    rack: tuple[sp.Symbol, ...]
 
 
 def derive() -> Program:
     """Derive accelerations, outputs, and the unsolved descriptor form; parameters stay symbols."""
     tape = Tape()
-    q, rates = body.symbols(DECLARED["coordinates"]), body.symbols(DECLARED["speeds"])
-    rack = body.symbols(DECLARED["inputs"])
-    p, flat = parts.parameters()
-    vehicle, attitude, speeds = parts.vehicle(tape, q, rates, p, NUMBERS)
-    mechanism = _Mechanism(
-        vehicle,
-        tuple(
-            linkage.assembled(tape, _own(q, k), rack[0], vehicle.points[k], parts.SIDES[k])
-            for k in range(2)
-        ),
-        tuple(rack),
-    )
+    vehicle, parameters = corners.vehicle(tape)
+    p, q, rates, speeds = vehicle.p, vehicle.q, vehicle.rates, vehicle.speeds
+    n, count = len(q), len(DECLARED["constraints"])
     free = [free_rate(k, rate) for k, rate in enumerate(rates)]
-    gaps, motions = _closures(tape, mechanism, free)
+    gaps, motions = _closures(tape, vehicle, free)
     gap_rates = [value for motion in motions for value in motion.value]
     a, b = tape.let(2 * p["baumgarte_a"]), tape.let(p["baumgarte_b"] ** 2)
     biases = [bias for motion in motions for bias in motion.bias]
@@ -65,17 +45,18 @@ def derive() -> Program:
     ]
 
     bound = _bound_rates(tape, motions, gamma, free)
-    closed = _corners(tape, mechanism, bound)
-    solved = assembly.solved(tape, vehicle, closed)
-    accelerations = [
-        *assembly.chassis_accelerations(tape, attitude, solved, speeds),
-        *_joint_accelerations(tape, bound, solved)[6:],
+    closed = _corners(tape, vehicle, bound)
+    solved = eliminate_symmetric(tape, *_kane(tape, vehicle, closed), ORDER)
+    accelerations = _chassis_accelerations(tape, vehicle, solved)
+    accelerations += [
+        tape.let(rate.bias + sp.Add(*[factor * solved[j] for j, factor in rate.columns.items()]))
+        for rate in bound[6:]
     ]
 
-    mass, force = assembly.kane(tape, vehicle, _corners(tape, mechanism, free))
-    zero = g.vector((0, 0, 0))
-    open_form = body.in_coordinates(tape, attitude, speeds, mass, force, velocity_bias=zero)
-    n = len(DECLARED["coordinates"])
+    mass, force = _kane(tape, vehicle, _corners(tape, vehicle, free))
+    open_form = body.in_coordinates(
+        tape, vehicle.attitude, speeds, mass, force, velocity_bias=mechanics.ZERO
+    )
     rows = [open_form[j * (n + 1) : (j + 1) * (n + 1)] for j in range(n)]
     second_order = [
         e
@@ -85,39 +66,24 @@ def derive() -> Program:
     descriptor = [*open_form]
     for row, right in zip(_rows(motions, range(n)), gamma, strict=True):
         descriptor += [*row, right]
+    violations = [e for pair in zip(gaps, gap_rates, strict=True) for e in pair]
+    outputs = [
+        *_outputs(tape, vehicle, closed),
+        *(_norm(tape, values) for values in (gaps, gap_rates)),
+    ]
     return assemble(
         tape,
-        {"x": [*q, *rates], "u": rack},
-        flat,
+        {"x": [*q, *rates], "u": vehicle.rack},
+        parameters,
         {
             "derivative": ([*rates, *accelerations], (2 * n,)),
-            "outputs": (
-                _outputs(tape, mechanism, closed, speeds, gaps, gap_rates),
-                (len(DECLARED["outputs"]),),
-            ),
+            "outputs": (outputs, (len(DECLARED["outputs"]),)),
             "second_order": (second_order, (n, n + 1)),
             "speeds": (list(rates), (n,)),
-            "descriptor": (descriptor, (n + len(DECLARED["constraints"]), n + 1)),
-            "violations": (
-                [e for pair in zip(gaps, gap_rates, strict=True) for e in pair],
-                (len(DECLARED["constraints"]), 2),
-            ),
+            "descriptor": (descriptor, (n + count, n + 1)),
+            "violations": (violations, (count, 2)),
         },
     )
-
-
-def _motions(
-    tape: Tape, m: _Mechanism, rates: Sequence[Rate], k: int
-) -> linkage_motions.LinkageMotions:
-    rack = (m.rack[1], m.rack[2])
-    return linkage_motions.linkage_motions(
-        tape, m.linkages[k], _own(m.vehicle.q, k), _own(rates, k), rack
-    )
-
-
-def _own(values: Sequence[Any], k: int) -> Sequence[Any]:
-    """The part of a list over all coordinates that belongs to a front corner."""
-    return values[CORNER[k].start : CORNER[k].stop]
 
 
 def _rows(motions: Sequence[mechanics.Motion], numbers: Sequence[int]) -> list[list[sp.Expr]]:
@@ -130,13 +96,12 @@ def _rows(motions: Sequence[mechanics.Motion], numbers: Sequence[int]) -> list[l
 
 
 def _closures(
-    tape: Tape, m: _Mechanism, free: Sequence[Rate]
+    tape: Tape, v: Vehicle, free: Sequence[Rate]
 ) -> tuple[list[sp.Expr], list[mechanics.Motion]]:
     """The 12 closures and their motions, three at a time."""
     gaps, motions = [], []
     for k in range(2):
-        own = _motions(tape, m, free, k)
-        new, moving = linkage_motions.closures(tape, m.linkages[k], own, m.vehicle.points[k])
+        new, moving = linkage.closures(tape, v.linkages[k], v.motions(tape, free, k), v.points[k])
         gaps += new
         motions += moving
     return gaps, motions
@@ -147,8 +112,8 @@ def _bound_rates(
 ) -> list[Rate]:
     """Rates whose derivatives follow from the closures and those of the lower arms."""
     bound = list(free)
-    for k in range(2):
-        lower, pair = LOWER_ARMS[k], closures[2 * k : 2 * k + 2]
+    for k, lower in enumerate(LOWER_ARMS):
+        pair = closures[2 * k : 2 * k + 2]
         dependent = [j for j in CORNER[k] if j != lower]
         driving = [-row[0] for row in _rows(pair, [lower])]
         follow, bias = eliminate(
@@ -159,42 +124,46 @@ def _bound_rates(
     return bound
 
 
-def _corners(tape: Tape, m: _Mechanism, rates: Sequence[Rate]) -> list[corners.Corner]:
-    front = [
-        corners.front_corner(tape, m.vehicle, k, m.linkages[k], _motions(tape, m, rates, k))
-        for k in range(2)
-    ]
-    return [*front, *(corners.rear_corner(tape, m.vehicle, k, rates) for k in (2, 3))]
+def _corners(tape: Tape, v: Vehicle, rates: Sequence[Rate]) -> list[Corner]:
+    front = [corners.front_corner(tape, v, k, v.motions(tape, rates, k)) for k in range(2)]
+    return [*front, *(corners.rear_corner(tape, v, k, rates) for k in (2, 3))]
 
 
-def _joint_accelerations(
-    tape: Tape, rates: Sequence[Rate], solved: Mapping[int, sp.Expr]
-) -> list[sp.Expr]:
-    """Derivatives of rates, from those that are solved for."""
+def _kane(
+    tape: Tape, v: Vehicle, parts: Sequence[Corner]
+) -> tuple[list[list[sp.Expr]], list[sp.Expr]]:
+    """Mass matrix and forces of all bodies, springs added."""
+    inertia = corners.diagonal(v.p, "chassis_inertia")
+    chassis = mechanics.Body(
+        v.p["chassis_mass"],
+        v.frame.origin(tape),
+        mechanics.ZERO,
+        v.frame.rotation(tape, inertia),
+        inertia,
+    )
+    return kane_with_corners(tape, chassis, parts, ARMS, len(v.q))
+
+
+def _chassis_accelerations(tape: Tape, v: Vehicle, solved: Mapping[int, sp.Expr]) -> list[sp.Expr]:
+    """Second derivatives of position, yaw, pitch and roll from the derivatives of the speeds."""
+    attitude = v.attitude
+    position = g.rotate(tape, attitude.rotation, g.vector([solved[k] for k in range(3)]))
+    bias = body.angle_bias(tape, attitude, v.frame.angular_velocity)
+    change = g.named(tape, g.vector([solved[k] for k in range(3, 6)]) - bias)
+    return [*position, *body.angle_rates(tape, attitude, change)]
+
+
+def _outputs(tape: Tape, v: Vehicle, parts: Sequence[Corner]) -> list[sp.Expr]:
+    """The model's outputs but for the last two, which measure the constraints."""
+    # The vertical speed is that in space.
+    speeds = [*v.speeds[:2], v.rates[2], *v.speeds[3:]]
+    carriers = [part.carrier for part in v.linkages]
     return [
-        solved[k]
-        if k in solved
-        else tape.let(
-            rate.bias + sp.Add(*[factor * solved[j] for j, factor in rate.columns.items()])
-        )
-        for k, rate in enumerate(rates)
+        *body.outputs(v.q, speeds),
+        *tire_outputs(tape, parts),
+        *(tape.let(sp.atan2(-carrier[0][1], carrier[1][1])) for carrier in carriers),
     ]
 
 
-def _outputs(
-    tape: Tape,
-    m: _Mechanism,
-    corner_parts: Sequence[corners.Corner],
-    speeds: Sequence[sp.Expr],
-    gaps: Sequence[sp.Expr],
-    gap_rates: Sequence[sp.Expr],
-) -> list[sp.Expr]:
-    def norm(values: Sequence[sp.Expr]) -> sp.Expr:
-        return tape.let(sp.sqrt(tape.let(sp.Add(*[value**2 for value in values]))))
-
-    carriers = [part.carrier for part in m.linkages]
-    return [
-        *assembly.outputs(tape, m.vehicle, corner_parts, speeds, carriers),
-        norm(gaps),
-        norm(gap_rates),
-    ]
+def _norm(tape: Tape, values: Sequence[sp.Expr]) -> sp.Expr:
+    return tape.let(sp.sqrt(tape.let(sp.Add(*[value**2 for value in values]))))

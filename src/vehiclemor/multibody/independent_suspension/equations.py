@@ -1,62 +1,48 @@
 """Equations of the 14-DOF vehicle: Kane's equations of its five bodies and four spinning wheels."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import sympy as sp
 
 from vehiclemor.multibody.components import body
-from vehiclemor.multibody.components.tire_coefficients import MAGIC_FORMULA
-from vehiclemor.multibody.components.tires import TireForces, magic_formula, tire_outputs
-from vehiclemor.multibody.independent_suspension.equilibrium import Derived, derived
-from vehiclemor.multibody.quantities import declared
+from vehiclemor.multibody.components.tires import (
+    Corner,
+    kane_with_corners,
+    tire_outputs,
+    upright_wheel,
+)
+from vehiclemor.multibody.independent_suspension.definition import DECLARED, Derived, derived
 from vehiclemor.symbolic import geometry as g
-from vehiclemor.symbolic import joints, mechanics
+from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
-
-DECLARED = declared("independent_suspension_vehicle")
 
 
 def derive() -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
     tape = Tape()
-    q = body.symbols(DECLARED["coordinates"])
-    nu = body.symbols(DECLARED["speeds"])
-    (delta,) = body.symbols(DECLARED["inputs"])
-    p = {name: sp.Symbol(f"p_{name}", real=True) for name in DECLARED["parameters"]}
-    attitude = body.attitude(tape, q)
-    vehicle = _vehicle(tape, q, nu, delta, p, attitude)
+    vehicle = _vehicle(tape)
+    q, nu, attitude = vehicle.q, vehicle.nu, vehicle.attitude
     sprung = _sprung_body(tape, vehicle)
     wheels = [_wheel(tape, vehicle, number) for number in range(4)]
-    mass, force = mechanics.kane(
-        tape, len(DECLARED["speeds"]), [sprung, *(wheel.rigid for wheel in wheels)]
-    )
-    for number, wheel in enumerate(wheels):
-        force[6 + number] = tape.let(force[6 + number] - wheel.spring)
+    mass, force = kane_with_corners(tape, sprung, wheels, range(6, 10), len(nu))
     # Spins and travels couple to the chassis alone: what is left of it is 6 x 6.
     order = [*range(10, 14), *range(6, 10), *range(6)]
-    accelerations = eliminate_symmetric(tape, mass, force, order)
+    solved = eliminate_symmetric(tape, mass, force, order)
     rates = [*body.rates(tape, attitude, nu), *nu[6:]]
     second_order = body.in_coordinates(tape, attitude, nu, mass, force)
-    outputs = [
-        *body.outputs(q, nu),
-        *tire_outputs(
-            [wheel.tire for wheel in wheels],
-            [wheel.load for wheel in wheels],
-            [wheel.contact.slip_ratio for wheel in wheels],
-            [wheel.contact.slip_angle for wheel in wheels],
-        ),
-    ]
-    n = len(DECLARED["coordinates"])
+    n = len(q)
     return assemble(
         tape,
-        {"x": [*q, *nu], "u": [delta]},
-        list(p.values()),
+        {"x": [*q, *nu], "u": [vehicle.delta]},
+        list(vehicle.p.values()),
         {
-            "derivative": ([*rates, *accelerations], (2 * n,)),
-            "outputs": (outputs, (len(DECLARED["outputs"]),)),
+            "derivative": ([*rates, *(solved[k] for k in range(n))], (2 * n,)),
+            "outputs": (
+                [*body.outputs(q, nu), *tire_outputs(tape, wheels)],
+                (len(DECLARED["outputs"]),),
+            ),
             "second_order": (second_order, (n, n + 1)),
             "speeds": ([*body.speeds(tape, attitude, nu), *nu[6:]], (n,)),
         },
@@ -69,45 +55,29 @@ class _Vehicle:
 
     frame: mechanics.MovingFrame
     attitude: body.Attitude
-    weight: g.Vector  # Acceleration of gravity, chassis components.
     q: list[sp.Symbol]
     nu: list[sp.Symbol]
     delta: sp.Symbol
     p: dict[str, sp.Symbol]
     # What follows from the parameters; distances, depths and preloads stand on the tape.
-    named: Derived
+    derived: Derived
+
+    @property
+    def weight(self) -> g.Vector:
+        """Acceleration of gravity, chassis components."""
+        return self.attitude.road_normal * -self.p["gravity"]
 
 
-class _Wheel(NamedTuple):
-    """A wheel with what acts on it, and the force of its spring."""
-
-    rigid: mechanics.Body
-    spring: sp.Expr
-    contact: body.Contact
-    load: sp.Expr
-    tire: TireForces
-
-
-def _vehicle(
-    tape: Tape,
-    q: list[sp.Symbol],
-    nu: list[sp.Symbol],
-    delta: sp.Symbol,
-    p: dict[str, sp.Symbol],
-    attitude: body.Attitude,
-) -> _Vehicle:
+def _vehicle(tape: Tape) -> _Vehicle:
     """The sprung body on the road."""
-    d = derived(p)
-    frame = mechanics.MovingFrame(g.vector(nu[:3]), g.vector(nu[3:6]), first=0)
-
-    def pair(values: tuple[sp.Expr, sp.Expr]) -> tuple[sp.Expr, sp.Expr]:
-        return tape.let(values[0]), tape.let(values[1])
-
-    named = replace(
-        d, sprung_distance=pair(d.sprung_distance), depth=pair(d.depth), preload=pair(d.preload)
-    )
-    weight = attitude.road_normal * -p["gravity"]
-    return _Vehicle(frame, attitude, weight, q, nu, delta, p, named)
+    q, nu, (delta,) = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds", "inputs"))
+    p = body.parameters(DECLARED["parameters"])
+    attitude, d = body.attitude(tape, q), derived(p)
+    pairs = {
+        k: tuple(map(tape.let, getattr(d, k))) for k in ("sprung_distance", "depth", "preload")
+    }
+    frame = mechanics.MovingFrame(g.vector(nu[:3]), g.vector(nu[3:6]))
+    return _Vehicle(frame, attitude, q, nu, delta, p, replace(d, **pairs))
 
 
 def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
@@ -115,7 +85,7 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
     inertia = (
         g.vector((v.p["roll_inertia"], 0, xz)),
         g.vector((0, v.p["pitch_inertia"], 0)),
-        g.vector((xz, 0, tape.let(v.named.yaw_inertia))),
+        g.vector((xz, 0, tape.let(v.derived.yaw_inertia))),
     )
     mass = v.p["sprung_mass"]
     origin = v.frame.origin(tape)
@@ -123,9 +93,9 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
     return mechanics.Body(mass, origin, v.weight * mass, rotation, inertia)
 
 
-def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
+def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> Corner:
     """A wheel of number 0 to 3 with its load, tire and spring."""
-    p, d, frame, front = v.p, v.named, v.frame, wheel < 2
+    p, d, frame, front = v.p, v.derived, v.frame, wheel < 2
     end, side = (0, "front") if front else (1, "rear")
     travel, rate, spin = v.q[6 + wheel], v.nu[6 + wheel], v.nu[10 + wheel]
     track = p[f"{side}_track"]
@@ -138,44 +108,13 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> _Wheel:
     )
     steer = (tape.let(sp.sin(v.delta)), tape.let(sp.cos(v.delta)))
     axle = g.vector((-steer[0], steer[1], 0) if front else (0, 1, 0))
-    upwards = joints.along(joints.free_rate(6 + wheel, rate), mechanics.UNIT[2])
+    upwards = mechanics.along(mechanics.free_rate(6 + wheel, rate), mechanics.UNIT[2])
     centre = frame.point(tape, place, upwards)
     about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
     rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
-    contact = body.contact(
-        tape, v.attitude, v.q[2], place, axle, centre.value, rotation.value, p["slip_speed"]
-    )
-    deflection = p["tire_stiffness"] * (p["tire_radius"] - contact.height)
-    pressed = tape.let(deflection - p["tire_damping"] * contact.rise)
-    load = tape.let((pressed + sp.Abs(pressed)) / 2)
-    tire = magic_formula(
-        tape,
-        {name: p[name] for name in MAGIC_FORMULA},
-        load,
-        tape.let(d.reference_load),
-        p["tire_radius"],
-        contact.slip_ratio,
-        contact.slip_angle,
-        contact.cos_slip_angle,
-    )
-    force, moment = _loads(tape, contact, v.attitude.road_normal, load, tire)
+    on_road = upright_wheel(tape, v.attitude, v.q[2], place, axle, centre.value, rotation.value, p)
     mass = p["unsprung_mass"]
-    whole = g.named(tape, force + v.weight * mass)
+    whole = g.named(tape, on_road.force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate
-    return _Wheel(
-        mechanics.Body(mass, centre, whole, rotation, about, moment),
-        tape.let(spring),
-        contact,
-        load,
-        tire,
-    )
-
-
-def _loads(
-    tape: Tape, contact: body.Contact, up: g.Vector, load: sp.Expr, tire: TireForces
-) -> tuple[g.Vector, g.Vector]:
-    """Force on a wheel and its moment about the wheel centre; the vertical load has no arm."""
-    shear = g.named(tape, contact.heading * tire.longitudinal + contact.leftward * tire.lateral)
-    arm = g.named(tape, up * -contact.height)
-    moment = arm.cross(shear) + up * tire.aligning
-    return g.named(tape, shear + up * load), g.named(tape, moment)
+    rigid = mechanics.Body(mass, centre, whole, rotation, about, on_road.moment)
+    return Corner((rigid,), -tape.let(spring), on_road)

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.sample_loops import Pieces
+from vehiclemor.inputs.polynomial_loops import Pieces
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.bases import (
     Basis,

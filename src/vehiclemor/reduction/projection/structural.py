@@ -18,7 +18,7 @@ from pydantic import Field
 
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.multibody.structure import Structure
+from vehiclemor.multibody.definition import Structure
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.projection.bases import RankTolerance
 from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTolerance

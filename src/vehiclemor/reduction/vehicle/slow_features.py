@@ -16,8 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from vehiclemor.codegen.operations import Value
-from vehiclemor.multibody.components.tire_coefficients import FIALA
-from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.multibody.quantities import FIALA, WHEELS
 from vehiclemor.reduction.vehicle.decoding_loops import MOVING
 from vehiclemor.reduction.vehicle.features import (
     FeatureListing,

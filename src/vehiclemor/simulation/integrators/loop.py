@@ -8,8 +8,7 @@ together.
 import math
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
-from vehiclemor.inputs.polynomial_loops import input_at
-from vehiclemor.inputs.sample_loops import Pieces
+from vehiclemor.inputs.polynomial_loops import Pieces, input_at
 from vehiclemor.simulation.formulations.full import error_norm, project, reconstruct, rhs
 from vehiclemor.simulation.integrators.dopri5 import (
     accept,

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, Vector
-from vehiclemor.inputs.sample_loops import Pieces
+from vehiclemor.inputs.polynomial_loops import Pieces
 
 # Places of a system's kernels in its list of addresses; see `System`.
 DERIVATIVE, SECOND_ORDER, SPEEDS, STEP_KERNEL = range(4)

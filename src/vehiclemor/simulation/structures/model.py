@@ -13,7 +13,7 @@ from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.inputs.signal import Signal
-from vehiclemor.multibody.structure import Structure
+from vehiclemor.multibody.definition import Structure
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import (
     check_positive,

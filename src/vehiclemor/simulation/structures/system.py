@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.codegen.loops import Ready, loops, ready
-from vehiclemor.multibody.structure import Structure
+from vehiclemor.multibody.definition import Structure
 from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.structures import time_loops as compiled
 from vehiclemor.simulation.structures.factors import blocks_of, columns_of, factored, ordering

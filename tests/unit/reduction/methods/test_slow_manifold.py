@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from vehiclemor.inputs.steering import lane_change, rack_lane_change, straight_ahead
-from vehiclemor.multibody.components.tire_coefficients import FIALA
-from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.multibody.quantities import FIALA, WHEELS
 from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
