@@ -84,7 +84,6 @@ def unbroken(_: Sphinx, _name: str, source: list[str]) -> None:
 def write_file_reference(app: Sphinx) -> None:
     """Write the page of the keys of study and parameter files, from the classes that read them."""
     from vehiclemor.report.description import SCHEMAS, schema_description
-    from vehiclemor.report.printing import table
 
     parts = ["# Keys of study and parameter files\n"]
     for name in SCHEMAS:
@@ -93,9 +92,19 @@ def write_file_reference(app: Sphinx) -> None:
         described.pop("schema")
         for title, rows in described.items():
             heading = "" if title == "keys" else f"### {title}\n\n"
-            parts.append(heading + table(rows, to="markdown"))
+            parts.append(heading + markdown(rows))
     path = Path(app.srcdir) / "study-file-reference.md"
     path.write_text("\n".join(parts), encoding="utf-8")
+
+
+def markdown(rows: list[dict[str, object]]) -> str:
+    """Rows as a table; a missing value is empty."""
+    lines = [[*rows[0]], ["---"] * len(rows[0])]
+    for row in rows:
+        values = ("" if value is None else value for value in row.values())
+        lines.append([f"{v:.4g}" if isinstance(v, float) else str(v) for v in values])
+    escaped = ([text.replace("|", "\\|") for text in line] for line in lines)
+    return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
 
 
 def setup(app: Sphinx) -> None:

@@ -67,7 +67,7 @@ def sources(results: Path) -> Iterator[tuple[str, str, Callable[[], Iterator[Ent
 
     yield "data/published/masoudi2015.toml", "", published
     yield "src", "", operations
-    yield "studies", "vehiclemor compare paper", partial(comparison, results / "studies")
+    yield "studies", "vehiclemor compare paper", partial(comparison, results)
     yield "in_use.nc", "python paper/in_use.py", partial(of_file, in_use, "in_use.nc")
     yield "benchmark.json", "tox -e bench", partial(of_file, benchmark, "benchmark.json")
     yield "peers.json", "tox -e peers", partial(of_file, peers, "peers.json")

@@ -17,13 +17,11 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.registry import names
-from vehiclemor.report.comparison import claim_criterion, of_published_start, rows_of
+from vehiclemor.report.comparison import stored_rows
 from vehiclemor.report.frames import frame
-from vehiclemor.report.printed_numbers import TIMING, compared, number_criterion
 from vehiclemor.report.published import load_published, rms_numbers
 from vehiclemor.report.sizes import size_rows
 from vehiclemor.report.unseen import protocol_rows
-from vehiclemor.study.plans.loading import load_studies
 
 PEERS = Path(__file__).parents[1] / "benchmarks" / "peers" / "report.py"
 # Name, value, and a unit where the name does not give it away.
@@ -261,15 +259,10 @@ def sizes(dataset: xr.Dataset) -> Iterator[Entry]:
         yield slug("size", row["mesh_kind"], label, "growth"), row["growth"]
 
 
-def comparison(folder: Path) -> Iterator[Entry]:
+def comparison(results: Path) -> Iterator[Entry]:
     """Every number and claim of the paper beside what is reproduced, from equilibrium."""
-    studies_ = (*load_studies("paper"), *TIMING.values())
-    results = {s: of_published_start(xr.open_dataset(folder / f"{s}.nc")) for s in studies_}
-    claims = [claim for claim in load_published().claim if claim.kind != "setup"]
-    judged_by = [(number, number_criterion(number)) for number in compared()]
-    judged_by += [(claim, claim_criterion(claim)) for claim in claims]
     verdicts: dict[str, int] = {}
-    for row in (row for pair in judged_by for row in rows_of(*pair, results)):
+    for row in stored_rows(results):
         kind, variant = "claims" if np.isnan(row["published"]) else "numbers", row["variant"]
         key = slug("comparison", kind, variant or "not_judged", row["verdict"])
         verdicts[key] = verdicts.get(key, 0) + 1

@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +21,9 @@ from drawings.catalogue import FIGURES, Entry
 
 from vehiclemor import VehiclemorError
 from vehiclemor.files import write_text
-from vehiclemor.report.comparison import claim_criterion, of_published_start, rows_of
+from vehiclemor.report.comparison import stored_rows
 from vehiclemor.report.figures import theme
-from vehiclemor.report.printed_numbers import TIMING
 from vehiclemor.report.published import load_published
-from vehiclemor.study.plans.loading import load_studies
 
 PAPER = Path(__file__).parent
 STYLE = str(PAPER / "figures.mplstyle")
@@ -46,35 +45,28 @@ def draw(entry: Entry, results: Path, path: Path) -> Path:
         return theme.save_figure(figure, path)
 
 
-def claims(results: Path) -> list[dict[str, Any]]:
+def claims(results: Path) -> Iterator[dict[str, Any]]:
     """Every claim of the paper that can be measured, with bound, both variants and verdicts."""
-    names = (*load_studies("paper"), *TIMING.values())
-    data = {name: of_published_start(stored(results, name)) for name in names}
-    return list(_claim_rows(data))
-
-
-def _claim_rows(data: dict[str, xr.Dataset]) -> Iterator[dict[str, Any]]:
-    for claim in load_published().claim:
-        if claim.kind == "setup":
-            continue
-        rows = [row for row in rows_of(claim, claim_criterion(claim), data) if row["measure"]]
-        if rows:
-            yield {
-                "id": claim.id,
-                "section": claim.section,
-                "statement": claim.statement,
-                "measure": rows[0]["measure"],
-                "bound": float(rows[0]["bound"]),
-                "rows": [
-                    {
-                        "variant": row["variant"],
-                        "value": float(f"{row['reproduced']:.4g}"),
-                        "verdict": row["verdict"],
-                    }
-                    for row in rows
-                    if np.isfinite(row["reproduced"])
-                ],
-            }
+    known = load_published().claims
+    measured = (row for row in stored_rows(results) if row["id"] in known and row["measure"])
+    for claim, group in groupby(measured, key=lambda row: row["id"]):
+        rows = list(group)
+        yield {
+            "id": claim,
+            "section": known[claim].section,
+            "statement": known[claim].statement,
+            "measure": rows[0]["measure"],
+            "bound": float(rows[0]["bound"]),
+            "rows": [
+                {
+                    "variant": row["variant"],
+                    "value": float(f"{row['reproduced']:.4g}"),
+                    "verdict": row["verdict"],
+                }
+                for row in rows
+                if np.isfinite(row["reproduced"])
+            ],
+        }
 
 
 def regenerate(results: Path, folder: Path, only: Sequence[str] = ()) -> list[Path]:
@@ -87,7 +79,7 @@ def regenerate(results: Path, folder: Path, only: Sequence[str] = ()) -> list[Pa
             print(f"{name}.svg stays as it is: {error.filename} is missing", file=sys.stderr)
     if not only:
         try:
-            text = json.dumps(claims(results), indent=1, ensure_ascii=False) + "\n"
+            text = json.dumps([*claims(results)], indent=1, ensure_ascii=False) + "\n"
         except FileNotFoundError as error:
             print(f"claims.json stays as it is: {error.filename} is missing", file=sys.stderr)
         else:

@@ -23,7 +23,7 @@ FIGURES: Mapping[str, Entry] = {
     "figure-01": Entry(schematics.figure_schematic, options={"name": "vehicle"}),
     "figure-02": Entry(vehicles.figure_paths, ["figures-2-4"], {"study": "figures-2-4"}),
     "figure-03": Entry(vehicles.figure_pitch_and_yaw, ["figures-2-4"]),
-    "figure-04": Entry(vehicles.figure_pitch_and_yaw_errors, ["figures-2-4"]),
+    "figure-04": Entry(vehicles.figure_pitch_and_yaw, ["figures-2-4"], {"errors": True}),
     "figure-05": Entry(schematics.figure_schematic, options={"name": "suspension"}),
     "figure-06": Entry(suspension.figure_histories, ["figures-6-7"], {"study": "figures-6-7"}),
     "figure-07": Entry(suspension.figure_errors, ["figures-6-7"]),

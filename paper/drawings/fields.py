@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from drawings import look
 from drawings.look import BLUE, GREEN, ORANGE, PINK, RED, THIN, TWO, Results, legend, panels, titles
-from vehiclemor.report.figures import size
+from vehiclemor.report.figures.costs import figure_size as figure_of_sizes
 from vehiclemor.report.figures.theme import tick_decades
 from vehiclemor.report.unseen import method_rows, protocol_of
 from vehiclemor.study.plans.protocol import FULL_ORDER
@@ -96,7 +96,7 @@ def _draw_row(axis: Any, row: Mapping[str, Any]) -> None:
 
 def figure_size(results: Results) -> Figure:
     """CPU time of a whole run over the number of coordinates, and what reduction gains."""
-    figure = size.figure_size(results)
+    figure = figure_of_sizes(results["size"])
     figure.set_size_inches(TWO, 2.8)
     # Room for the names of the vehicles.
     figure.axes[1].set_ylim(bottom=0.2)

@@ -11,6 +11,7 @@ from drawings.look import FULL, LINES, ONE, TWO, Results, legend, panels, titles
 from vehiclemor.report.published import rms_numbers
 
 TRAINED = "pod", "pod_literal"
+SYMBOLS = r"$\theta$", r"$\psi$"
 
 
 def figure_paths(results: Results, *, study: str) -> Figure:
@@ -37,35 +38,23 @@ def figure_paths(results: Results, *, study: str) -> Figure:
     return figure
 
 
-def figure_pitch_and_yaw(results: Results) -> Figure:
-    """Pitch and yaw, two initial conditions."""
-    figure, grid = panels(2, 2, ONE, 2.6, sharex=True)
-    for column, start in enumerate(("equilibrium", "dropped")):
-        runs = results["figures-2-4"].sel(start=start).squeeze()
-        for axis, output in zip(grid[:, column], ("pitch", "yaw"), strict=True):
-            look.history(axis, runs, output, TRAINED, 1e3)
-        grid[-1, column].set_xlabel("time (s)")
-        grid[-1, column].set_xlim(0.0, 6.0)
-    grid[0, 0].set_ylabel(r"pitch $\theta$ (mrad)")
-    grid[1, 0].set_ylabel(r"yaw $\psi$ (mrad)")
-    titles(grid, ["equilibrium", "dropped"])
-    legend(figure, grid.flat, 2)
-    return figure
-
-
-def figure_pitch_and_yaw_errors(results: Results) -> Figure:
-    """Errors of pitch and yaw, two initial conditions."""
-    figure, grid = panels(2, 2, ONE, 2.8, sharex=True, sharey="row")
+def figure_pitch_and_yaw(results: Results, *, errors: bool = False) -> Figure:
+    """Pitch and yaw or their errors, two initial conditions."""
+    share = {"sharey": "row"} if errors else {}
+    figure, grid = panels(2, 2, ONE, 2.8 if errors else 2.6, sharex=True, **share)
     bounds = rms_numbers("independent_suspension_vehicle")
     for column, start in enumerate(("equilibrium", "dropped")):
         runs = results["figures-2-4"].sel(start=start).squeeze()
         for axis, output in zip(grid[:, column], ("pitch", "yaw"), strict=True):
-            look.errors_in_periods(axis, runs, output, TRAINED, 0.5, bounds[output].value)
-            look.decades(axis)
+            if errors:
+                look.errors_in_periods(axis, runs, output, TRAINED, 0.5, bounds[output].value)
+                look.decades(axis)
+            else:
+                look.history(axis, runs, output, TRAINED, 1e3)
         grid[-1, column].set_xlabel("time (s)")
-        grid[-1, column].set_xlim(0.0, 15.0)
-    grid[0, 0].set_ylabel(r"error of $\theta$ (rad)")
-    grid[1, 0].set_ylabel(r"error of $\psi$ (rad)")
+        grid[-1, column].set_xlim(0.0, 15.0 if errors else 6.0)
+    for axis, name, symbol in zip(grid[:, 0], ("pitch", "yaw"), SYMBOLS, strict=True):
+        axis.set_ylabel(f"error of {symbol} (rad)" if errors else f"{name} {symbol} (mrad)")
     titles(grid, ["equilibrium", "dropped"])
     legend(figure, grid.flat, 2)
     return figure

@@ -56,9 +56,11 @@ def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None
     except OSError as error:
         raise not_written(path, error) from None
     finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        shutil.rmtree(temporary, ignore_errors=True)
+        if temporary.is_dir():
+            shutil.rmtree(temporary, ignore_errors=True)
+        else:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
     return path
 
 

@@ -77,9 +77,9 @@ def test_output_that_is_something_else_is_kept(fails, tmp_path):
     fails([*simulate, f"{long}.nc"], "too long")
     fails([*study, out], "not a folder")
     fails([*study, long], "too long")
-    fails(["figures", "--only", "6", "--out", out], "not a folder")
+    fails(["figures", "--only", "figure-11", "--out", out], "not a folder")
     fails(["run", f"{long}.toml"], "too long")
     if Path("/proc/self").is_dir():  # a place where nobody writes
         fails([*study, "/proc/self/results"], "can't be written")
-        fails(["figures", "--only", "6", "--out", "/proc/self/figures"], "can't be written")
+        fails(["figures", "--only", "figure-11", "--out", "/proc/self/figures"], "can't be written")
     assert out.read_text() == "my notes"

@@ -7,7 +7,7 @@ from PIL import Image
 import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.exceptions import InputError
-from vehiclemor.report.figures import animation, mechanisms
+from vehiclemor.report.figures import animation
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def test_film_of_reduced_and_full_order(tmp_path, model, method):
 def test_a_car_is_drawn_where_its_outputs_say():
     run = vm.model("independent_suspension_vehicle").simulate("lane_change")
     histories = animation._quantities(run.dataset(), "outputs")
-    lines = mechanisms.car(histories, {}, 1.0)
+    lines = animation.car(histories, {}, 1.0)
     places = np.stack([run["longitudinal_position"], run["lateral_position"]], -1)
     assert abs(middle(lines)[:, :2] - places).max() < 0.2
     # The line from the middle of the tail to that of the nose points to where the car heads.
@@ -51,7 +51,7 @@ def test_the_linkage_closes(suspension):
     """Joints of the drawing, placed by the outputs, are those of the model."""
     model, full = vm.model("double_wishbone"), suspension[1]
     histories = animation._quantities(full.dataset(), "outputs")
-    lines = mechanisms.suspension(histories, model.parameters.values(), 1.0)
+    lines = animation.suspension(histories, model.parameters.values(), 1.0)
     for k in (0, 300, 900):
         joints = model.joints_at(full.coordinates[k])
         for joint in list(joints.values())[:5]:

@@ -173,7 +173,7 @@ def test_figures_of_a_study_and_a_protocol(place, capsys):
     assert [entry.name for entry in entries] == ["mine-errors", "mine-histories", "road-pareto"]
     data = run_studies(str(place / "both.toml"), results)
     with styled():
-        figure = entries[0].draw(data)
+        figure = entries[0].draw(data["mine"])
         checked(figure)
     assert "mine" in " ".join(text.get_text() for text in figure.legends[0].get_texts())
     folders = ["--results", results, "--out", place / "figures"]

@@ -1,4 +1,4 @@
-"""The figures of the catalogue as data: what their texts, lines and limits are; and as files."""
+"""The figures of studies as data: what their texts, lines and limits are; and as files."""
 
 import matplotlib
 import numpy as np
@@ -9,8 +9,10 @@ from matplotlib.image import imread
 
 from tests.report.figure_texts import checked, varied
 from vehiclemor.exceptions import InputError
-from vehiclemor.report.figures.catalogue import FIGURES
-from vehiclemor.report.figures.pareto import figure_pareto
+from vehiclemor.report.figures.catalogue import find
+from vehiclemor.report.figures.costs import figure_pareto, figure_size
+from vehiclemor.report.figures.errors import figure_errors
+from vehiclemor.report.figures.result_plot import shown_outputs
 from vehiclemor.report.figures.theme import panels, save_figure, styled
 from vehiclemor.report.sizes import size_rows
 from vehiclemor.study.run import run_studies
@@ -19,6 +21,7 @@ PARETO = "predictive-double_wishbone"
 
 
 FACTORS = np.linspace(0.7, 1.3, 7)
+OUTPUTS = ("lateral_position", "yaw")
 
 
 def luminance(color):
@@ -28,10 +31,9 @@ def luminance(color):
     return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
-def grid_of(entry):
+def grid_of(*labels):
     """Errors that a study over both factors could have, none at the nominal input of replay."""
-    labels, outputs = list(entry.options["methods"]), entry.options["outputs"]
-    grid = varied(labels, outputs, amplitude_factor=FACTORS, frequency_factor=FACTORS)
+    grid = varied(labels, OUTPUTS, amplitude_factor=FACTORS, frequency_factor=FACTORS)
     grid["rms_error"][3, 3] = 4.4e-7
     grid["rms_error"][3, 3, labels.index("replay")] = 0.0
     return grid
@@ -81,20 +83,15 @@ def test_a_reduced_model_is_set_beside_the_cheapest_mesh_that_is_as_accurate():
 
 
 @pytest.fixture(scope="session")
-def drawn(results, unseen_travels):
-    """Every figure of the catalogue, drawn."""
-    figures = {}
-    for name, entry in FIGURES.items():
-        data = dict(results)
-        if name.endswith("map"):
-            data[entry.studies[0]] = grid_of(entry)
-        elif entry.drawing == "pareto":
-            data[entry.studies[0]] = unseen_travels
-        elif entry.drawing == "size":
-            data = {"size": sized()}
-        with styled():
-            figures[name] = checked(entry.draw(data))
-    return figures
+def drawn(results, results_folder, unseen_travels):
+    """Every figure of the paper's studies, and one of each other kind, drawn."""
+    with styled():
+        every = find("paper", results_folder)
+        figures = {entry.name: entry.draw(results[entry.result]) for entry in every}
+        figures["map"] = figure_errors(grid_of("pod", "replay"), outputs=OUTPUTS)
+        figures["pareto"] = figure_pareto(unseen_travels)
+        figures["size"] = figure_size(sized())
+        return {name: checked(figure) for name, figure in figures.items()}
 
 
 def test_axes_have_units_and_no_label_is_longer_than_its_axis(drawn):
@@ -124,7 +121,8 @@ def test_lines_differ_in_grey_too(drawn):
 
 def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, results):
     run = results["figures-2-4"].sel({"label": "pod", "start": "equilibrium", "output": "pitch"})
-    axis = drawn["4"].axes[0]
+    shown = shown_outputs(results["figures-2-4"])
+    axis = drawn["figures-2-4-histories"].axes[len(shown) + shown.index("pitch")]
     marks = [line.get_ydata() for line in axis.lines if line.get_marker() == "<"]
     heights = [mark[0] for mark in marks if np.size(mark)]
     assert run["rms_error"].item() in heights
@@ -132,7 +130,7 @@ def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, resu
     low, high = axis.get_ylim()
     assert all(low < height < high for height in (*heights, published.get_ydata()[0]))
     error = abs(run["outputs"] - run["reference_outputs"]).squeeze()
-    (line,) = (x for x in axis.lines if x.get_label().startswith("POD, r = 3 (default)"))
+    (line,) = (x for x in axis.lines if x.get_label() == "POD*")
     steps = [float(error.sel(time=slice(t + 1e-6, t + 0.5 + 1e-6)).max()) for t in (2.0, 2.5)]
     np.testing.assert_array_equal(np.interp([2.25, 2.75], *steps_of(line)), steps)
     assert np.nanmax(line.get_ydata()) == float(error.max())
@@ -145,10 +143,10 @@ def steps_of(line):
 
 
 def test_maps_hold_the_nominal_input_and_read_well(drawn):
-    cells = [t for t in drawn["vehicle-map"].axes[0].texts if t.get_text()]
+    cells = [t for t in drawn["map"].axes[0].texts if t.get_text()]
     assert len(cells) == 49
     assert not [t for t in cells if "e" in t.get_text()]
-    mesh = drawn["vehicle-map"].axes[0].collections[0]
+    mesh = drawn["map"].axes[0].collections[0]
     colors = mesh.to_rgba(mesh.get_array()).reshape(-1, 4)
     for text, color in zip(cells, colors, strict=True):
         one, other = sorted((luminance(to_rgb(text.get_color())), luminance(color[:3])))
@@ -157,7 +155,10 @@ def test_maps_hold_the_nominal_input_and_read_well(drawn):
 
 def test_files_have_fonts_texts_resolution_and_style(drawn, tmp_path):
     with styled():
-        pdf, svg = (save_figure(drawn["6"], tmp_path / f"6.{end}") for end in ("pdf", "svg"))
+        pdf, svg = (
+            save_figure(drawn["figures-6-7-histories"], tmp_path / f"a.{end}")
+            for end in ("pdf", "svg")
+        )
     assert b"/Type3" not in pdf.read_bytes()
     assert b"/FontFile2" in pdf.read_bytes()
     assert ">time (s)</text>" in svg.read_text(encoding="utf-8")
@@ -178,7 +179,7 @@ def test_files_have_fonts_texts_resolution_and_style(drawn, tmp_path):
 
 
 def test_pareto_figure_shows_every_method(drawn, unseen_travels):
-    axis = drawn["pareto-suspension"].axes[0]
+    axis = drawn["pareto"].axes[0]
     texts = axis.get_legend_handles_labels()[1]
     assert set(texts) == {"fixed basis (chosen)", "failing (fails)"}
     low, high = axis.get_ylim()
@@ -187,6 +188,6 @@ def test_pareto_figure_shows_every_method(drawn, unseen_travels):
     seconds = unseen_travels["seconds"].sel(label="fixed basis").mean().item()
     assert chosen.lines[0].get_xdata()[0] == pytest.approx(1e6 * seconds)
     worse = unseen_travels.assign(rms_error=unseen_travels["rms_error"] + 1e-4)
-    axis = figure_pareto({PARETO: worse}).axes[0]
+    axis = figure_pareto(worse).axes[0]
     assert "full order, newton" in axis.get_legend_handles_labels()[1]
-    assert figure_pareto({PARETO: worse.sel(label=["failing"])}).axes
+    assert figure_pareto(worse.sel(label=["failing"])).axes

@@ -8,7 +8,8 @@ from tests.study.small import small_study
 from vehiclemor.study.plans.grid import expand, sampled
 from vehiclemor.study.plans.loading import load_studies, write_study
 from vehiclemor.study.plans.results import flattened
-from vehiclemor.study.plans.study_file import Sampling, StudyFile
+from vehiclemor.study.plans.study_file import StudyFile
+from vehiclemor.study.plans.study_runs import Sampling
 from vehiclemor.study.run import run_studies
 from vehiclemor.toml_files import read_toml
 

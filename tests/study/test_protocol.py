@@ -20,7 +20,8 @@ from vehiclemor.study.plans.protocol import (
     sampled_runs,
     sampled_sets,
 )
-from vehiclemor.study.plans.study_file import FACTORS, Bound, Box, Draw, Group
+from vehiclemor.study.plans.study_file import Bound
+from vehiclemor.study.plans.study_runs import FACTORS, Box, Draw, Group
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 SAME_POINT = "f 1.01, a 1.435, equilibrium, 18.548 m/s"

@@ -12,7 +12,7 @@ from vehiclemor.cli.options import All, Json, ParameterFile, Parameters, key_val
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import write_whole
 from vehiclemor.registry import GROUPS, names
-from vehiclemor.report.printing import table, wrapped
+from vehiclemor.report.printing import Table, wrapped
 from vehiclemor.resources import data_folder, data_names
 
 KINDS = ("models", "methods", "maneuvers", "studies")
@@ -91,7 +91,7 @@ def _print(key: str, content: Any, few: bool, indent: str = "") -> int:
     for heading, rows in _by_source(key, shown).items():
         columns = [name for name in rows[0] if any(r[name] not in ("", None, [], {}) for r in rows)]
         more = f" ({len(shown)} of {len(content)})" if cut else ""
-        print(f"\n{wrapped(f'{heading}{more}:', 0, 2)}\n{table(rows, columns, explain=False)}")
+        print(f"\n{wrapped(f'{heading}{more}:', 0, 2)}\n{Table(rows, columns, explain=False)}")
     return cut
 
 

@@ -232,7 +232,7 @@ def judge(
     dataset
         Folder that the command dataset has written.
     """
-    from vehiclemor.report.printing import json_text, table
+    from vehiclemor.report.printing import Table, json_text
 
     rows = vm.judge(file, dataset, results)
     if json_output:
@@ -241,6 +241,6 @@ def judge(
     own, errors = ["label", "runs", "misses", "silent", "flagged"], ["score", "median_score"]
     own += [*errors, "output"] + ["seconds"] * bool(rows["seconds"].notna().any())
     methods, outputs = (rows.query(f"kind == {kind!r}") for kind in ("method", "output"))
-    print(table(methods, own))
+    print(Table(methods, own))
     each = ["output", "measure", "bound", "unit", "misses", "silent", *errors]
-    print(f"\n{table(outputs, each, explain=False)}")
+    print(f"\n{Table(outputs, each, explain=False)}")

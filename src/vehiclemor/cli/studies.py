@@ -125,14 +125,14 @@ def figures(
     style: str = "",
     dpi: int | None = None,
 ) -> int:
-    """Draw the paper's figures, or those of any study; studies that are missing are run first.
+    """Draw the figures of any study; studies that are missing are run first.
 
     Parameters
     ----------
     only
-        Names of figures, separated by commas: those of the paper, such as 6, or histories-,
-        errors-, map- or pareto- and the name of a model; or a study, collection or protocol by name
-        or TOML file, of which is drawn what its dimensions ask for.  The paper's by default.
+        Names, separated by commas: a study, collection or protocol by name or TOML file, of which
+        is drawn what its dimensions ask for; or histories-, errors-, map- or pareto- and the name
+        of a model.  The studies of the paper by default.
     out
         Folder of the figures; by default `figures` in the results folder.
     style

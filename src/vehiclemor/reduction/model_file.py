@@ -31,7 +31,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.sizes import require
 
 # Of the layout of these files.
-SCHEMA = 4
+SCHEMA = 5
 # Texts beside the arrays.
 TEXTS = ("parts", "settings", "training", "parameters")
 # What is taken apart.

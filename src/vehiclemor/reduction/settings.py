@@ -13,7 +13,7 @@ Value = int | float | str
 LARGEST_NUMBER = 1e300
 # Marks a setting that is at most the number of the model's coordinates where it is not given.
 AT_MOST_COORDINATES = "at most the number of coordinates"
-# Shortest step of a structure in s.
+# Shortest time step in s.
 SHORTEST = 1e-6
 # Beyond a tenth nothing is solved any more.
 LARGEST_TOLERANCE = 0.1
@@ -72,32 +72,6 @@ Tolerance = Annotated[
         le=LARGEST_TOLERANCE,
         description="largest local error of a state relative to its typical size",
     ),
-]
-StructuralTolerance = Annotated[
-    float,
-    Field(
-        gt=0.0,
-        le=LARGEST_TOLERANCE,
-        description="largest error of an output by the step size, as part of its range",
-    ),
-]
-
-
-def _step(value: float) -> float:
-    """A step that is none, or long enough that a run ends."""
-    if 0.0 < value < SHORTEST:
-        raise ValueError(f"is {value:g}; it must be 0 or at least {SHORTEST:g}")
-    return value
-
-
-StructuralStep = Annotated[
-    float,
-    Field(
-        ge=0.0,
-        le=0.1,
-        description="step size in s in the place of the tolerance, from 1e-6 s on; 0: by that",
-    ),
-    AfterValidator(_step),
 ]
 
 

@@ -166,13 +166,9 @@ class InputRange:
     def _bands(self, names: Sequence[str], maneuver: Maneuver) -> dict[str, tuple[float, float]]:
         """How far whole inputs of a structure go, in magnitude and in each band."""
         used = bands_of(maneuver) / self._sizes
-        words = [f"{low:g} to {high:g} Hz" for low, high in pairwise(BANDS)]
-        found = {}
-        for name, (size, *content) in zip(names, used.T, strict=True):
-            found[f"input {name}"] = float(size), 0.0 if size > 1.0 else np.inf
-            for word, part in zip(words, content, strict=True):
-                found[f"input {name}, {word}"] = float(part), 0.0 if part > 1.0 else np.inf
-        return found
+        words = ["", *(f", {low:g} to {high:g} Hz" for low, high in pairwise(BANDS))]
+        labels = [f"input {name}{word}" for name in names for word in words]
+        return ranges_of(np.zeros(1), used.T.reshape(1, -1), labels)
 
     def _unlike(self, maneuver: Maneuver) -> tuple[float, float]:
         """How far inputs are from those of the nearest training run, and since when (s)."""

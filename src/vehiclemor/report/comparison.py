@@ -1,7 +1,7 @@
 """Comparisons: with the paper, on unseen inputs, of every model, of any study; and costs."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,6 @@ import xarray as xr
 
 from vehiclemor.arguments import count, file_path
 from vehiclemor.exceptions import InputError
-from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report.criteria import CRITERIA
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
@@ -20,13 +19,14 @@ from vehiclemor.report.labels import of_kind, timing_cases
 from vehiclemor.report.printed_numbers import CLAIMS, TIMING, compared, number_criterion
 from vehiclemor.report.published import Claim, Number, load_published
 from vehiclemor.report.sizes import size_rows
-from vehiclemor.report.spectrum import spectrum_table
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings, make_experiment
+from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
+from vehiclemor.study.store import combined_path
 from vehiclemor.study.timing import timed_starts
 
 PAPER = "paper"
@@ -82,13 +82,25 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
     """Every number and claim of the paper, by model, with verdict and reason; see `compare`."""
     results = dict(run_studies(PAPER, folder, jobs))
     results |= {timing: timing_of(model, folder) for model, timing in TIMING.items()}
+    models = [*dict.fromkeys(number.model for number in compared()), ALL_MODELS]
+    return pd.DataFrame(sorted(published_rows(results), key=lambda row: models.index(row["model"])))
+
+
+def published_rows(results: Results) -> Iterator[Row]:
+    """Numbers, then claims of the paper, by the results of its studies and timings by name."""
     results = {name: of_published_start(dataset) for name, dataset in results.items()}
-    numbers, claims = compared(), load_published().claim
-    judged_by = [(number, number_criterion(number)) for number in numbers]
-    judged_by += [(claim, claim_criterion(claim)) for claim in claims if claim.kind != "setup"]
-    rows = [row for entry, criterion in judged_by for row in rows_of(entry, criterion, results)]
-    place = {model: index for index, model in enumerate(dict.fromkeys(n.model for n in numbers))}
-    return pd.DataFrame(sorted(rows, key=lambda row: place.get(row["model"], len(place))))
+    judged_by = [(number, number_criterion(number)) for number in compared()]
+    judged_by += [(c, claim_criterion(c)) for c in load_published().claim if c.kind != "setup"]
+    for entry, criterion in judged_by:
+        yield from rows_of(entry, criterion, results)
+
+
+def stored_rows(results: Path) -> Iterator[Row]:
+    """As `published_rows`, of what a results folder holds; nothing is checked or computed."""
+    known = (*load_studies(PAPER), *TIMING.values())
+    yield from published_rows(
+        {name: xr.load_dataset(combined_path(results, name)) for name in known}
+    )
 
 
 def claim_criterion(claim: Claim) -> Criterion:
@@ -126,14 +138,12 @@ def rows_of(entry: Number | Claim, criterion: Criterion, results: Results) -> It
 def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
     """Every registered method that fits, on one model; what is missing is run first.
 
-    `kind` tells what a row is: `cost`, `spectrum` as in `cost_table`, `spectrum_table`; the others
-    as in `study_comparison`, of the model's nominal and perturbed runs and of its protocol.
+    `kind` tells what a row is: `cost` as in `cost_table`; the others as in `study_comparison`, of
+    the model's nominal and perturbed runs and of its protocol.
     """
     studies = nominal(name, folder), perturbed(name, folder)
     parts = [study_comparison(study, folder, jobs) for study in studies]
     parts.append(cost_table(name, folder).assign(kind="cost"))
-    if pod.METHOD.accepts(build(name))[0]:
-        parts.append(spectrum_table(name).assign(kind="spectrum"))
     parts.append(study_comparison(unseen(name, folder), folder, jobs))
     return pd.concat(parts, ignore_index=True).assign(model=name)
 
@@ -147,13 +157,15 @@ def study_comparison(
     grid, see `frames.grid_rows`.  `method`, `target`, `bound`: a method of a protocol, and what the
     one that validation has chosen must and does reach, see `unseen`.  Errors are in SI units.
     """
-    rows: list[Row] = []
-    for dataset in run_studies(study, folder, jobs, seed=seed).values():
-        if "mesh" in dataset.dims:
-            rows += size_rows(dataset)
-            continue
-        rows += protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
-    return pd.DataFrame(rows)
+    results = run_studies(study, folder, jobs, seed=seed).values()
+    return pd.DataFrame([row for dataset in results for row in result_rows(dataset)])
+
+
+def result_rows(dataset: xr.Dataset) -> Sequence[Row]:
+    """Rows of one study, by what it is."""
+    if "mesh" in dataset.dims:
+        return list(size_rows(dataset))
+    return protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
 
 
 def timing_of(model: str, folder: Path) -> xr.Dataset:

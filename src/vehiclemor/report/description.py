@@ -17,7 +17,8 @@ from vehiclemor.registry import component, names, unknown
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build_derived
 from vehiclemor.study.plans.loading import load_studies, read_study, study_path
-from vehiclemor.study.plans.study_file import SETS, StudyFile, values
+from vehiclemor.study.plans.study_file import SETS, StudyFile
+from vehiclemor.study.plans.study_runs import values
 from vehiclemor.toml_files import read_toml
 
 Description = dict[str, Any]

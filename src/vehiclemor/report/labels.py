@@ -157,7 +157,7 @@ class TablesFile(FileSchema):
 
 @cache
 def tables_file() -> TablesFile:
-    """The package's own file, read once."""
+    """The package's own file."""
     return read_toml(data_folder() / "figures" / "tables.toml", TablesFile)
 
 

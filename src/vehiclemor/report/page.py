@@ -18,18 +18,17 @@ from vehiclemor.failure import attempt_apart
 from vehiclemor.files import write_text
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
-from vehiclemor.report.comparison import paper_comparison
+from vehiclemor.report.comparison import paper_comparison, result_rows
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.figures.pareto import figure_pareto
+from vehiclemor.report.figures.costs import figure_pareto, figure_size
 from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
 from vehiclemor.report.figures.runs import PATH
 from vehiclemor.report.figures.theme import METADATA, styled
-from vehiclemor.report.frames import counted_ends, frame, grid_rows
+from vehiclemor.report.frames import counted_ends, frame
 from vehiclemor.report.labels import TRAINED, Column, trained_runs, unit_of
 from vehiclemor.report.printing import Table
 from vehiclemor.report.result_selection import drawn
 from vehiclemor.report.screens import Part, claim_parts, paper_parts, study_parts
-from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.study.run import run_studies
 
 # More runs of a study are not listed.
@@ -120,7 +119,8 @@ def _stored(folder: Path, left_out: dict[str, str]) -> dict[str, xr.Dataset]:
             found[path.stem] = read_dataset(path, "source", "vehiclemor")
         except FileError as error:
             left_out[str(path)] = str(error).removeprefix(f"{path}: ")
-    found = {n: d for n, d in found.items() if "status" in d and "study" in d.attrs}
+    # Timings and references have no study file.
+    found = {name: dataset for name, dataset in found.items() if "configuration" in dataset.attrs}
     if not found:
         raise InputError(f"{folder}: no results of a study; vehiclemor run STUDY makes them")
     return found
@@ -147,12 +147,11 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
     """A study or protocol as `compare` has it, and every picture that it has the data for."""
     parts: list[Part] = []
     pictures: dict[str, Callable[[], Figure]] = {}
-    if "scenario_set" in dataset.coords:
-        rows = protocol_rows(dataset)
-        draw = partial(figure_pareto, {name: dataset})
-        pictures["Worst error over bound, over time"] = draw
+    if "mesh" in dataset.dims:
+        pictures["Times over the size of the model"] = partial(figure_size, dataset)
+    elif "scenario_set" in dataset.coords:
+        pictures["Worst error over bound, over time"] = partial(figure_pareto, dataset)
     else:
-        rows = grid_rows(dataset)
         parts.append(f"Study of {dataset.attrs['model']}: {counted_ends(dataset)}.")
         runs = error_table(dataset)
         shown = {column: Column(str(column).replace("_", " "), ".3g") for column in runs}
@@ -170,7 +169,7 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
         for caption, draw in pictures.items()
         for picture in attempt_apart(f"{caption}, {name}", left_out, partial(_svg, caption, draw))
     ]
-    parts = study_parts(pd.DataFrame(rows)) + parts
+    parts = study_parts(pd.DataFrame(result_rows(dataset))) + parts
     return Section(name, str(dataset.attrs["title"]), parts, made, dataset.attrs)
 
 

@@ -1,4 +1,4 @@
-"""Tables and texts: rows in the terminal, in Markdown and in HTML, by one place."""
+"""Tables and texts: rows in the terminal and in HTML, by one place."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from vehiclemor.report.labels import ERROR, TRAINED, Column, column, trained_runs
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-Format = Literal["terminal", "markdown", "html"]
 Rows = Sequence[Mapping[str, Any]]
 # Columns of a line where there is no terminal, and the most that a wide one is given.
 WIDTH, WIDEST = 80, 120
@@ -33,7 +32,12 @@ ERRORS = ("rms_error", "floor_rms_error", "max_error", "signal_range")
 
 @dataclass(frozen=True)
 class Table:
-    """Rows as a table: text by `str`, HTML where a template asks for it; see `table`."""
+    """Rows as a table: text within the width of the terminal by `str`, HTML for a template.
+
+    `columns` are names of those that are shown, by default all, or how each of them is printed, by
+    default as `labels.column` has it.  Values of `group` and `note` stand in lines of their own,
+    above their rows and below each; meanings of the columns below the table, if it is to `explain`.
+    """
 
     rows: pd.DataFrame | Rows
     columns: Sequence[str] | Mapping[str, Column] = ()
@@ -43,18 +47,63 @@ class Table:
     explain: bool = True
     below: str = ""
 
-    def __str__(self) -> str:
-        parts = wrapped(self.title), self._table("terminal"), wrapped(self.below, 0, 1)
-        return "\n".join(filter(None, parts))
+    def _records(self) -> Rows:
+        """Rows, those of a group together."""
+        rows = self.rows
+        records: Rows = rows if isinstance(rows, Sequence) else rows.to_dict("records")  # type: ignore[assignment]
+        if not self.group:
+            return records
+        places = list(dict.fromkeys(row[self.group] for row in records))
+        return sorted(records, key=lambda row: places.index(row[self.group]))
+
+    def _kinds(self, records: Rows) -> tuple[Mapping[str, Column], str]:
+        """How each column is printed, and what the columns mean."""
+        kinds = self.columns
+        if not isinstance(kinds, Mapping):
+            kinds = {name: column(name) for name in kinds or (records[0] if records else ())}
+        meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds.values() if kind.meaning]
+        return kinds, f"({'; '.join(meanings)}.)" if meanings and self.explain else ""
 
     def __html__(self) -> str:
+        records = self._records()
+        kinds, meanings = self._kinds(records)
+        wide, last = f'<tr><td colspan="{len(kinds)}"><div>%s</div></td></tr>', None
+        heads = "".join(f"<th>{escape(kind.heading)}</th>" for kind in kinds.values())
+        lines = [f"<tr>{heads}</tr>"]
+        for row in records:
+            if self.group and row[self.group] != last:
+                last = row[self.group]
+                lines.append(wide % f"<b>{escape(str(last))}</b>")
+            cells = (f"<td>{_cell(row.get(name), kind)}</td>" for name, kind in kinds.items())
+            lines.append(f"<tr>{''.join(cells)}</tr>")
+            if self.note and row[self.note]:
+                lines.append(wide % escape(str(row[self.note])))
         caption = f"<h3>{escape(self.title)}</h3>" if self.title else ""
-        below = f"<p>{escape(self.below)}</p>" if self.below else ""
-        return caption + self._table("html") + below
+        texts = (f"<p>{escape(text)}</p>" for text in (meanings, self.below) if text)
+        return "".join([caption, "<table>", *lines, "</table>", *texts])
 
-    def _table(self, to: Format) -> str:
-        own = {"group": self.group, "note": self.note}
-        return table(self.rows, self.columns, to, explain=self.explain, **own)
+    def __str__(self) -> str:
+        records = self._records()
+        kinds, meanings = self._kinds(records)
+        cells = [
+            [shown(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
+            for row in records
+        ]
+        numbers = [all(isinstance(row.get(name), int | float) for row in records) for name in kinds]
+        heads = [kind.heading for kind in kinds.values()]
+        widths, last = _widths(heads, cells, numbers), None
+        # Headings stand at the bottom of their lines.
+        lines = [wrapped(self.title), *_in_columns(heads, widths, numbers, -1)]
+        for row, line in zip(records, cells, strict=True):
+            if self.group and row[self.group] != last:
+                last = row[self.group]
+                lines.append(wrapped(str(last), 0, 2))
+            lines += _in_columns(line, widths, numbers)
+            if self.note and row[self.note]:
+                lines.append(wrapped(str(row[self.note]), NOTE, NOTE))
+        return "\n".join(
+            filter(None, [*lines, *(wrapped(t, 0, 1) for t in (meanings, self.below))])
+        )
 
 
 def shown(value: object, form: str = ".6g", scale: float = 1.0) -> str:
@@ -67,92 +116,13 @@ def shown(value: object, form: str = ".6g", scale: float = 1.0) -> str:
     return "" if value is None else str(value)
 
 
-def table(
-    rows: pd.DataFrame | Rows,
-    columns: Sequence[str] | Mapping[str, Column] = (),
-    to: Format = "terminal",
-    *,
-    group: str = "",
-    note: str = "",
-    explain: bool = True,
-) -> str:
-    """Rows as a table.
-
-    Parameters
-    ----------
-    columns
-        Names of those that are shown, or how each of them is printed; all by default.
-    to
-        `terminal`, `html`: headings and formats of `labels.column`, meanings below; within the
-        width of the terminal, or with all digits in the attribute `value`.  `markdown`: names and
-        four digits.
-    group, note
-        Columns whose values stand in lines of their own: above their rows, and below each.
-    explain
-        Whether meanings stand below.
-    """
-    records: Rows = rows if isinstance(rows, Sequence) else rows.to_dict("records")  # type: ignore[assignment]
-    names = columns or (records[0] if records else ())
-    if to == "markdown":
-        head = f"| {' | '.join(names)} |\n|{'---|' * len(names)}\n"
-        lines = ([_four_digits(row.get(name)) for name in names] for row in records)
-        return head + "".join(f"| {' | '.join(line)} |\n" for line in lines)
-    kinds = columns if isinstance(columns, Mapping) else {name: column(name) for name in names}
-    if group:
-        places = list(dict.fromkeys(row[group] for row in records))
-        records = sorted(records, key=lambda row: places.index(row[group]))
-    meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds.values() if kind.meaning]
-    below = f"({'; '.join(meanings)}.)" if meanings and explain else ""
-    return (_terminal if to == "terminal" else _html)(records, kinds, group, note, below)
-
-
-def _four_digits(value: object) -> str:
-    if isinstance(value, float):
-        return "" if value != value else f"{value:.4g}"
-    return "" if value is None else str(value).replace("|", "\\|")
-
-
-def _html(records: Rows, kinds: Mapping[str, Column], group: str, note: str, below: str) -> str:
-    wide, last = f'<tr><td colspan="{len(kinds)}"><div>%s</div></td></tr>', None
-    heads = "".join(f"<th>{escape(kind.heading)}</th>" for kind in kinds.values())
-    lines = [f"<tr>{heads}</tr>"]
-    for row in records:
-        if group and row[group] != last:
-            last = row[group]
-            lines.append(wide % f"<b>{escape(str(last))}</b>")
-        cells = (f"<td>{_cell(row.get(name), kind)}</td>" for name, kind in kinds.items())
-        lines.append(f"<tr>{''.join(cells)}</tr>")
-        if note and row[note]:
-            lines.append(wide % escape(str(row[note])))
-    return f"<table>{''.join(lines)}</table>" + (f"<p>{escape(below)}</p>" if below else "")
-
-
 def _cell(value: object, kind: Column) -> str:
+    """A value in HTML; a number with all its digits."""
     text = escape(shown(value, kind.form, kind.scale))
     if isinstance(value, float) and value == value:
         return f'<data value="{value}">{text}</data>'
     verdict = f' class="{text}"' if text in ("met", "missed") else ""
     return f"<div{verdict}>{text}</div>"
-
-
-def _terminal(records: Rows, kinds: Mapping[str, Column], group: str, note: str, below: str) -> str:
-    cells = [
-        [shown(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
-        for row in records
-    ]
-    numbers = [all(isinstance(row.get(name), int | float) for row in records) for name in kinds]
-    heads = [kind.heading for kind in kinds.values()]
-    widths, last = _widths(heads, cells, numbers), None
-    # Headings stand at the bottom of their lines.
-    lines = _in_columns(heads, widths, numbers, -1)
-    for row, line in zip(records, cells, strict=True):
-        if group and row[group] != last:
-            last = row[group]
-            lines.append(wrapped(str(last), 0, 2))
-        lines += _in_columns(line, widths, numbers)
-        if note and row[note]:
-            lines.append(wrapped(str(row[note]), NOTE, NOTE))
-    return "\n".join(filter(None, [*lines, wrapped(below, 0, 1)]))
 
 
 def _in_columns(
@@ -207,7 +177,7 @@ def simulation_text(dataset: xr.Dataset, shown: Sequence[str], counts: Iterable[
     parts = [
         wrapped(f"{dataset.attrs['title']}{note}: {ended}"),
         wrapped(str(dataset["remark"].item())),
-        table(rows),
+        str(Table(rows)),
         f"{further} more outputs: --all-outputs" if further else "",
         wrapped(", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in counts)),
         f"seconds in the compiled loop {seconds:.3e} ({clock})",

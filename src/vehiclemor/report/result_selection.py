@@ -16,7 +16,7 @@ from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import unknown
 from vehiclemor.resources import data_names
 from vehiclemor.study.plans.loading import content_hash, load_studies
-from vehiclemor.study.plans.study_file import FACTORS
+from vehiclemor.study.plans.study_runs import FACTORS
 from vehiclemor.study.store import combined_path, result_path
 
 if TYPE_CHECKING:

@@ -189,7 +189,7 @@ def cost_text(model: str, folder: Path, brief: bool = False) -> str:
 
 
 def _model_parts(name: str, rows: pd.DataFrame, folder: Path) -> list[Part]:
-    """Errors of every method in nominal and perturbed runs, costs, modes, unseen inputs."""
+    """Errors of every method in nominal and perturbed runs, costs, unseen inputs."""
     kinds = _by(rows.to_dict("records"), "kind")
     nominal, perturbed = _by(kinds[ERRORS], "study").values()
     key = ("start", "label", "output")
@@ -205,10 +205,6 @@ def _model_parts(name: str, rows: pd.DataFrame, folder: Path) -> list[Part]:
     title = f"{name}: RMS errors, SI units"
     parts: list[Part] = [Table(lines, columns, title, group="of", below="; ".join(reasons))]
     parts.append(cost_text(name, folder))
-    if "spectrum" in kinds:
-        title = "Singular values of POD over all control periods of the nominal run"
-        shares = ["mode", "median_singular_value", "largest_singular_value", "largest_left_out"]
-        parts.append(Table(kinds["spectrum"], shares, title, group="preset"))
     judged = [row for kind in ("method", "target", "bound") for row in kinds.get(kind, ())]
     return parts + _unseen_parts(judged)
 

@@ -29,7 +29,8 @@ from vehiclemor.study.plans.choice import reasons
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names, sampled_sets
 from vehiclemor.study.plans.protocol_run import second_runs
 from vehiclemor.study.plans.results import described
-from vehiclemor.study.plans.study_file import PARAMETER, SETS
+from vehiclemor.study.plans.study_file import SETS
+from vehiclemor.study.plans.study_runs import PARAMETER
 from vehiclemor.study.result import variables
 from vehiclemor.study.scenario import Scenario
 

@@ -75,14 +75,8 @@ def evaluate(
     """Labelled result of an experiment, whatever becomes of it.
 
     Where nothing could be computed the values are missing, and `status` and `message` say why.
-
-    Parameters
-    ----------
-    model
-        The model that the experiment was made with; what was lately fitted to it and solved with it
-        is used again.  By default it is built from the registry, as that of all others is.
-    errors
-        Whether to compare with the full-order solution; without it, it is not solved.
+    What was lately solved with a `model` that is given is used again; by default it is built from
+    the registry.  Without `errors` the full order is not solved.
     """
     solve = kept_reference if model is None else recent_reference
     with first_use(f"{experiment.model} with {experiment.method}"), one_thread():

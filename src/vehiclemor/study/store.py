@@ -215,15 +215,8 @@ def stored(
     """What is stored for this key, else what `make` gives, which is then stored.
 
     That takes the place of the results of another study of that name, which can be combined again.
-
-    Parameters
-    ----------
-    attribute
-        Global attribute that holds the key.
-    sources
-        Files that it is made from; it is made again if one is missing, or a bug has ended a run.
-    content
-        Hash of what a study file says.
+    The global `attribute` holds the key, `content` is the hash of a study file.  It is made again
+    if one of the files that it is made from is missing, or a bug has ended a run.
     """
     held = global_attributes(path)
     if held.get(attribute) == key and all(source.exists() for source in sources()):

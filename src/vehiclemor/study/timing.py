@@ -112,18 +112,8 @@ def timed_tests(
 ) -> xr.Dataset:
     """Time experiments on their test scenarios, which are the same for all.
 
-    Parameters
-    ----------
-    finished
-        Whether a run is timed (experiments, scenarios): one that has failed is not.
-    what
-        What the scenarios are.
-
-    Returns
-    -------
-    xarray.Dataset
-        `seconds` with quartiles and `loop_seconds` on `case` and `scenario`, missing where a run is
-        not timed; `offline_seconds` on `case`.
+    A run that has not `finished` (experiments, scenarios) is not timed: its `seconds` with
+    quartiles and `loop_seconds`, on `case` and `scenario`, are missing.
     """
     rounds = PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG
     seconds, offline = _rounds(list(experiments.values()), rounds, what, finished)

@@ -9,9 +9,9 @@ from scipy.sparse import csc_array, diags_array
 
 import vehiclemor as vm
 from vehiclemor.exceptions import InputError
-from vehiclemor.reduction.methods import balanced_truncation, craig_bampton, krylov
-from vehiclemor.reduction.projection.modes import port_rates
-from vehiclemor.reduction.projection.structural import projected
+from vehiclemor.reduction.methods.linear import BALANCED_TRUNCATION
+from vehiclemor.reduction.methods.port_bases import CRAIG_BAMPTON, KRYLOV, krylov_vectors
+from vehiclemor.reduction.projection.structural import modes_within, port_rates, projected
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def truck():
 
 
 def fitted(method, model, **values):
-    method.METHOD.check(model, settings := method.METHOD.settings["structural"](**values))
+    method.check(model, settings := method.settings["structural"](**values))
     return method.fit(model, None, settings)
 
 
@@ -34,19 +34,19 @@ def response(model, structure, frequency):
 
 
 def response_error(model, reduced):
-    full, small = model.system.structure, projected(model.system.structure, reduced.bases[0])[0]
+    full, small = model.system.structure, projected(model.system.structure, reduced.bases[0])
     exact, found = ([response(model, x, f) for f in (0.5, 2, 8, 20, 50)] for x in (full, small))
     return max(np.linalg.norm(a - b) / np.linalg.norm(a) for a, b in zip(exact, found, strict=True))
 
 
 def test_balanced_truncation_has_smaller_errors_than_craig_bampton_of_equal_rank(truck):
-    others = fitted(craig_bampton, truck, highest=60.0)
+    others = fitted(CRAIG_BAMPTON, truck, highest=60.0)
     ranks = 25, others.order
-    errors = [response_error(truck, fitted(balanced_truncation, truck, rank=r)) for r in ranks]
+    errors = [response_error(truck, fitted(BALANCED_TRUNCATION, truck, rank=r)) for r in ranks]
     assert errors[1] < min(0.1 * errors[0], 0.5 * response_error(truck, others))
 
 
-@pytest.mark.parametrize("method", [balanced_truncation, krylov])
+@pytest.mark.parametrize("method", [BALANCED_TRUNCATION, KRYLOV])
 def test_reduced_trucks_ride_as_the_full_one(truck, method):
     road = vm.road("C", 7, 22.0)
     full, run = truck.run(road), fitted(method, truck).simulate(road, "equilibrium")
@@ -55,10 +55,11 @@ def test_reduced_trucks_ride_as_the_full_one(truck, method):
 
 
 def test_krylov_vectors_match_twice_as_many_moments_as_blocks(truck):
-    vectors = krylov.krylov_vectors(truck, 20.0, 2)
+    vectors = krylov_vectors(truck, 20.0, 2)
     assert np.allclose(vectors.T @ vectors, np.eye(vectors.shape[1]), atol=1e-12)
     moments = []
-    for s in (truck.system.structure, projected(truck.system.structure, vectors)[0]):
+    structure = truck.system.structure
+    for s in (structure, projected(structure, modes_within(structure, vectors))):
         m, b = s.mass.toarray(), s.ports.toarray()
         solved = np.linalg.inv((s.stiffness + (40.0 * np.pi) ** 2 * s.mass).toarray())
         moments.append([b.T @ solved @ np.linalg.matrix_power(m @ solved, k) @ b for k in range(5)])
@@ -73,22 +74,21 @@ def test_motions_without_mass_are_for_krylov_alone():
     model = SimpleNamespace(
         kind="structural", name="plate", size=3, system=SimpleNamespace(structure=structure)
     )
-    assert krylov.krylov_vectors(model, 1.0, 9).shape == (3, 2)
+    assert krylov_vectors(model, 1.0, 9).shape == (3, 2)
     with pytest.raises(InputError, match="plate has motions without mass"):
-        balanced_truncation.METHOD.check(
-            model, balanced_truncation.BalancedTruncationSettings(rank=2)
-        )
+        BALANCED_TRUNCATION.check(model, BALANCED_TRUNCATION.settings["structural"](rank=2))
 
 
 def test_what_does_not_fit_is_refused(truck, monkeypatch):
     with pytest.raises(InputError, match=r"n = 559; balanced_truncation .* up to 499"):
-        fitted(balanced_truncation, vm.model("flexible_truck", {"elements_per_bay": 3}))
+        fitted(BALANCED_TRUNCATION, vm.model("flexible_truck", {"elements_per_bay": 3}))
     with pytest.raises(InputError, match="rank is 175; flexible_truck allows at most 174"):
-        fitted(balanced_truncation, truck, rank=175)
+        fitted(BALANCED_TRUNCATION, truck, rank=175)
     with pytest.raises(InputError, match="moments is 3; it allows at most 2"):
-        krylov.METHOD.check(
-            SimpleNamespace(kind="structural", name="it", size=3), krylov.KrylovSettings(moments=3)
+        KRYLOV.check(
+            SimpleNamespace(kind="structural", name="it", size=3),
+            KRYLOV.settings["structural"](moments=3),
         )
     monkeypatch.setitem(sys.modules, "pymor.models.iosys", None)
     with pytest.raises(InputError, match=r'pip install "vehiclemor\[contenders\]"'):
-        fitted(balanced_truncation, truck)
+        fitted(BALANCED_TRUNCATION, truck)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
 from itertools import combinations_with_replacement
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +18,6 @@ from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.reduction.interface import OfflineCost, installed
 from vehiclemor.reduction.learned.learned_loops import Equations
 from vehiclemor.reduction.learned.samples import (
-    Components,
     Samples,
     States,
     components,
@@ -98,25 +97,15 @@ def stable_step(equations: Equations, r: int, longest: float) -> float:
     return longest / float(np.clip(np.ceil(longest * fastest / STABLE), 1, MOST_STEPS))
 
 
-class Regression(NamedTuple):
-    """What a learner sees: standardised arguments (samples, v - 1) and results (samples, m).
-
-    The first r results are rates of the components or, of one-step models, their changes; then come
-    psi', U, V of a vehicle, beyond those of straight running.  Of a mechanism the results are the
-    coordinates.
-    """
-
-    arguments: np.ndarray
-    results: np.ndarray
-
-
 @dataclass(frozen=True, eq=False)
 class Learning:
     """Samples as a learner sees them, and the model of what it has fitted."""
 
     # Of the training runs.
     samples: Samples
-    components: Components
+    # Components per deviation (r, n) and back (n, r).
+    forward: np.ndarray
+    back: np.ndarray
     mapped: bool  # Whether changes in one step are learned; else rates.
     began: float  # `time.process_time()` at the beginning of the fit.
 
@@ -130,7 +119,7 @@ class Learning:
         samples = gathered(model, training, settings.steps, settings.skipped)
         # As if samples that are known from another fit were made anew.
         began = time.process_time() - samples.seconds
-        return cls(samples, components(samples, settings.rank), mapped, began)
+        return cls(samples, *components(samples, settings.rank), mapped, began)
 
     @cached_property
     def input_scale(self) -> np.ndarray:
@@ -141,8 +130,8 @@ class Learning:
     @cached_property
     def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
         """Components (samples, r) of the samples, and of those that follow."""
-        s, forward = self.samples, self.components.forward.T
-        return s.deviations @ forward, s.next_deviations @ forward
+        s = self.samples
+        return s.deviations @ self.forward.T, s.next_deviations @ self.forward.T
 
     @cached_property
     def inputs(self) -> np.ndarray:
@@ -152,13 +141,18 @@ class Learning:
         return np.hstack([s.inputs / scale, *more])
 
     @cached_property
-    def regression(self) -> Regression:
-        """Arguments and results at the samples."""
+    def regression(self) -> tuple[np.ndarray, np.ndarray]:
+        """Standardised arguments (samples, v - 1) and results (samples, m).
+
+        The first r results are rates of the components or, of one-step models, their changes; then
+        come psi', U, V of a vehicle, beyond those of straight running.  Of a mechanism the results
+        are the coordinates.
+        """
         s, (z, following) = self.samples, self.coordinates
         if s.states.model.kind == "ae":
-            return Regression(self.inputs, s.deviations)
-        results = following - z if self.mapped else s.rates @ self.components.forward.T
-        return Regression(np.hstack([z, self.inputs]), np.hstack([results, s.motion]))
+            return self.inputs, s.deviations
+        results = following - z if self.mapped else s.rates @ self.forward.T
+        return np.hstack([z, self.inputs]), np.hstack([results, s.motion])
 
     def least_squares(self, terms: Terms, values: np.ndarray, arguments: np.ndarray) -> np.ndarray:
         """Coefficients (terms, m) of values (samples, m)."""
@@ -183,11 +177,11 @@ class Learning:
     def residual_scale(self) -> np.ndarray:
         """Magnitudes (m,) of what linear equations leave of the results; 1 of rounding."""
         sizes = self.linear[1].std(axis=0)
-        return np.where(sizes > CUT * np.abs(self.regression.results).max(initial=0.0), sizes, 1.0)
+        return np.where(sizes > CUT * np.abs(self.regression[1]).max(initial=0.0), sizes, 1.0)
 
     def model(self, equations: Equations, lifted: Terms = ()) -> "LearnedModel":
         """The model of what has been fitted; `lifted` are monomials of the first components."""
-        s, r = self.samples, len(self.components.forward)
+        s, r = self.samples, len(self.forward)
         if s.states.shape:
             straight = np.zeros((1, equations.coefficients.shape[1]))
             straight[0, -2] = s.states.shape.speed
@@ -206,25 +200,22 @@ class Learning:
         cost = OfflineCost(time.process_time() - self.began, s.evaluations)
         largest = np.abs(self.coordinates[0]).max(axis=0, initial=0.0)
         online = s.inputs[:, len(s.states.model.inputs) :]
-        known = np.vstack([np.column_stack([-largest, largest]), *_ranges(online)])
+        ranges = np.column_stack([online.min(axis=0), online.max(axis=0)])
+        known = np.vstack([np.column_stack([-largest, largest]), ranges])
         return LearnedModel(
-            *(s.states, self.components, equations, step, self.mapped),
+            *(s.states, self.forward, self.back, equations, step, self.mapped),
             *(self.input_scale, table.reshape(-1, count), outputs, known, cost),
         )
-
-
-def _ranges(values: np.ndarray) -> list[np.ndarray]:
-    """Least and largest value of each column."""
-    return [np.array([column.min(), column.max()]) for column in values.T]
 
 
 @dataclass(frozen=True, eq=False)
 class LearnedModel(ShortRepr):
     """Equations that a general learner has fitted to training runs."""
 
-    # Which states are meant, and their components.
-    states: States
-    components: Components
+    states: States  # Which are meant.
+    # Components per deviation of these (r, n) and back (n, r).
+    forward: np.ndarray
+    back: np.ndarray
     equations: Equations  # Of components and standardised inputs, see `Learning`.
     # In s; whether the equations give what changes in a step, or rates.
     time_step: float
@@ -254,12 +245,13 @@ class LearnedModel(ShortRepr):
             own = self.order + inputs, self.order + self.states.planar
             require((arguments, m) == own, "equations")
         require(SHORTEST <= self.time_step < np.inf, "time_step")
-        r, online = len(self.components.forward), len(self.model.definition.online)
+        r, online = len(self.forward), len(self.model.definition.online)
         shaped("known", (self.known, r + online, 2))
         require(len(self.input_scale) == len(self.model.inputs) + online, "input_scale")
+        require(self.forward.shape == self.back.T.shape, "components")
         if not static and self.model.kind != "structural":
             n = len(self.states.of(self.model.start()[None])[0])
-            shaped("components", (self.components.forward, r, n))
+            shaped("components", (self.forward, r, n), (self.back, n, r))
         elif self.model.kind == "structural":
             rows = r + len(self.input_scale) + 1
             shaped("outputs", (self.outputs, rows, len(self.model.outputs)))
@@ -268,7 +260,7 @@ class LearnedModel(ShortRepr):
     @property
     def order(self) -> int:
         """Number of coordinates: components, or monomials of them."""
-        return len(self.lifted) or len(self.components.forward)
+        return len(self.lifted) or len(self.forward)
 
     def for_model(self, model: Any) -> "LearnedModel":
         """The same equations for a model whose online parameters are others."""
@@ -279,7 +271,7 @@ class LearnedModel(ShortRepr):
         table, run = self._run(maneuver, start)
         if self.model.kind == "ae" or run.status != "ok":
             return run
-        r = len(self.components.forward)
+        r = len(self.forward)
         online = online_inputs(self.model, run.inputs)[:, len(self.model.inputs) :]
         (low, high), values = self.known.T, np.hstack([table[:, :r], online])
         reach = MARGIN * np.maximum(0.5 * (high - low), SLACK * np.abs(high))
@@ -307,7 +299,7 @@ class LearnedModel(ShortRepr):
             failure = f"the learned equations have diverged at t = {known[reached]:.4g} s"
         table = np.column_stack([np.interp(times, known, column) for column in path.T])
         table[late & bool(failure)] = np.nan
-        r = len(self.components.forward)
+        r = len(self.forward)
         if model.kind == "structural":
             u = online_inputs(model, inputs) / self.input_scale
             return table, Trajectory.of(
@@ -323,7 +315,7 @@ class LearnedModel(ShortRepr):
                 names=model.outputs,
                 model=model,
             )
-        states = self.states.back(table[:, :r] @ self.components.back.T, table[:, self.order :])
+        states = self.states.back(table[:, :r] @ self.back.T, table[:, self.order :])
         states[0] = begun
         return table, model.trajectory(times, inputs, states, nothing, seconds, failure)
 
@@ -331,7 +323,7 @@ class LearnedModel(ShortRepr):
         """Full states (samples, 2 n) in the span of the components."""
         if self.model.kind in ("ae", "structural"):
             return None
-        found = self.states.of(states) @ self.components.forward.T @ self.components.back.T
+        found = self.states.of(states) @ self.forward.T @ self.back.T
         planar = np.array([self.states.begun(state) for state in states])
         return self.states.back(found, planar)
 
@@ -360,7 +352,7 @@ class LearnedModel(ShortRepr):
         """Coordinates of a full state, then heading and place."""
         if self.model.kind == "structural":
             return np.zeros(self.order)
-        z = self.states.of(state[None]) @ self.components.forward.T
+        z = self.states.of(state[None]) @ self.forward.T
         if len(self.lifted):
             z = np.prod(np.column_stack([[1.0], z])[:, self.lifted], axis=2)
         return np.concatenate([z[0], self.states.begun(state)])

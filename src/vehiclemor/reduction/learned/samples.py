@@ -179,23 +179,10 @@ def _of_run(
     return u[taken], u[taken + 1], *pair, rates, motion, outputs, evaluations
 
 
-@dataclass(frozen=True, eq=False)
-class Components:
-    """Principal components of deviations, each of mean square 1."""
+def components(samples: Samples, rank: int) -> tuple[np.ndarray, np.ndarray]:
+    """The first principal components of the samples, at most as many as they span.
 
-    # Components per deviation (r, n) and back (n, r).
-    forward: np.ndarray
-    back: np.ndarray
-
-    def check_sizes(self) -> None:
-        """Raise `ValueError` if they don't fit each other."""
-        if self.forward.shape != self.back.T.shape:
-            raise ValueError("components")
-
-
-def components(samples: Samples, rank: int) -> Components:
-    """The first components of the samples, at most as many as they span.
-
+    Components of mean square 1 per deviation (r, n), and deviations per component (n, r).
     States stand in SI units: scaled by their ranges, ringing of the wheels would come first, and
     learned models of it were unstable.  `InputError` if nothing moves.
     """
@@ -204,4 +191,4 @@ def components(samples: Samples, rank: int) -> Components:
         raise InputError("nothing moves in the training runs: there is nothing to learn")
     sizes = sizes[:rank][sizes[:rank] > ROUNDING * sizes[0]] / np.sqrt(len(samples.deviations))
     vectors = rows[: len(sizes)]
-    return Components(vectors / sizes[:, None], vectors.T * sizes)
+    return vectors / sizes[:, None], vectors.T * sizes

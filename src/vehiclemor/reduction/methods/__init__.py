@@ -1,1 +1,1 @@
-"""Reduction methods, one in each file; none knows another."""
+"""Reduction methods: those of one kind in a file; no file knows another."""

@@ -1,4 +1,7 @@
-"""The full-order model itself: the baseline of every comparison."""
+"""The full-order model itself: the baseline of every comparison; and a structure on a coarse mesh.
+
+The latter is the null model of structures: a cheaper model is had by larger elements, too.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.exceptions import ConvergenceError
+from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost, Presets
 from vehiclemor.reduction.projection.structural import StructuralRuns, StructuralSettings
@@ -20,14 +23,16 @@ from vehiclemor.reduction.settings import (
     StepTolerance,
     Tolerance,
     Value,
+    inline_table,
 )
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
+from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.kernel_derivatives import By
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.structures.model import USUAL, StructuralModel
+from vehiclemor.simulation.structures.model import SOLVER, USUAL, StructuralModel
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -58,7 +63,7 @@ class FullStructureSettings(StructuralSettings):
     """How structures are integrated."""
 
     solver: Literal["generalised_alpha"] = Field(
-        "generalised_alpha", description="of order 2, one step size a run, damped at infinity"
+        SOLVER, description="of order 2, one step size a run, damped at infinity"
     )
 
 
@@ -99,7 +104,7 @@ class FullOrder:
                 raise
             return error.trajectory
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray:
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """The states themselves: the full space holds them."""
         return states
 
@@ -137,34 +142,63 @@ class FullOrderMechanism(FullOrder, ReducedMechanism):
         return self.model.jacobian(state, inputs, by, of)
 
 
+class CoarseMeshSettings(StructuralSettings):
+    """Settings for a structure."""
+
+    mesh: str = Field(
+        "elements_per_bay = 1, shell_size = 0", description="parameters of the mesh, as in TOML"
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class FullOrderStructure(StructuralRuns, FullOrder):
-    """A structural model; it gives whole runs alone."""
+    """A structural model, on its own mesh or on another one; it gives whole runs alone."""
 
     model: StructuralModel
     step_size: float = 0.0
+    mesh: str = ""  # Parameters of another mesh.
 
     @property
     def order(self) -> int:
         """Number of coordinates."""
-        return self.model.size
+        return self.meshed.size
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray:
-        """The states themselves."""
-        return states
+    @cached_property
+    def meshed(self) -> Any:
+        """The model on the mesh."""
+        return reparametrised(self.model, mesh_parameters(self.mesh)) if self.mesh else self.model
+
+    @property
+    def solved(self) -> tuple[StructuralModel, None]:
+        """The model on the mesh, in its own coordinates."""
+        return self.meshed, None
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """The states themselves; of another mesh there are none."""
+        return None if self.mesh else states
 
 
-def fit(
-    model: Any,
-    training: Training,
-    settings: AlgebraicSettings | DynamicSettings | FullStructureSettings,
-) -> FullOrder:
+def mesh_parameters(mesh: str) -> dict[str, float]:
+    """Parameters of a mesh by name; `InputError` if the text is none."""
+    return inline_table(mesh, "coarse_mesh: mesh")
+
+
+def check_mesh(model: StructuralModel, settings: CoarseMeshSettings) -> None:
+    """Raise `InputError` if the mesh is none."""
+    given = mesh_parameters(settings.mesh)
+    for name in given:
+        if name in model.definition.online:
+            raise InputError(f"coarse_mesh: {name} is no parameter of a mesh")
+    reparametrised(model, given)
+
+
+def fit(model: Any, training: Training, settings: Any) -> FullOrder:
     """Nothing is fitted, and no training run is looked at."""
-    if isinstance(settings, FullStructureSettings):
-        own = model, settings.solver, settings.tolerance
-        return FullOrderStructure(*own, step_size=settings.step_size)
+    if model.kind == "structural":
+        how = {"step_size": settings.step_size, "mesh": getattr(settings, "mesh", "")}
+        return FullOrderStructure(model, SOLVER, settings.tolerance, **how)
     kind = FullOrderMechanism if model.kind == "ae" else FullOrderSystem
-    return kind(model, settings.solver, settings.tolerance)  # type: ignore[arg-type]
+    return kind(model, settings.solver, settings.tolerance)
 
 
 METHOD = Method(
@@ -177,9 +211,18 @@ METHOD = Method(
         "ae": _presets("newton_lanes", 1e-4),
         "ode": _presets("ros34pw2", 2e-3, paper=PAPER),
         "dae": _presets("ros34pw2", 7e-4, paper=PAPER),
-        "structural": _presets("generalised_alpha", 1e-2, paper={"tolerance": USUAL}),
+        "structural": _presets(SOLVER, 1e-2, paper={"tolerance": USUAL}),
     },
     fit=fit,
+    learns_from="inputs",
+    own_limits=True,
+)
+COARSE_MESH = Method(
+    name="coarse_mesh",
+    summary="no reduction: larger elements, the null model of structures",
+    settings={"structural": CoarseMeshSettings},
+    fit=fit,
+    check=check_mesh,
     learns_from="inputs",
     own_limits=True,
 )

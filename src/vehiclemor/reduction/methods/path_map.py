@@ -270,7 +270,9 @@ def _mapped(
     moving = np.flatnonzero(widths > RESTING)
     if not len(moving):
         raise InputError("path_map: no input moves in training")
-    shares = (np.arange(number)[:, None] + 0.5 + 0.5 * _nodes(degree)).ravel() / number
+    shares = (
+        np.arange(number)[:, None] + 0.5 + 0.5 * chebyshev.chebpts1(degree + 1)
+    ).ravel() / number
     grid = [low + shares * (high - low) for low, high in ranges[moving]]
     inputs = np.tile(centres, (len(grid[0]) ** len(grid), 1))
     inputs[:, moving] = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, len(grid))
@@ -304,17 +306,13 @@ def _distinct(values: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
     return np.column_stack(kept), tuple(columns)
 
 
-def _nodes(degree: int) -> np.ndarray:
-    return chebyshev.chebpts1(degree + 1)
-
-
 def _coefficients(values: np.ndarray, moving: int, number: int, degree: int) -> np.ndarray:
     """Coefficients (cells, monomials, quantities) from values (nodes, quantities) of all cells."""
     size = degree + 1
     values = values.reshape(*[number, size] * moving, values.shape[1])
     values = np.moveaxis(values, range(0, 2 * moving, 2), range(moving))
     # Series first: they say what to leave out, and are well-conditioned.
-    series = np.linalg.inv(chebyshev.chebvander(_nodes(degree), degree))
+    series = np.linalg.inv(chebyshev.chebvander(chebyshev.chebpts1(degree + 1), degree))
     for axis in range(moving, 2 * moving):
         values = _along(series, values, axis)
     beyond = np.indices([size] * moving).sum(axis=0) > degree

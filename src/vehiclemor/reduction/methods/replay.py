@@ -51,13 +51,10 @@ class ReplayModel(ShortRepr):
         inputs = maneuver.at(times)
         alike = [run for run in self.recorded if np.array_equal(run.times, times)]
         nearest = min(alike or self.recorded, key=lambda run: _distance(run, times, inputs))
-        paths = nearest.coordinates, nearest.speeds
-        # Copies: the training run stays what it is.
-        q, v = (p.copy() if alike else _resampled(nearest.times, p, times) for p in paths)
-        if self.model.kind == "structural":
-            # There are no coordinates to make outputs of.
-            outputs = _resampled(nearest.times, nearest.outputs, times).copy()
-        else:
+        paths = nearest.coordinates, nearest.speeds, nearest.outputs
+        q, v, outputs = (_resampled(nearest.times, path, times) for path in paths)
+        # Of a structure there are no coordinates to make outputs of.
+        if self.model.kind != "structural":
             outputs = self.model.outputs_at(np.hstack((q, v)), inputs)
         return replace(
             nearest,
@@ -84,8 +81,6 @@ def _distance(run: Trajectory, times: np.ndarray, inputs: np.ndarray) -> float:
 
 def _resampled(before: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Columns of `values` (samples, k) at other times, the last value after the end."""
-    if np.array_equal(before, times):
-        return values
     columns = [np.interp(times, before, column) for column in values.T]
     return np.array(columns).reshape(len(columns), len(times)).T
 

@@ -25,8 +25,18 @@ from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
+from vehiclemor.reduction.vehicle.fitting import (
+    after_transient,
+    forward_selection,
+    improved,
+    largest,
+    ridge_fit,
+    targets_of,
+    training_reach,
+    with_transients,
+)
+from vehiclemor.reduction.vehicle.linear_modes import SlowModes, slow_modes
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
-from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import (
     ShapeSamples,
     VehicleShape,
@@ -41,13 +51,6 @@ from vehiclemor.reduction.vehicle.slow_features import (
     odd_candidates,
     slow_features,
 )
-from vehiclemor.reduction.vehicle.slow_modes import SlowModes, slow_modes
-from vehiclemor.reduction.vehicle.training_runs import (
-    after_transient,
-    training_reach,
-    with_transients,
-)
-from vehiclemor.reduction.vehicle.trajectory_fit import improved, targets_of
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 

@@ -25,7 +25,7 @@ from vehiclemor.simulation.newton.newton_loops import (
 
 # Number of entries of the Jacobian that are no structural zeros.
 ENTRIES = 0
-INLINED = ("weighted", "decode", "tangent_product", "enter_window")
+INLINED = ("weigh", "decode", "tangent_product", "enter_window")
 
 
 class Windows(NamedTuple):
@@ -47,12 +47,14 @@ def tangent(parts: Vector, column: Vector, result: Vector) -> None:
     """Jacobian, by its entries, times a column (N,) into result (N,)."""
 
 
-def weighted(test, k, product, j):
-    """Row k of the test basis times row j of the product."""
-    total = 0.0
-    for i in range(N):
-        total += test[k, i] * product[j, i]
-    return total
+def weigh(test, r, product, reduced):
+    """Rows of the test basis times those of the product: the reduced equations."""
+    for k in range(r):
+        for column in range(r + 1):
+            j, total = column if column < r else N, 0.0
+            for i in range(N):
+                total += test[k, i] * product[j, i]
+            reduced[k, j] = total
 
 
 def decode(mean, basis, qh, r, q):
@@ -107,7 +109,6 @@ def projected_path(
         q[i] = q_start[i]
     for window in range(windows.ranks.shape[0]):
         r, mean, basis = windows.ranks[window], windows.means[window], windows.bases[window]
-        test = windows.tests[window]
         enter_window(mean, basis, r, q, qh)
         for sample in range(windows.first_samples[window], windows.first_samples[window + 1]):
             counts[SAMPLE] = sample
@@ -118,16 +119,10 @@ def projected_path(
                 tangent_parts(q, u, constants, parts)
                 tangent_product(parts, basis, r, product)
                 iterations += 1
-                for k in range(r):
-                    for j in range(r):
-                        if least_squares:
-                            reduced[k, j] = weighted(product, k, product, j)
-                        else:
-                            reduced[k, j] = weighted(test, k, product, j)
-                    if least_squares:
-                        reduced[k, N] = weighted(product, k, product, N)
-                    else:
-                        reduced[k, N] = weighted(test, k, product, N)
+                if least_squares:
+                    weigh(product, r, product, reduced)
+                else:
+                    weigh(windows.tests[window], r, product, reduced)
                 if not small_solve(reduced, r):
                     return stopped(counts, iterations, iterations, SINGULAR)
                 for j in range(r):

@@ -1,4 +1,4 @@
-"""Structures in a basis: Galerkin projection of their matrices, ports and outputs.
+"""Structures in a basis: Galerkin projection of matrices, ports and outputs; and their modes.
 
 q = V z about the static state: M z'' + (W W' + d K) z' + K z = B f holds with V'MV in the place
 of M and so on; the law of the ports stays what it is.  Coordinates are turned so that V'MV is the
@@ -14,18 +14,19 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import Structure
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.projection.bases import RankTolerance
-from vehiclemor.reduction.settings import Settings, StructuralStep, StructuralTolerance
+from vehiclemor.reduction.settings import LARGEST_TOLERANCE, SHORTEST, Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.kernel_derivatives import PLACES, By, chosen, parameter_names, partial
+from vehiclemor.simulation.structures.factors import factored
 from vehiclemor.simulation.structures.model import (
     FIRST_STEP,
     REASONS,
@@ -37,6 +38,8 @@ from vehiclemor.simulation.structures.system import StructuralSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory
 from vehiclemor.sizes import require
 
+# Modes that are looked for at first.
+FIRST_MODES = 16
 # Directions whose mass is below this part of the largest one carry none.
 MASSLESS = 1e-12
 RESULTS = {"rhs": "rhs", "outputs": "outputs"}
@@ -45,14 +48,31 @@ RESULTS = {"rhs": "rhs", "outputs": "outputs"}
 class StructuralSettings(Settings):
     """What all reductions of structures share."""
 
-    tolerance: StructuralTolerance = USUAL
-    step_size: StructuralStep = 0.0
+    tolerance: float = Field(
+        USUAL,
+        gt=0.0,
+        le=LARGEST_TOLERANCE,
+        description="largest error of an output by the step size, as part of its range",
+    )
+    step_size: float = Field(
+        0.0,
+        ge=0.0,
+        le=0.1,
+        description="step size in s in the place of the tolerance, from 1e-6 s on; 0: by that",
+    )
+
+    @field_validator("step_size")
+    @classmethod
+    def _long_enough(cls, value: float) -> float:
+        """A step that is none, or long enough that a run ends."""
+        if 0.0 < value < SHORTEST:
+            raise ValueError(f"is {value:g}; it must be 0 or at least {SHORTEST:g}")
+        return value
 
 
-def projected(structure: Structure, basis: np.ndarray) -> tuple[Structure, np.ndarray]:
-    """A structure in a basis (n, k), and the modes (n, r) that are its coordinates."""
+def modes_within(structure: Structure, basis: np.ndarray) -> np.ndarray:
+    """Modes (n, r) of a structure in the span of a basis (n, k): of unit mass, slow ones first."""
     from scipy.linalg import eigh
-    from scipy.sparse import csc_array, eye_array
 
     def within(matrix: Any, vectors: np.ndarray) -> np.ndarray:
         product = vectors.T @ (matrix @ vectors)
@@ -61,25 +81,29 @@ def projected(structure: Structure, basis: np.ndarray) -> tuple[Structure, np.nd
     sizes, directions = eigh(within(structure.mass, basis))
     heavy = sizes > MASSLESS * sizes[-1]
     vectors = basis @ (directions[:, heavy] / np.sqrt(sizes[heavy]))
-    squares, shapes = eigh(within(structure.stiffness, vectors))
-    vectors = vectors @ shapes
-    r = vectors.shape[1]
+    return vectors @ eigh(within(structure.stiffness, vectors))[1]
+
+
+def projected(structure: Structure, modes: np.ndarray) -> Structure:
+    """A structure in coordinates of its modes (n, r), as `modes_within` gives them."""
+    from scipy.sparse import csc_array, diags_array, eye_array
+
     positions, rates, accelerations, forces = structure.outputs
-    made = Structure(
-        mass=csc_array(eye_array(r)),
-        stiffness=csc_array(np.diag(squares)),
+    squares = np.einsum("ij,ij->j", modes, structure.stiffness @ modes)
+    return Structure(
+        mass=csc_array(eye_array(modes.shape[1])),
+        stiffness=csc_array(diags_array(squares)),
         damping_time=structure.damping_time,
-        dampers=csc_array((structure.dampers.T @ vectors).T),
-        ports=csc_array((structure.ports.T @ vectors).T),
-        load=np.zeros(r),
+        dampers=csc_array((structure.dampers.T @ modes).T),
+        ports=csc_array((structure.ports.T @ modes).T),
+        load=np.zeros(modes.shape[1]),
         outputs=(
-            csc_array(positions @ vectors),
-            csc_array(rates @ vectors),
-            csc_array(accelerations @ vectors),
+            csc_array(positions @ modes),
+            csc_array(rates @ modes),
+            csc_array(accelerations @ modes),
             forces,
         ),
     )
-    return made, vectors
 
 
 class StructuralRuns(ShortRepr):
@@ -117,7 +141,7 @@ class ReducedStructure(StructuralRuns):
     """A structure in one basis, or in another one in each control period."""
 
     model: StructuralModel  # The full one.
-    bases: tuple[np.ndarray, ...]  # Vectors (n, r) of each period.
+    bases: tuple[np.ndarray, ...]  # Modes (n, r) of each period, see `modes_within`.
     edges: tuple[float, ...]  # Times in s at which the next period begins.
     # Cost of making it; error by the step size, as of the full model.
     offline: OfflineCost
@@ -135,18 +159,18 @@ class ReducedStructure(StructuralRuns):
         """Largest number of reduced coordinates in any period."""
         return max(basis.shape[1] for basis in self.bases)
 
-    @cached_property
-    def _modes(self) -> list[tuple[Structure, np.ndarray]]:
-        return [projected(self.model.system.structure, basis) for basis in self.bases]
+    def for_model(self, model: StructuralModel) -> Any:
+        """The same for a model whose online parameters are others, its modes in the same bases."""
+        modes = tuple(modes_within(model.system.structure, basis) for basis in self.bases)
+        return replace(self, model=model, bases=modes)
 
     @cached_property
     def periods(self) -> Periods:
         """Reduced structures, and how coordinates pass from one to the next: nearest by mass."""
-        law, mass = self.model.system.law, self.model.system.structure.mass
-        systems = tuple(StructuralSystem(structure, law) for structure, _ in self._modes)
-        vectors = [modes for _, modes in self._modes]
-        pairs = pairwise(vectors)
-        passed = tuple(after.T @ (mass @ before) for before, after in pairs)
+        structure, law = self.model.system.structure, self.model.system.law
+        systems = tuple(StructuralSystem(projected(structure, modes), law) for modes in self.bases)
+        pairs = pairwise(self.bases)
+        passed = tuple(after.T @ (structure.mass @ before) for before, after in pairs)
         return Periods(systems, self.edges, passed)
 
     @property
@@ -201,38 +225,34 @@ class SteppedStructure(ReducedStructure):
         return np.concatenate(moved[:2])
 
     @cached_property
-    def _dense(self) -> tuple[np.ndarray, ...]:
-        """Squares of the frequencies (r,), ports (r, p), dampers (r, k), outputs as in `Structure`.
-
-        Products with these few numbers take less time than with sparse arrays.
-        """
-        s: Any = self._first.structure
-        outputs = (matrix.toarray() for matrix in s.outputs)
-        return s.stiffness.diagonal(), s.ports.toarray(), s.dampers.toarray(), *outputs
+    def _linear(self) -> tuple[np.ndarray, ...]:
+        """Matrices of x' = A x + B f and y = C x + D f, f the forces of the ports; ports (r, p)."""
+        s = self._first.structure
+        ports, dampers, elastic = s.ports.toarray(), s.dampers.toarray(), s.stiffness.toarray()
+        positions, rates, accelerations, forces = (matrix.toarray() for matrix in s.outputs)
+        nothing, one = np.zeros_like(elastic), np.eye(len(elastic))
+        slowing = s.damping_time * elastic + dampers @ dampers.T
+        a, b = np.block([[nothing, one], [-elastic, -slowing]]), np.vstack([0.0 * ports, ports])
+        c = np.hstack([positions, rates]) + accelerations @ a[len(elastic) :]
+        return a, b, c, forces + accelerations @ ports, ports
 
     def _forces(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Port forces and their derivatives (p, 3)."""
-        ports, r = self._dense[1], len(state) // 2
-        return self._first.law.at(state[:r] @ ports, state[r:] @ ports, inputs)
+        deflections, rates = state.reshape(2, -1) @ self._linear[-1]
+        return self._first.law.at(deflections, rates, inputs)
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """Time derivative (2 r,) of a state."""
         del time
-        squares, ports, dampers, *_ = self._dense
-        r, damping_time = len(squares), self._first.structure.damping_time
-        elastic = squares * (state[:r] + damping_time * state[r:])
-        force = ports @ self._forces(state, inputs)[:, 0]
-        return np.concatenate([state[r:], force - elastic - dampers @ (state[r:] @ dampers)])
+        a, b, *_ = self._linear
+        return a @ state + b @ self._forces(state, inputs)[:, 0]
 
     def outputs(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Outputs (samples, outputs) of states (samples, 2 r) at inputs (samples, inputs)."""
-        found, r = [], states.shape[1] // 2
-        cq, cv, ca, cf = self._dense[3:]
-        for x, u in zip(states, inputs, strict=True):
-            force = self._forces(x, u)[:, 0] + self._first.law.static[1]
-            moved = cq @ x[:r] + cv @ x[r:] + ca @ self.rates(x, u)[r:]
-            found.append(moved + cf @ force)
-        return np.array(found)
+        _, _, c, d, _ = self._linear
+        forces = [self._forces(x, u)[:, 0] for x, u in zip(states, inputs, strict=True)]
+        static = self._first.structure.outputs[-1] @ self._first.law.static[1]
+        return states @ c.T + np.array(forces) @ d.T + static
 
     def sensitivities(
         self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
@@ -242,32 +262,20 @@ class SteppedStructure(ReducedStructure):
         function = chosen(of, RESULTS)
         if parameter_names(by):
             raise InputError(f"the reduced equations of {self.model.name} have no parameters")
-        squares, ports, dampers, cq, cv, ca, cf = self._dense
-        damping_time, law = self._first.structure.damping_time, self._first.law
-        r, p = ports.shape
+        a, b, c, d, ports = self._linear
+        own, through = (a, b) if function == "rhs" else (c, d)
         if by == "state":
             slopes = self._forces(state, inputs)
-            force = np.hstack([slopes[:, 1, None] * ports.T, slopes[:, 2, None] * ports.T])
-            elastic = np.diag(squares)
-            linear = np.hstack([-elastic, -damping_time * elastic - dampers @ dampers.T])
-            rate = np.hstack([np.zeros((r, r)), np.eye(r)])
-        else:
-            x = np.concatenate([law.static[0] + ports.T @ state[:r], ports.T @ state[r:]])
-            arrays = x, inputs, law.constants
-            found = partial(law.kernels, "port_forces", arrays, 3 * p, PLACES["inputs"])
-            force, linear = found.reshape(p, 3, -1)[:, 0], np.zeros((r, len(inputs)))
-            rate = linear
-        acceleration = linear + ports @ force
-        if function == "rhs":
-            return np.vstack([rate, acceleration])
-        position = np.hstack([np.eye(r), np.zeros((r, r))]) if by == "state" else linear
-        return cq @ position + cv @ rate + ca @ acceleration + cf @ force
+            return own + through @ np.hstack([slopes[:, [1]] * ports.T, slopes[:, [2]] * ports.T])
+        law, (deflections, rates) = self._first.law, state.reshape(2, -1) @ ports
+        arrays = np.concatenate([law.static[0] + deflections, rates]), inputs, law.constants
+        found = partial(law.kernels, "port_forces", arrays, 3 * len(rates), PLACES["inputs"])
+        return through @ found.reshape(len(rates), 3, -1)[:, 0]
 
     def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Coordinates (samples, n) about the static state of states (samples, 2 r)."""
         del inputs
-        (_, vectors), *_ = self._modes
-        return states[:, : vectors.shape[1]] @ vectors.T
+        return states[:, : self.order] @ self.bases[0].T
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> None:
         """Its inputs tell how far it goes in what it knows."""
@@ -283,11 +291,57 @@ def reduced(
     edges: Sequence[float] | np.ndarray = (),
 ) -> ReducedStructure:
     """The structure in its bases; offline cost from `began` (`time.process_time()`) on."""
-    modes = tuple(projected(model.system.structure, basis)[1] for basis in bases)
+    modes = tuple(modes_within(model.system.structure, basis) for basis in bases)
     cost = OfflineCost(time.process_time() - began, evaluations)
     kind = SteppedStructure if len(modes) == 1 else ReducedStructure
     ends = tuple(map(float, edges))
     return kind(model, modes, ends, cost, settings.tolerance, settings.step_size)
+
+
+def port_rates(model: StructuralModel) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and damping (p,) of the ports at the static state."""
+    law = model.system.law
+    rest = np.zeros(law.static.shape[1])
+    _, stiffness, damping = -law.at(rest, rest, np.zeros(len(model.inputs))).T
+    return stiffness, damping
+
+
+def free_modes(model: StructuralModel, highest: float) -> np.ndarray:
+    """Modes (n, k) up to so many Hz of the structure on its springs and tires.
+
+    It is linearised at the static state; dampers are left out.
+    """
+    structure: Any = model.system.structure
+    stiffness, _ = port_rates(model)
+    held = structure.held(stiffness)
+    # Shifted, so that motion that hardly anything holds does no harm.
+    shift = 1.0
+    solve = factored(held + shift * structure.mass, "MMD_AT_PLUS_A").solve
+    return modes_below(held, structure.mass, solve, -shift, highest)
+
+
+def modes_below(stiffness: Any, mass: Any, solve: Any, shift: float, highest: float) -> np.ndarray:
+    """Modes (n, k) up to so many Hz; `solve` is by the stiffness less `shift` times the mass."""
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    n, count, largest = mass.shape[0], FIRST_MODES, (2.0 * np.pi * highest) ** 2
+    operator = LinearOperator((n, n), matvec=solve, dtype=float)  # type: ignore[call-arg]
+    begin = solve(mass @ np.cos(np.arange(n, dtype=float)))
+    while True:
+        count = min(count, n - 2)
+        squares, modes = eigsh(stiffness, count, mass, shift, v0=begin, OPinv=operator)
+        order = np.argsort(squares)
+        squares, modes = squares[order], modes[:, order]
+        if squares[-1] > largest or count == n - 2:
+            break
+        count *= 2
+    if squares[0] > largest:
+        raise InputError(f"no mode is below {highest:g} Hz: the first has {_hertz(squares[0]):.4g}")
+    return modes[:, squares <= largest]
+
+
+def _hertz(square: float) -> float:
+    return float(np.sqrt(max(square, 0.0)) / (2.0 * np.pi))
 
 
 class StructuralPodSettings(StructuralSettings):

@@ -1,9 +1,14 @@
-"""From reduced states to full ones in one compiled pass, with what tells how far a run goes."""
+"""From reduced states to full ones in one compiled pass, with what tells how far a run goes.
+
+Ranges tell where a run is.  But errors of the heading grow with the time that a run stays there,
+those of the place with the way that it drives on with them; and what a start excites, beside the
+slow motion, is known for the starts of the training alone.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -14,20 +19,46 @@ from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.codegen.weighted_sums import padded
-from vehiclemor.reduction.vehicle.decoding_loops import BESIDES, Known
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import extent_of
+from vehiclemor.reduction.trust import inputs_beyond
+from vehiclemor.reduction.vehicle.decoding_loops import (
+    BESIDES,
+    LEVELS,
+    MOVING,
+    PARTS,
+    STILL,
+    Known,
+)
 from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, decoding_kernel
-from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, REASONS, TrainingReach
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.kernel_derivatives import INPUTS, STATE, partial
 from vehiclemor.simulation.paths import PATH_LOOPS, address_of
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.simulation.workspaces import Run
-from vehiclemor.sizes import require
+from vehiclemor.sizes import require, shaped
 
 # Part of a transient below which it needs no samples of its own.
 NEGLIGIBLE = 1e-4
 # Modes are known by differences: a smaller part of a deviation than this excites none.
 ROUNDING = 1e-7
+# A run may last so many times as long as any training run.
+LONGER = 1.05
+# A start may leave so many times what samples of training runs leave.
+UNLIKE = 3.0
+# What is left, beside its modes, of a start's motion when training runs begin to be steered.
+FADED = 0.01
+# Decay (1/s) that is none.
+SLOWEST = 1e-6
+# What is told besides ranges, in the order of the loop.
+REASONS = (
+    "it moves sideways for longer, or has longer ago, than any training run",
+    "it moves sideways before what its start excites has decayed",
+    "it starts sideways, as no training run does",
+    "its start leaves more than the slow motion, unlike any training run",
+    "it is steered further or quicker than any training run",
+)
+BEYOND = np.array([STILL, MOVING, *np.arange(1, PARTS) / PARTS])
 
 
 @dataclass(frozen=True)
@@ -58,6 +89,80 @@ class Transient:
 
 
 NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
+
+
+@dataclass(frozen=True)
+class TrainingReach:
+    """What is known of durations and starts."""
+
+    # Seconds (2 columns, levels) that a run may be beyond each level of a range; below them their
+    # integrals in s^2.
+    lasted: np.ndarray
+    sideways: float  # How far the starts use the ranges of these columns.
+    # Amplitudes (modes,) that a start's transient may have in a run that is steered.
+    decaying: np.ndarray
+    # When (s) known starts that excite modes were steered first, 0 if none was, and their
+    # amplitudes (modes,).
+    faded: float
+    steered: np.ndarray
+    left: np.ndarray  # What decoding leaves of the states of the shape (n,).
+    # Directions (m, n), in parts of `left`, in which known starts leave more, and how far.
+    starts: np.ndarray
+    begun: np.ndarray
+    # Sizes (3, inputs) that the inputs may have between output times too, see `Extent`; nothing is
+    # told of them where it is empty.
+    inputs: np.ndarray = field(default_factory=lambda: np.zeros((3, 0)))
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the amplitudes or the starts don't fit one another."""
+        modes, n, starts = len(self.decaying), len(self.left), len(self.begun)
+        shaped("lasted", (self.lasted, len(self.lasted), LEVELS))
+        shaped("steered", (self.decaying, modes), (self.steered, modes))
+        shaped("starts", (self.left, n), (self.starts, starts, n), (self.begun, starts))
+        shaped("reach", (self.inputs, 3, *self.inputs.shape[1:2]))
+
+    def driven(self, maneuver: Maneuver) -> tuple[float, float]:
+        """How far a maneuver's inputs go, 1 at the edge, and when (s) they pass it."""
+        if not self.inputs.size:
+            return 0.0, np.inf
+        used = float(np.maximum.reduce(extent_of(maneuver).largest / self.inputs, axis=None))
+        return used, np.inf if used <= 1.0 else inputs_beyond(maneuver, self.inputs).min()
+
+    def settled(self, excited: np.ndarray) -> float:
+        """Time in s from which on a start's transient, as `Decoding.excited` gives it, is known."""
+        rates, amplitudes = excited
+        if not len(rates) or not len(self.decaying):
+            return 0.0
+        sizes = np.hypot(*amplitudes.T)
+        larger = np.maximum(sizes / self.decaying, 1.0)
+        # What does not decay never settles.
+        settled = float((np.log(larger) / np.maximum(-rates[:, 0], SLOWEST)).max())
+        if not self.faded:
+            return settled
+        # Slower motion of the start is in the reduced states; it is as large as that of the modes.
+        larger = max(float((sizes / self.steered).max()) / FADED, 1.0)
+        return max(settled, self.faded * np.log(larger) / -np.log(FADED))
+
+    def unlike(self, remainder: np.ndarray) -> float:
+        """How much a start leaves (n,), beside what known starts do; 1 is the edge."""
+        if not len(self.left):
+            return 0.0
+        scaled = remainder / self.left
+        known = np.clip(self.starts @ scaled, -LONGER * self.begun, LONGER * self.begun)
+        return float(np.abs(scaled - known @ self.starts).max()) / UNLIKE
+
+
+NONE = np.zeros(0)
+NOTHING_KNOWN = TrainingReach(
+    np.zeros((0, LEVELS)), MOVING, NONE, 0.0, NONE, NONE, np.zeros((0, 0)), NONE
+)
+
+
+def durations(times: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Seconds (samples, 2 columns, levels) beyond each level so far, and their integrals."""
+    spans = np.diff(times, prepend=times[:1])[:, None, None]
+    spent = np.cumsum(spans * (sizes[:, :, None] > BEYOND), axis=0)
+    return np.concatenate([spent, np.cumsum(spans * spent, axis=0)], axis=1)
 
 
 class DecodingSpace(NamedTuple):
@@ -185,7 +290,7 @@ class Decoding(ShortRepr):
         if modes:
             given = np.empty((len(times), inputs.shape[1] + 2 * modes))
             scratch = np.empty((modes, 2))
-            decay = _loops()["with_decay"].prepared(times, inputs, *excited, scratch, given)
+            decay = decoding_loops()["with_decay"].prepared(times, inputs, *excited, scratch, given)
             calls.append((decay, ("times", "inputs", "result")))
             inputs = given
         kernels, constants = self._kernels(modes)
@@ -197,7 +302,7 @@ class Decoding(ShortRepr):
         start = np.array([0.0, 0.0, 0.0, 0.0, np.inf])
         lasted = self.reach.lasted
         known = Known(times, lasted, np.empty_like(lasted), start, self.reach.sideways)
-        decoded = _loops()["decoded"].prepared(
+        decoded = decoding_loops()["decoded"].prepared(
             path, inputs, address, constants, states, known, largest, first
         )
         calls.append((decoded, ("path", "inputs", "states", "known.times")))
@@ -207,33 +312,33 @@ class Decoding(ShortRepr):
         return DecodingSpace(excited, times, states, largest, first, start, counted)
 
     def _lifted(self, space: DecodingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
+        """What `states` gives of the arrays; no trust where nothing tells how far a run goes."""
         for call, places in space.calls:
             for place in places:
                 call.words[place] = rows
             call()
-        largest, first = space.largest.tolist(), space.first.tolist()
-        left = min(first, default=rows)
-        return space.states, self.trust(
-            largest, first, float(space.times[left]) if left < rows else np.inf
+        largest, first, watched = (
+            space.largest.tolist(),
+            space.first.tolist(),
+            self.features.watched,
         )
-
-    def trust(self, largest: list[float], first: list[int], until: float) -> Trust | None:
-        """How far a run has gone; none if nothing tells.
-
-        Of each watched quantity and of what is told besides the largest magnitude, and the first
-        row at which it is above 1; `until` is the time (s) of the first of these rows.
-        """
         if not largest:
-            return None
-        if np.isinf(until):
-            return Trust(max(largest))
+            return space.states, None
+        if largest[len(watched)] > 1.0:
+            times, sizes = space.times[:rows], np.abs(space.states[:rows, self.layout.size :])
+            spent = durations(times, sizes[:, : len(self.reach.lasted) // 2])
+            beyond = int((spent > self.reach.lasted).any(axis=(1, 2)).argmax())
+            first[len(watched)] = beyond or rows - 1
+        left = min(first)
+        if left >= rows:
+            return space.states, Trust(max(largest))
         # Of what is left at once the start tells most.
-        column = len(first) - 1 - first[::-1].index(min(first))
-        watched = self.features.watched
-        if column >= len(watched):
-            return Trust(max(largest), until, REASONS[column - len(watched)])
-        reason = f"{watched[column][1]} leaves what the training runs have covered"
-        return Trust(max(largest), until, reason)
+        column = len(first) - 1 - first[::-1].index(left)
+        if column < len(watched):
+            reason = f"{watched[column][1]} leaves what the training runs have covered"
+        else:
+            reason = REASONS[column - len(watched)]
+        return space.states, Trust(max(largest), float(space.times[left]), reason)
 
 
 def decayed(excited: np.ndarray) -> float:
@@ -242,5 +347,7 @@ def decayed(excited: np.ndarray) -> float:
     return float(np.log(NEGLIGIBLE) / slowest) if slowest < 0.0 else np.inf
 
 
-def _loops() -> Mapping[str, Loop]:
-    return loops((*PATH_LOOPS, "reduction.vehicle.decoding_loops"), ("with_decay", "decoded"))
+def decoding_loops() -> Mapping[str, Loop]:
+    """The compiled loops of reduced vehicles."""
+    entries = "with_decay", "decoded", "recurrence"
+    return loops((*PATH_LOOPS, "reduction.vehicle.decoding_loops"), entries)

@@ -1,9 +1,9 @@
-"""What the decoding of a reduced vehicle does along time, compiled."""
+"""What reduced vehicles do along time, compiled: decoding, and the variation of a run."""
 
 import math
 from typing import NamedTuple
 
-from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector
+from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, Vector
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.path_loops import kernel_path, lane_path
 
@@ -102,12 +102,13 @@ def decoded(
 
 
 def tell(states, column, known, largest, first):
-    """How far a run goes in durations and its start in known ones, and the first samples beyond."""
+    """How far a run goes in durations and its start in known ones, and the first samples beyond.
+
+    Of the durations, which are first, only how far.
+    """
     times, columns = known.times, len(known.spent) // 2
     longest, moving = durations(times, states, column, known.lasted, known.spent)
     largest[0] = longest
-    if longest > 1.0:
-        first[0] = overstayed(times, states, column, known.lasted, known.spent)
     if moving < len(times):
         largest[1] = known.start[0] / max(times[moving], SOON)
         first[1] = moving if largest[1] > 1.0 else first[1]
@@ -132,9 +133,7 @@ def durations(times, states, column, lasted, spent):
     Seconds beyond each level have a row for each column, and then so have their integrals.
     """
     columns, end, moving, longest = len(spent) // 2, times[len(times) - 1], len(times), 0.0
-    for row in range(2 * columns):
-        for level in range(LEVELS):
-            spent[row, level] = 0.0
+    spent[:, :] = 0.0
     for sample in range(len(times)):
         span = times[sample] - times[sample - 1] if sample else 0.0
         later = span * (end - times[sample] + span)
@@ -155,23 +154,15 @@ def durations(times, states, column, lasted, spent):
     return longest, moving
 
 
-def overstayed(times, states, column, lasted, spent):
-    """First sample at which a known time is over."""
-    columns = len(spent) // 2
-    for row in range(2 * columns):
-        for level in range(LEVELS):
-            spent[row, level] = 0.0
-    for sample in range(1, len(times)):
-        span = times[sample] - times[sample - 1]
-        for k in range(columns):
-            size = abs(states[sample, column + k])
-            for level in range(LEVELS):
-                if size > (max((level - 1) / PARTS, MOVING) if level else STILL):
-                    spent[k, level] += span
-                spent[columns + k, level] += span * spent[k, level]
-                if (
-                    spent[k, level] > lasted[k, level]
-                    or spent[columns + k, level] > lasted[columns + k, level]
-                ):
-                    return sample
-    return len(times) - 1
+def recurrence(matrices: Cube, forcing: Cube, result: Cube) -> Int:
+    """From its first entry on, x' = A x + g: matrices, forcing and result (samples, n, m)."""
+    for sample in range(len(matrices)):
+        before, now = result[sample], result[sample + 1]
+        for i in range(before.shape[0]):
+            for f in range(before.shape[1]):
+                now[i, f] = forcing[sample, i, f]
+            for j in range(before.shape[0]):
+                weight = matrices[sample, i, j]
+                for f in range(before.shape[1]):
+                    now[i, f] += weight * before[j, f]
+    return 0

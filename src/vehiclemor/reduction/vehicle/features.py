@@ -12,11 +12,10 @@ Coefficients are constants of the kernel: fits with the same features compile no
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache, reduce
-from itertools import combinations_with_replacement
 from operator import mul
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,9 +41,9 @@ PLANAR = 3
 MOST_STATES = 100
 # What an elementary function counts, in operations: chains of them take longest to compile.
 CALL = 160
+ARGUMENTS = ("_x", "_u", "_constants", "_result")
 # Factors of a product, in order.
 Term = tuple[Value, ...]
-Factor = TypeVar("Factor")
 
 
 @dataclass(frozen=True)
@@ -75,19 +74,6 @@ class Features:
         """Blocks of C: numbers of features, columns."""
         everything = tuple(range(len(self.terms))), tuple(range(self.states + PLANAR))
         return self.groups or (everything,)
-
-    def with_terms(self, kept: Sequence[int], groups: Any = ()) -> Features:
-        """Some of the features, by their numbers in order, and no operation that none needs."""
-        terms = [self.terms[i] for i in kept]
-        operations, places = pruned(self.operations, [*terms, *(n for n, _ in self.watched)])
-        return replace(
-            self,
-            operations=tuple(operations),
-            named=tuple(places[n] for n in self.named if n in places),
-            terms=tuple(places[n] for n in terms),
-            groups=groups,
-            watched=tuple((places[n], what) for n, what in self.watched),
-        )
 
 
 @lru_cache(maxsize=64)
@@ -137,30 +123,25 @@ class FeatureListing(Listing):
         watched: Sequence[tuple[Term, str]] = (),
         lateral: int = 0,
     ) -> Features:
-        """Features, each the product of its factors."""
-        numbers = tuple(product(term).number for term in terms)
-        told = tuple((product(term).number, what) for term, what in watched)
-        sizes, made = (
-            (len(self.z), len(self.u)),
-            (tuple(self.operations), tuple(sorted(self.named))),
+        """Features, each the product of its factors, and no operation that none needs."""
+        numbers = [product(term).number for term in terms]
+        told = [(product(term).number, what) for term, what in watched]
+        operations, places = pruned(self.operations, [*numbers, *(n for n, _ in told)])
+        return Features(
+            states=len(self.z),
+            inputs=len(self.u),
+            operations=tuple(operations),
+            named=tuple(places[n] for n in sorted(self.named) if n in places),
+            terms=tuple(places[n] for n in numbers),
+            groups=groups,
+            watched=tuple((places[n], what) for n, what in told),
+            lateral=lateral,
         )
-        found = Features(*sizes, *made, numbers, groups, told, lateral)
-        return found.with_terms(range(len(terms)), groups)
 
 
 def product(factors: Term) -> Value:
     """The product of factors, from the first one on."""
     return reduce(mul, factors)
-
-
-def monomials(values: Sequence[Factor], degree: int) -> tuple[tuple[Factor, ...], ...]:
-    """All products of that many of the values, or of their names."""
-    return tuple(combinations_with_replacement(values, degree))
-
-
-def held(value: Value) -> Value:
-    """A value held in [-1, 1]: nothing is known of what lies beyond the training runs."""
-    return 0.5 * (abs(value + 1.0) - abs(value - 1.0))
 
 
 class Layout(NamedTuple):
@@ -178,10 +159,6 @@ def _listed(features: Features) -> tuple[Listing, list[Value]]:
     listing.operations += features.operations
     listing.named.update(features.named)
     return listing, [Value(listing, number) for number in features.terms]
-
-
-def _kernel(listing: Listing, name: str) -> Kernel:
-    return listing.kernel(name, ("_x", "_u", "_constants", "_result"))
 
 
 def rates_kernel(features: Features, parameters: int) -> Kernel:
@@ -202,15 +179,7 @@ def rates_kernel(features: Features, parameters: int) -> Kernel:
         listing.store(i, totals[i])
     listing.store(k + 1, forward * cosine - sideward * sine)
     listing.store(k + 2, forward * sine + sideward * cosine)
-    return _kernel(listing, "derivative")
-
-
-def columns_kernel(features: Features) -> Kernel:
-    """What evaluates the features; its constants are their parameters."""
-    listing, values = _listed(features)
-    for i, value in enumerate(values):
-        listing.store(i, value)
-    return _kernel(listing, "columns")
+    return listing.kernel("derivative", ARGUMENTS)
 
 
 def decoding_kernel(features: Features, layout: Layout, parameters: int, modes: int) -> Kernel:
@@ -236,7 +205,7 @@ def decoding_kernel(features: Features, layout: Layout, parameters: int, modes: 
     results |= enumerate(watched, layout.size)
     for place, value in results.items():
         listing.store(place, value)
-    return _kernel(listing, "full_state")
+    return listing.kernel("full_state", ARGUMENTS)
 
 
 def feature_columns(
@@ -249,7 +218,11 @@ def feature_columns(
 
 @cache
 def _column_kernels(features: Features) -> Kernels:
-    return Kernels([columns_kernel(features)])
+    """What evaluates the features; its constants are their parameters."""
+    listing, values = _listed(features)
+    for i, value in enumerate(values):
+        listing.store(i, value)
+    return Kernels([listing.kernel("columns", ARGUMENTS)])
 
 
 # A fit makes systems of the same features again and again.

@@ -13,7 +13,14 @@ from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
 from vehiclemor.reduction.trust import trust_of
-from vehiclemor.reduction.vehicle.decoding import NO_TRANSIENT, Decoding, Transient, decayed
+from vehiclemor.reduction.vehicle.decoding import (
+    NO_TRANSIENT,
+    NOTHING_KNOWN,
+    Decoding,
+    TrainingReach,
+    Transient,
+    decayed,
+)
 from vehiclemor.reduction.vehicle.features import (
     PLANAR,
     Features,
@@ -22,7 +29,6 @@ from vehiclemor.reduction.vehicle.features import (
     needed_parameters,
 )
 from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, TrainingReach
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.system import System

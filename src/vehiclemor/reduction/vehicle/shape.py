@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.multibody.quantities import WHEELS
-from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.vehicle.features import Layout
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators.mirror_image import partners
@@ -26,14 +25,9 @@ from vehiclemor.simulation.trajectory import Trajectory
 
 STEP = 6e-6
 INPUT_STEP = 1e-5
-# Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
-CORNERING = 4.0
 # States that move less than this part of their range count as not moved; how often steering is
 # followed through the equations; relative singular values that are rounding.
 STILL, POWERS, RANK = 1e-6, 4, 1e-10
-# Error scales: a multiple of steady cornering; of the speed (m/s), heading (rad), place (m).
-MARGIN = 3.0
-SPEED, HEADING, PLACE = 10.0, 1.0, 10.0
 # Outputs in which the slow manifold has its nonlinear terms.
 SLIP_OUTPUTS = ("roll", *(f"slip_angle_{wheel}" for wheel in WHEELS))
 
@@ -141,12 +135,9 @@ class VehicleShape:
         steps = STEP * np.maximum(1.0, np.abs(self.reference))
         shapes = np.tile(self.reference, (2 * (n + inputs), 1))
         values = self._no_input(len(shapes))
-        for j in range(n):
-            shapes[2 * j, j] += steps[j]
-            shapes[2 * j + 1, j] -= steps[j]
-        for j in range(inputs):
-            values[2 * (n + j), j] += INPUT_STEP
-            values[2 * (n + j) + 1, j] -= INPUT_STEP
+        for side, sign in enumerate((1.0, -1.0)):
+            shapes[side : 2 * n : 2] += sign * np.diag(steps)
+            values[2 * n + side :: 2] += sign * INPUT_STEP * np.eye(inputs)
         widths = 2.0 * np.concatenate([steps, np.full(inputs, INPUT_STEP)])
         outputs = self.model.outputs_at(
             self.states(shapes, np.zeros((len(shapes), 3))), np.ascontiguousarray(values)
@@ -209,8 +200,3 @@ def shape_samples(shape: VehicleShape, runs: Sequence[Trajectory]) -> ShapeSampl
     outputs = np.concatenate([run.outputs for run in runs])
     shapes = np.concatenate([shape.of(run.states) for run in runs])
     return ShapeSamples(inputs, outputs, shapes - shape.reference, *shape.motion(shapes, inputs))
-
-
-def linearisation_cost(shape: VehicleShape, began: float) -> OfflineCost:
-    """Seconds since `began`; two evaluations for every state and input."""
-    return offline_cost(began, shape.model, further=2 * sum(shape.linearised.b.shape))

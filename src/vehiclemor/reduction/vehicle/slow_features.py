@@ -12,6 +12,7 @@ Springer 2014).  Of any other tires they are powers of the mean slip of each axl
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -22,13 +23,11 @@ from vehiclemor.reduction.vehicle.features import (
     FeatureListing,
     Features,
     feature_columns,
-    held,
-    monomials,
     product,
 )
-from vehiclemor.reduction.vehicle.regression import forward_selection, largest, ridge_fit
+from vehiclemor.reduction.vehicle.fitting import forward_selection, largest, ridge_fit
+from vehiclemor.reduction.vehicle.linear_modes import SlowModes
 from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
-from vehiclemor.reduction.vehicle.slow_modes import SlowModes
 from vehiclemor.simulation.dynamic import DynamicModel
 
 AXLES = (WHEELS[:2], WHEELS[2:])
@@ -45,7 +44,8 @@ NAMES = ("lateral speed", "yaw rate", "roll", "roll rate", "steering", "change o
 DERIVATIVES = ("rate of steering", "acceleration of steering")
 # Arguments that go as one over the speed.
 OVER_SPEED = (True, True, False, True)
-SQUARE, CUBIC = monomials(ARGUMENTS, 2), monomials(ARGUMENTS, 3)
+SQUARE = (*combinations_with_replacement(ARGUMENTS, 2),)
+CUBIC = (*combinations_with_replacement(ARGUMENTS, 3),)
 LINEAR = tuple((f"raw{i}",) for i in range(len(ARGUMENTS)))
 ONE, FAST = ("1",), ("m",)
 # What changes with the speed.
@@ -62,6 +62,11 @@ SATURATION = 1.2
 # Part of heave and pitch at the start that samples after the landing still show, and how much of
 # it, in parts of what samples show, a car may have that is steered.
 AFTER_LANDING, STEERED = 0.3, 1.2
+
+
+def held(value: Value) -> Value:
+    """A value held in [-1, 1]: nothing is known of what lies beyond the training runs."""
+    return 0.5 * (abs(value + 1.0) - abs(value - 1.0))
 
 
 class SlowFeatures(FeatureListing):

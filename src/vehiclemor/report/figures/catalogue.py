@@ -1,45 +1,30 @@
-"""Which figures there are: of `figures.toml`, of every model, of any study; and their files."""
+"""Which figures there are, of every model and of any study; and their files."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import xarray as xr
 from matplotlib.figure import Figure
-from pydantic import Field
 
 from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.failure import attempt_apart
-from vehiclemor.files import make_folder, write_text
+from vehiclemor.files import make_folder
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
-from vehiclemor.report.figures import errors, pareto, result_plot, runs, size, theme
+from vehiclemor.report.figures import costs, result_plot, runs, theme
 from vehiclemor.report.result_selection import drawn
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import studies_and_files
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.run import run_studies
-from vehiclemor.toml_files import FileSchema, read_toml
 
-
-def figure_result(results: theme.Results, *, kind: str) -> Figure:
-    """The picture of a study: at its nominal or first point, errors over the whole grid."""
-    (dataset,) = results.values()
-    shown, point = drawn(dataset, kind, {})
-    if point:
-        shown = shown.assign_attrs(title=f"{shown.attrs['title']}\nat {point}")
-    return result_plot.figure_of(shown, kind)
-
-
-# What `draw` of an entry names.
-DRAWINGS: dict[str, Callable[..., Figure]] = {
-    "histories": runs.figure_histories,
-    "paths": runs.figure_paths,
-    "errors": errors.figure_errors,
-    "pareto": pareto.figure_pareto,
-    "result": figure_result,
-    "size": size.figure_size,
+# What is drawn of a study that has no grid.
+DRAWINGS: Mapping[str, Callable[[xr.Dataset], Figure]] = {
+    "pareto": costs.figure_pareto,
+    "size": costs.figure_size,
 }
 # Figures that every model has, of all registered methods: study, what is drawn of it.
 OF_A_MODEL: Mapping[str, tuple[Callable[[str, Path], str], str]] = {
@@ -50,86 +35,51 @@ OF_A_MODEL: Mapping[str, tuple[Callable[[str, Path], str], str]] = {
 }
 
 
-class Entry(FileSchema):
-    """One figure, by its name for `vehiclemor figures --only`.
-
-    `draw` is a key of `DRAWINGS`, with its `options`; `studies` are names or paths of study files,
-    and `datasets` names of what they give where those are not the studies' own.  By `default` the
-    paper's are drawn, and what belongs to them.
-    """
+class Entry(NamedTuple):
+    """One figure: its name, what is drawn, of which study (name or path), and of which result."""
 
     name: str
-    drawing: str = Field(alias="draw")
-    studies: list[str]
-    datasets: list[str] = Field(default_factory=list)
-    caption: str
-    default: bool = True
-    options: dict[str, object] = Field(default_factory=dict)
+    kind: str
+    study: str
+    result: str
 
-    @property
-    def names(self) -> list[str]:
-        """Names of the studies' datasets."""
-        return self.datasets or [Path(study).stem for study in self.studies]
-
-    def draw(self, results: theme.Results) -> Figure:
-        """Draw it from the combined datasets by study; what it does not show is left out."""
-        shown = {name: results[name] for name in self.names}
-        return DRAWINGS[self.drawing](shown, **self.options)
-
-
-class FigureFile(FileSchema):
-    """Schema of `data/figures/figures.toml`."""
-
-    parameters: str
-    figures: list[Entry]
-
-
-_FILE = read_toml(data_folder() / "figures" / "figures.toml", FigureFile)
-PARAMETERS = _FILE.parameters
-FIGURES: Mapping[str, Entry] = {entry.name: entry for entry in _FILE.figures}
+    def draw(self, dataset: xr.Dataset) -> Figure:
+        """Draw a study at its nominal or first point, its errors over the whole grid."""
+        if self.kind in DRAWINGS:
+            return DRAWINGS[self.kind](dataset)
+        shown, point = drawn(dataset, self.kind, {})
+        if point:
+            shown = shown.assign_attrs(title=f"{shown.attrs['title']}\nat {point}")
+        return result_plot.figure_of(shown, self.kind)
 
 
 def find(name: str, results: Path) -> list[Entry]:
-    """The figure of a name such as `6`, or `histories-<model>`, or all figures of a study.
+    """The figure of a name such as `histories-<model>`, or all figures of a study or collection.
 
     Studies of a model that declares none are written to the results folder.
     """
-    if name in FIGURES:
-        return [FIGURES[name]]
     if name.endswith(".toml") or name in data_names("studies"):
         members = studies_and_files(name).items()
         return [entry for member, found in members for entry in _of_a_study(member, *found)]
     kind, _, model = name.partition("-")
     if kind not in OF_A_MODEL or model not in names("model"):
         known = [f"{kind}-{model}" for kind in OF_A_MODEL for model in names("model")]
-        raise unknown("figure", name, [*FIGURES, *known, *data_names("studies"), "FILE.toml"])
-    study, drawn = OF_A_MODEL[kind]
-    (entry,) = (e for e in find(study(model, results), results) if e.name.endswith(f"-{drawn}"))
-    return [entry.model_copy(update={"name": name})]
+        raise unknown("figure", name, [*known, *data_names("studies"), "FILE.toml"])
+    study, drawing = OF_A_MODEL[kind]
+    (entry,) = (entry for entry in find(study(model, results), results) if entry.kind == drawing)
+    return [entry._replace(name=name)]
 
 
 def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
     """What a study lets be drawn: of a protocol the errors over the times."""
-    kinds = {"errors": "errors over what is varied"}
+    kinds = ["errors"]
     if study.keep == "trajectories":
-        kinds["histories"] = "outputs and errors over the time"
-        if {output.name for output in component("model", study.model).outputs} >= set(runs.PATH):
-            kinds["paths"] = "paths in the plane"
-    if study.size:
-        kinds = {"size": "times over the number of coordinates"}
-    elif study.bounds:
-        kinds = {"pareto": "worst error on unseen inputs over the time of a call"}
-    return [
-        Entry(
-            name=f"{name}-{kind}",
-            draw=kind if study.bounds or study.size else "result",
-            studies=[path.stem if data_folder() in path.parents else str(path)],
-            datasets=[name],
-            caption=f"{study.title}: {content}.",
-            options={} if study.bounds or study.size else {"kind": kind},
-        )
-        for kind, content in kinds.items()
-    ]
+        outputs = {output.name for output in component("model", study.model).outputs}
+        kinds += ["histories", *["paths"] * (outputs >= set(runs.PATH))]
+    if study.size or study.bounds:
+        kinds = ["size" if study.size else "pareto"]
+    of = path.stem if data_folder() in path.parents else str(path)
+    return [Entry(f"{name}-{kind}", kind, of, name) for kind in kinds]
 
 
 def figures(
@@ -142,14 +92,14 @@ def figures(
     dpi: int | None = None,
     failed: dict[str, str] | None = None,
 ) -> list[Path]:
-    """Draw figures of the paper or of any study; studies that are missing are run first.
+    """Draw the figures of any study; studies that are missing are run first.
 
     Parameters
     ----------
     only
-        Figure names such as `6`, or `histories-`, `errors-`, `map-` or `pareto-` and the name of a
-        model, or studies and protocols by name or TOML file; by default the paper's and an index of
-        captions.
+        Studies, collections and protocols by name or TOML file, of which is drawn what they vary;
+        or `histories-`, `errors-`, `map-` or `pareto-` and the name of a model.  By default the
+        studies of the paper.
     out
         Folder of the figures; `figures` in the results folder by default.
     results
@@ -179,26 +129,21 @@ def figures(
     # What is wrong is named before anything is computed.
     theme.styled(style, dpi)
     jobs = count("jobs", jobs, most=MOST_JOBS)
-    wanted = only or [name for name, entry in FIGURES.items() if entry.default]
+    wanted = only or ["paper"]
     chosen = {entry.name: entry for name in wanted for entry in find(name, folder)}
     make_folder(target)
     data: dict[str, xr.Dataset] = {}
     for entry in chosen.values():
-        for study in entry.studies:
-            if not data.keys() >= set(entry.names):
-                data |= run_studies(study, folder, jobs)
+        if entry.result not in data:
+            (data[entry.result],) = run_studies(entry.study, folder, jobs).values()
     written: list[Path] = []
     wrong: dict[str, str] = {}
-    index = ["# Figures", "", PARAMETERS, ""]
     for name, entry in chosen.items():
         stem = name if name.startswith("figure") else f"figure-{name}"
         files = [target / f"{stem}.{suffix}" for suffix in theme.FORMATS]
         with theme.styled(style, dpi):
-            caption = attempt_apart(name, wrong, partial(_draw, entry, data, files))
-        index += [f"- {stem}: {text}" for text in caption]
-        written += files if caption else []
-    if not only:
-        written.append(write_text(target / "figures.md", "\n".join(index) + "\n"))
+            draw = partial(_draw, entry, data[entry.result], files)
+            written += [file for found in attempt_apart(name, wrong, draw) for file in found]
     if failed is not None:
         failed.update(wrong)
     elif wrong:
@@ -206,10 +151,6 @@ def figures(
     return written
 
 
-def _draw(entry: Entry, data: theme.Results, files: list[Path]) -> str:
-    """Draw a figure of datasets; its caption and where it is from."""
-    figure = entry.draw(data)
-    for path in files:
-        theme.save_figure(figure, path)
-    hashes = sorted({str(data[name].attrs["kernel_hash"]) for name in entry.names})
-    return f"{entry.caption} Studies: {', '.join(entry.names)}; kernels {', '.join(hashes)}."
+def _draw(entry: Entry, dataset: xr.Dataset, files: list[Path]) -> list[Path]:
+    figure = entry.draw(dataset)
+    return [theme.save_figure(figure, path) for path in files]

@@ -18,11 +18,11 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.runs import legend_of
-from vehiclemor.report.figures.theme import Places, Results, Style, places_of, tick_decades
+from vehiclemor.report.figures.theme import Places, Style, places_of, tick_decades
 from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
-from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
+from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
 # Lines of a panel, and sampled quantities with panels.
 LINES, SAMPLED = 8, 3
@@ -35,9 +35,8 @@ OFF: tuple[tuple[Style, float, str], ...] = (
 )
 # Of samples that have no quantity.
 SORTED = "sorted by error"
-FLOOR: Style = {"color": "#BBBBBB", "linewidth": 3.5, "zorder": 1.5, "label": "best approximation"}
-# Columns of maps, cells of a map with their number, and cells that a contour must enclose.
-COLUMNS, WRITTEN, ENCLOSED = 3, 100, 4
+# Columns of maps, and cells of a map with their number.
+COLUMNS, WRITTEN = 3, 100
 # In % of the cells, those whose small errors the colours leave out; part of the colours on which
 # white has more contrast than black.
 LEAST, DARK = 2.0, 120 / 256
@@ -45,69 +44,59 @@ LEAST, DARK = 2.0, 120 / 256
 Lines = Mapping[str, tuple[str, xr.DataArray]]
 
 
-def figure_errors(
-    results: Results, *, outputs: Sequence[str], methods: Mapping[str, str] | None = None
-) -> Figure:
-    """RMS errors of studies over all that they vary.
-
-    `methods` are labels with their texts, by default all but the full order.
-    """
-    first = next(iter(results.values()))
-    if not {"rms_error", "signal_range"} <= set(first):
+def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
+    """RMS errors of a study over all that it varies; of full order where there is nothing else."""
+    if not {"rms_error", "signal_range"} <= set(dataset):
         raise InputError("no errors in this result: it was not compared with full order")
-    known = {str(label): labels.method_text(str(label)) for label in first["label"].values}
+    known = {str(label): labels.method_text(str(label)) for label in dataset["label"].values}
     reduced = {m: text for m, text in known.items() if not m.startswith("full_order")}
-    methods = {m: text for m, text in (methods or reduced or known).items() if m in known}
-    if not _varied(first):
-        return _of_a_point(first, reduced and methods)
-    panels: list[tuple[xr.Dataset, str, str, Places, Lines]] = []
-    notes: list[str] = []
-    for dataset in results.values():
-        axis, *others = _varied(dataset)
-        errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
-        lines = _lines(errors, methods, others)
-        sampled, factors = _is_sample(axis), set(FACTORS) <= {axis, *others}
-        mapped = not sampled and (factors or len(lines) > max(LINES, len(methods)))
-        shown = [axis] if not mapped else list(FACTORS) if factors else [axis, others[0]]
-        rest = [name for name in others if name not in shown]
-        if sampled or mapped:
-            errors = errors.max(rest)
-            lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
-            notes += [f"{dataset.sizes[axis]} samples"] if sampled else []
-            notes += [f"the largest error over {_listed(rest)}"] if rest else []
-        if mapped:
-            notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
-            figure = _map(dataset, errors, methods, outputs, shown)
-            return _finish(figure, results, methods, notes)
+    methods = reduced or known
+    if not _varied(dataset):
+        return _of_a_point(dataset, reduced)
+    axis, *others = _varied(dataset)
+    errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
+    lines = _lines(errors, methods, others)
+    sampled, factors = _is_sample(axis), set(FACTORS) <= {axis, *others}
+    mapped = not sampled and (factors or len(lines) > max(LINES, len(methods)))
+    shown = [axis] if not mapped else list(FACTORS) if factors else [axis, others[0]]
+    rest = [name for name in others if name not in shown]
+    notes = [f"{dataset.sizes[axis]} samples"] if sampled else []
+    if sampled or mapped:
+        errors = errors.max(rest)
+        lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
+        notes += [f"the largest error over {_listed(rest)}"] if rest else []
+    if mapped:
+        notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
+        figure = _map(dataset, errors, methods, outputs, shown)
+    else:
         places = _sampled(dataset, axis) if sampled else [places_of(dataset, axis)]
-        panels += [(dataset, output, axis, at, lines) for output in outputs for at in places]
-    each = len(panels) // len(results) // len(outputs)
-    columns = each if each > 1 else len(outputs)
-    rows = len(panels) // columns
-    size = (6.7 if columns < 3 else 8.5, 2.5 * rows + 0.8)
-    figure, grid = theme.panels(rows, columns, size)
-    for number, (panel, (dataset, output, axis, at, lines)) in enumerate(
-        zip(grid.flat, panels, strict=True)
-    ):
-        panel.set_title(theme.letter(number))
-        _draw_panel(panel, dataset, output, axis, at, lines)
-        at.scale(panel)
-        # Of panels above each other with the same axis the lowest has its label.
-        if any(below[3].label == at.label for below in panels[number + columns :][:1]):
-            panel.set_xlabel("")
-    return _finish(figure, results, methods, notes)
-
-
-def _finish(
-    figure: Figure, results: Results, methods: Mapping[str, str], notes: Sequence[str]
-) -> Figure:
-    """A line above the panels, how many runs were trained on, and the legend."""
-    held = [labels.trained_runs(dataset).sel(label=list(methods)) for dataset in results.values()]
-    count, size = sum(int(runs.sum()) for runs in held), sum(runs.size for runs in held)
-    trained = f"{count} of {size} runs were in their own training" if count else ""
+        figure = _panels(dataset, axis, places, outputs, lines)
+    # A line above the panels, how many runs were trained on, and the legend.
+    held = labels.trained_runs(dataset).sel(label=list(methods))
+    count = int(held.sum())
+    trained = f"{count} of {held.size} runs were in their own training" if count else ""
     if text := "\n".join(filter(None, (", ".join(notes), trained))):
         figure.suptitle(text, fontsize="medium")
     theme.legend_below(figure, figure.axes)
+    return figure
+
+
+def _panels(
+    dataset: xr.Dataset, axis: str, places: Sequence[Places], outputs: Sequence[str], lines: Lines
+) -> Figure:
+    """A panel for each output, or a row of them where there are several places."""
+    cells = list(itertools.product(outputs, places))
+    columns = len(places) if len(places) > 1 else len(outputs)
+    rows = len(cells) // columns
+    size = (6.7 if columns < 3 else 8.5, 2.5 * rows + 0.8)
+    figure, grid = theme.panels(rows, columns, size)
+    for number, (panel, (output, at)) in enumerate(zip(grid.flat, cells, strict=True)):
+        panel.set_title(theme.letter(number))
+        _draw_panel(panel, dataset, output, axis, at, lines)
+        at.scale(panel)
+        # Of panels above each other the lowest has the label of their axis.
+        if number + columns < len(cells):
+            panel.set_xlabel("")
     return figure
 
 
@@ -169,7 +158,7 @@ def _sampled(dataset: xr.Dataset, sample: str) -> list[Places]:
 def _draw_panel(
     axis: Axes, dataset: xr.Dataset, output: str, dimension: str, places: Places, lines: Lines
 ) -> None:
-    """Lines of one output; over perturbations the best approximation and the published error."""
+    """Lines of one output; over perturbations the published error."""
     cloud = _is_sample(dimension)
     looks = theme.styles(lines)
     for marker, (name, (text, errors)) in zip(itertools.cycle(theme.MARKERS), lines.items()):
@@ -192,13 +181,9 @@ def _draw_panel(
             edge: Style = {"transform": axis.get_xaxis_transform(), "clip_on": False, **mark}
             if found.any():
                 axis.plot(np.compress(found, places.at), heights, color=look["color"], **edge)
-    if dimension in FACTORS:
-        if "pod" in lines and "floor_rms_error" in dataset:
-            floor = dataset["floor_rms_error"].sel(label="pod", output=output).squeeze(drop=True)
-            if floor.dims == (dimension,) and bool(np.isfinite(floor).any()):
-                axis.plot(places.at, floor, **FLOOR)
-        if published := rms_numbers(str(dataset.attrs["model"])).get(output):
-            axis.axhline(published.value, label="published, nominal", **theme.THIN)
+    published = rms_numbers(str(dataset.attrs["model"])).get(output)
+    if published and dimension in FACTORS:
+        axis.axhline(published.value, label="published, nominal", **theme.THIN)
     axis.set_yscale("log")
     tick_decades(axis.yaxis, *axis.get_ylim())
     # Last in the legend what the axis can't show.
@@ -217,7 +202,7 @@ def _map(
 ) -> Figure:
     """Errors over two dimensions (across and upwards), a column for each method.
 
-    Of few cells each has its number; of many a white line is where the error is the published one.
+    Of few cells each has its number.
     Colours leave out the least errors, as that of the training run, far below all others.
     """
     errors = errors.squeeze([d for d in errors.dims if d not in ("output", "label", *axes)])
@@ -239,13 +224,8 @@ def _map(
             factor, unit = labels.readable_unit(float(np.median(colored)), unit)
         low, high = factor * np.percentile(colored, (LEAST, 100.0), method="higher")
         norm = LogNorm(low, high, clip=True)
-        published = rms_numbers(str(dataset.attrs["model"])).get(output)
         for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):
             _draw_cells(axis, across.at, up.at, factor * found[number], norm, written=written)
-            if published and not written and np.sum(found[number] < published.value) >= ENCLOSED:
-                lines: Style = {"levels": [np.log(published.value)], "linestyles": "solid"}
-                logarithms = np.log(np.maximum(found[number], low))
-                axis.contour(across.at, up.at, logarithms, colors="white", linewidths=1.2, **lines)
             axis.set_title(theme.letter(row * len(methods) + number, text))
         label = labels.error_label(dataset, "RMS error", output, unit)
         extend = "min" if factor * colored.min() < low else None

@@ -18,11 +18,9 @@ from vehiclemor.report.labels import main_outputs, tabled_outputs
 # At most so many outputs have panels.
 PANELS = 3
 DRAWINGS: dict[str, Callable[[xr.Dataset], Figure]] = {
-    "histories": lambda dataset: figure_histories(
-        {"": dataset}, outputs=shown_outputs(dataset), beside=True
-    ),
-    "paths": lambda dataset: figure_paths({"": dataset}),
-    "errors": lambda dataset: figure_errors({"": dataset}, outputs=shown_outputs(dataset)),
+    "histories": lambda dataset: figure_histories(dataset, outputs=shown_outputs(dataset)),
+    "paths": figure_paths,
+    "errors": lambda dataset: figure_errors(dataset, outputs=shown_outputs(dataset)),
 }
 
 
@@ -46,10 +44,7 @@ def figure_of(dataset: xr.Dataset, kind: str) -> Figure:
         raise InputError("a protocol has no grid to draw over; vehiclemor figures --only draws it")
     if not dataset.sizes.get("output"):
         raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
-    if "label" not in dataset.coords:
-        dataset = dataset.assign_coords(label=_configuration(dataset).get("method", "run"))
-    if "label" not in dataset.dims:
-        dataset = dataset.expand_dims("label")
+    dataset = by_method(dataset)
     figure = DRAWINGS[kind](dataset)
     lines = filter(None, (_title(dataset), figure.get_suptitle()))
     figure.suptitle("\n".join(lines), fontsize="medium", wrap=True)
@@ -57,19 +52,27 @@ def figure_of(dataset: xr.Dataset, kind: str) -> Figure:
     return figure
 
 
-def _configuration(dataset: xr.Dataset) -> dict[str, Any]:
+def configuration(dataset: xr.Dataset) -> dict[str, Any]:
     """What determines the result; a run that is no experiment has none."""
     return json.loads(dataset.attrs.get("configuration", "{}"))
 
 
-def _model(dataset: xr.Dataset) -> str:
-    return str(dataset.attrs.get("model") or _configuration(dataset).get("model", "it"))
+def model_name(dataset: xr.Dataset) -> str:
+    """The model that a result is of."""
+    return str(dataset.attrs.get("model") or configuration(dataset).get("model", "it"))
+
+
+def by_method(dataset: xr.Dataset, unnamed: str = "run") -> xr.Dataset:
+    """A result on the dimension `label`, which that of one run does not have."""
+    if "label" not in dataset.coords:
+        dataset = dataset.assign_coords(label=configuration(dataset).get("method", unnamed))
+    return dataset if "label" in dataset.dims else dataset.expand_dims("label")
 
 
 def _title(dataset: xr.Dataset) -> str:
     """Title of the result; of one run with its input."""
-    title = str(dataset.attrs.get("title", _model(dataset)))
-    for test in _configuration(dataset).get("test") or []:
+    title = str(dataset.attrs.get("title", model_name(dataset)))
+    for test in configuration(dataset).get("test") or []:
         changed = [k for k in ("frequency", "amplitude") if test[k] != 1.0]
         factors = "".join(f", {key} {test[key]:g}" for key in changed)
         return f"{title}: {test['maneuver']}{factors}, from {test['start']}"
@@ -80,7 +83,7 @@ def shown_outputs(dataset: xr.Dataset) -> list[str]:
     """Outputs that the model shows; of a model that is not installed here, the first."""
     known = [str(output) for output in dataset["output"].values]
     try:
-        definition = component("model", _model(dataset))
+        definition = component("model", model_name(dataset))
         main = main_outputs(definition)
         shown = list(dict.fromkeys((*main, *tabled_outputs(definition))))[: max(2, len(main))]
     except InputError:

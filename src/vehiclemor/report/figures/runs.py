@@ -1,7 +1,7 @@
 """Runs of any model: histories and paths of full order and reduced models, and their errors."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from vehiclemor.exceptions import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
-from vehiclemor.report.figures.theme import CROSS, FULL, Results, Style, hide_rounding, tick_decades
+from vehiclemor.report.figures.theme import CROSS, FULL, Style, hide_rounding, tick_decades
 from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
@@ -21,12 +21,11 @@ from vehiclemor.simulation.trajectory import FINISHED
 PATH = ("longitudinal_position", "lateral_position")
 DISTANCE = "distance from full order at the same time"
 RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
-END: Style = {"color": "#777777", "linewidth": 0.8, "label": "end of a control period"}
 # How far around the full-order signal the others are shown, as a multiple of its range; share of
 # the largest value below which the full order stands still.
 REACH, STILL = 0.6, 1e-4
 # Height of a panel in inches; letters of a label beside it in one line.
-HISTORY, ERROR, LINE = 2.0, 1.7, 26
+HISTORY, ERROR, LINE = 2.2, 1.7, 26
 
 
 class Curve(NamedTuple):
@@ -88,58 +87,26 @@ def runs_of(dataset: xr.Dataset, texts: Mapping[str, str]) -> Runs:
     return Runs(next(with_full, next(iter(points.values()))), curves)
 
 
-def figure_histories(
-    results: Results,
-    *,
-    outputs: Sequence[str],
-    methods: Mapping[str, str] | None = None,
-    rows: Sequence[str] = (),
-    beside: bool = False,
-    place: Mapping[str, object] | None = None,
-    shown: float | None = None,
-    marks: Sequence[float] = (),
-) -> Figure:
-    """Outputs over the time: a column for each start, or for each output if they stand `beside`.
-
-    Parameters
-    ----------
-    methods
-        As of `legend_of`.
-    rows
-        Of each output: `history`, `error` (beside that of the best approximation), `largest error`
-        (in each control period, with the RMS error over the run beside the published one).
-    place
-        Place in the study's grid.
-    shown, marks
-        Time up to which the runs are shown, and times at which a control period ends, in s.
-    """
-    (dataset,) = results.values()
-    dataset = dataset.sel(place or {})
-    texts = legend_of(dataset, methods)
-    starts = list(dataset["start"].values) if "start" in dataset.dims and not beside else [None]
-    runs = [runs_of(dataset if s is None else dataset.sel(start=s), texts) for s in starts]
-    if not rows:
-        error = "largest error" if len(texts) > 1 else "error"
-        rows = ["history", error] if runs[0].compared else ["history"]
-    columns = len(outputs) if beside else len(runs)
-    cells = [(runs[0], output, content) for content in rows for output in outputs]
-    if not beside:
-        cells = [(run, output, content) for output in outputs for content in rows for run in runs]
-    heights = [HISTORY if content == "history" else ERROR for *_, content in cells[::columns]]
+def figure_histories(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
+    """Outputs over the time, side by side, at a point of a study; their errors below."""
+    texts = legend_of(dataset)
+    runs = runs_of(dataset, texts)
+    rows = [draw_history]
+    if runs.compared:
+        rows.append(draw_largest_errors if len(texts) > 1 else draw_errors)
+    heights = [HISTORY, ERROR][: len(rows)]
+    columns = len(outputs)
     size = (6.7 if columns < 3 else 9.5, sum(heights) + 1.2)
     ratios = {"height_ratios": heights}
-    figure, axes = theme.panels(len(heights), columns, size, sharex=True, gridspec_kw=ratios)
-    for number, (axis, (run, output, content)) in enumerate(zip(axes.flat, cells, strict=True)):
-        start = starts[number % len(starts)]
-        axis.set_title(theme.letter(number, f"{start} start" if len(starts) > 1 else ""))
-        DRAWN[content](axis, run, output)
-        for moment in marks:
-            axis.axvline(moment, **END)
+    figure, axes = theme.panels(len(rows), columns, size, sharex=True, gridspec_kw=ratios)
+    cells = itertools.product(rows, outputs)
+    for number, (axis, (draw, output)) in enumerate(zip(axes.flat, cells, strict=True)):
+        axis.set_title(theme.letter(number))
+        draw(axis, runs, output)
     time = dataset["time"].values
     for axis in axes[-1]:
-        part = f", first {shown:g} s of {time[-1]:g} s" if shown else ""
-        axis.set_xlabel(f"time (s){part}")
-        axis.set_xlim(float(time[0]), shown or float(time[-1]))
+        axis.set_xlabel("time (s)")
+        axis.set_xlim(float(time[0]), float(time[-1]))
     theme.legend_below(figure, axes.flat)
     return figure
 
@@ -252,43 +219,21 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> None:
     axis.set_ylabel(f"{label}\nin each {period:.2g} s ({labels.unit_of(runs.full, output)})")
 
 
-DRAWN: Mapping[str, Callable[[Axes, Runs, str], None]] = {
-    "history": draw_history,
-    "error": draw_errors,
-    "largest error": draw_largest_errors,
-}
-
-
-def figure_paths(
-    results: Results,
-    *,
-    methods: Mapping[str, str] | None = None,
-    place: Mapping[str, object] | None = None,
-    parts: Mapping[str, float | None] | None = None,
-) -> Figure:
-    """Paths in the plane, and the distances from full order at the same time below.
-
-    `parts` are lengths in m that panels show, by their titles; by default one of the whole path.
-    """
-    (dataset,) = results.values()
-    dataset = dataset.sel(place or {})
+def figure_paths(dataset: xr.Dataset) -> Figure:
+    """Paths in the plane, and the distances from full order at the same time below."""
     missing = sorted(set(PATH) - {str(output) for output in dataset["output"].values})
     if missing:
         raise InputError(f"{dataset.attrs.get('model')} has no path: no output {missing}")
-    runs = runs_of(dataset, legend_of(dataset, methods))
-    shown: list[tuple[str, float | None]] = list((parts or {"": None}).items())
-    if runs.compared:
-        shown.append((DISTANCE, shown[0][1]))
-    figure, axes = theme.panels(len(shown), 1, (6.7, 1.4 + 1.5 * len(shown)), sharex=not parts)
-    for number, (axis, (title, length)) in enumerate(zip(axes.flat, shown, strict=True)):
+    runs = runs_of(dataset, legend_of(dataset))
+    titles = ["", DISTANCE][: 1 + runs.compared]
+    figure, axes = theme.panels(len(titles), 1, (6.7, 1.4 + 1.5 * len(titles)), sharex=True)
+    for number, (axis, title) in enumerate(zip(axes.flat, titles, strict=True)):
         axis.set_title(theme.letter(number, title))
-        if title == DISTANCE:
+        if title:
             _draw_distances(axis, runs.curves)
         else:
             draw_paths(axis, runs)
             axis.set_ylabel("Y (m)")
-        if length:
-            axis.set_xlim(0.0, length)
     axes[-1, 0].set_xlabel("X (m), not to the scale of Y")
     theme.legend_below(figure, [axes[0, 0]])
     return figure

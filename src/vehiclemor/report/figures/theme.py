@@ -1,7 +1,7 @@
 """One look for all figures: lines, panels, axes, legends, and the files they are written to."""
 
 import string
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from itertools import cycle
 from pathlib import Path
@@ -19,9 +19,8 @@ from vehiclemor.arguments import count, quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import write_whole
 from vehiclemor.report.labels import MARK, TRAINED
-from vehiclemor.study.plans.study_file import FACTORS, PARAMETER
+from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
-Results = Mapping[str, "xr.Dataset"]
 Style = dict[str, Any]
 FORMATS = ("pdf", "svg", "png")
 OWN_STYLE = Path(__file__).with_name("style.mplstyle")

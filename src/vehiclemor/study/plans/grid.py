@@ -20,15 +20,8 @@ from vehiclemor.study.experiment import (
     default_settings,
     make_experiment,
 )
-from vehiclemor.study.plans.study_file import (
-    FACTORS,
-    PARAMETER,
-    TEXTS,
-    MethodEntry,
-    Sampling,
-    StudyFile,
-    values,
-)
+from vehiclemor.study.plans.study_file import MethodEntry, StudyFile
+from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER, TEXTS, Sampling, values
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Overrides, Scenario, Values, check, overrides, with_parameters
 

@@ -19,16 +19,8 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
 from vehiclemor.study.plans.loading import read_study, study_path
-from vehiclemor.study.plans.ranges import DECIMALS
-from vehiclemor.study.plans.study_file import (
-    DRAWN,
-    SETS,
-    Box,
-    Draw,
-    Group,
-    MethodEntry,
-    StudyFile,
-)
+from vehiclemor.study.plans.study_file import DRAWN, SETS, MethodEntry, StudyFile
+from vehiclemor.study.plans.study_runs import DECIMALS, Box, Draw, Group
 from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
 
 FULL_ORDER, CONTENDER = "full order", "contender"

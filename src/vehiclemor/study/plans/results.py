@@ -18,7 +18,8 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.choice import Row
 from vehiclemor.study.plans.grid import Grid
 from vehiclemor.study.plans.protocol import Protocol
-from vehiclemor.study.plans.study_file import PARAMETER, StudyFile
+from vehiclemor.study.plans.study_file import StudyFile
+from vehiclemor.study.plans.study_runs import PARAMETER
 from vehiclemor.study.result import meaning_of, variables
 from vehiclemor.study.store import read_run
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -33,7 +33,8 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.study.plans.loading import content_hash
-from vehiclemor.study.plans.study_file import StudyFile
+from vehiclemor.study.plans.study_file import MethodEntry, StudyFile
+from vehiclemor.study.plans.study_runs import Size
 from vehiclemor.study.result import variables
 from vehiclemor.study.store import combined_path, stored
 from vehiclemor.study.timing import called
@@ -42,6 +43,8 @@ FULL = "full order"
 # Groups of outputs, of which the worst error counts: strains are what coarse meshes are worst at.
 GROUPS = ("motion", "strain")
 ROUNDS = 5
+# A whole run, or its beginning, and how many times as long the whole run is.
+Call = tuple[Callable[[], Any], float]
 
 
 def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
@@ -54,47 +57,49 @@ def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
     content = [study.model_dump_json(), *codes, kernel, machine(), ROUNDS]
     text = json.dumps([*content, compiler_identity()])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    make = partial(_measured, name, study, folder)
+    make = partial(_measured, name, study, study.size, folder)
     return stored(combined_path(folder, name), "size", key, make, content=content_hash(study))
 
 
-def _measured(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
-    size = study.size
-    assert size is not None
+def _measured(name: str, study: StudyFile, size: Size, folder: Path) -> xr.Dataset:
     # What can't be had is told before anything is computed.
     beside = [(strongest_full(model), rom(model)) for model in size.beside]
     meshes: list[Any] = [build(study.model, overrides=mesh) for mesh in size.meshes]
     chosen = component("maneuver", study.maneuver).perturbed(size.frequency, size.amplitude)
+    labels, vehicles = [FULL, *study.labelled], range(len(meshes), len(meshes) + len(beside))
+    texts = [[f"{name} {value:g}" for name, value in mesh.items()] for mesh in size.meshes]
+    rows = [*map(", ".join, texts), *size.beside]
+    n = [model.size for model in meshes] + [len(full.model.coordinates) for full, _ in beside]
     with one_thread():
         references = [_reference(model, chosen, size.step, folder) for model in meshes]
-        fits = [_fits(study, model) for model in meshes]
-        labels = [FULL, *(entry.label or entry.method for entry in study.methods)]
-        texts = [[f"{name} {value:g}" for name, value in mesh.items()] for mesh in size.meshes]
-        rows = [*map(", ".join, texts), *size.beside]
-        n = [model.size for model in meshes] + [len(full.model.coordinates) for full, _ in beside]
-        timed = _timed(name, size, list(zip(meshes, fits, strict=True)), beside, chosen, n)
-    shape = len(rows), len(labels)
-    errors = np.full((*shape, len(GROUPS)), np.nan)
-    order, offline = np.full(shape, np.nan), np.full(shape, np.nan)
-    truth = references[-1]
-    strains = np.array([name.startswith("strain") for name in truth["output"].values])
-    scale = signal_range(truth["outputs"].values)
-    scale[scale == 0.0] = 1.0
-    for row, (reference, own) in enumerate(zip(references, fits, strict=True)):
-        found = [reference["outputs"].values]
-        found += [model and model.simulate(chosen).outputs for model in own]
-        for column, outputs in enumerate(found):
-            if outputs is not None:
-                relative = rms(outputs - truth["outputs"].values) / scale
-                for group, chosen_outputs in enumerate((~strains, strains)):
-                    errors[row, column, group] = relative[chosen_outputs].max(initial=0.0)
-        for column, model in enumerate(own, start=1):
-            if model is not None:
-                order[row, column] = model.reduced.order
-                offline[row, column] = model.reduced.offline.seconds
+        # Reduced models by mesh and label.
+        models = {
+            (row, column): reduced
+            for row, model in enumerate(meshes)
+            for column, entry in enumerate(study.methods, start=1)
+            if (reduced := _fit(study, size, entry, model))
+        }
+        calls = {place: (partial(model.simulate, chosen), 1.0) for place, model in models.items()}
+        calls |= {(row, 0): _full(model, chosen, size) for row, model in enumerate(meshes)}
+        for row, (full, reduced) in zip(vehicles, beside, strict=True):
+            models[row, 1] = reduced
+            calls |= {(row, 0): (full.simulate, 1.0), (row, 1): (reduced.simulate, 1.0)}
+        timed = _timed(name, calls, (len(rows), len(labels)))
+    outputs = {(row, 0): reference["outputs"].values for row, reference in enumerate(references)}
+    order, offline = np.full((2, len(rows), len(labels)), np.nan)
     order[:, 0] = n
-    for row, (_, reduced) in enumerate(beside, start=len(meshes)):
-        order[row, 1], offline[row, 1] = reduced.reduced.order, reduced.reduced.offline.seconds
+    for place, model in models.items():
+        order[place], offline[place] = model.reduced.order, model.reduced.offline.seconds
+        if place[0] not in vehicles:
+            outputs[place] = model.simulate(chosen).outputs
+    truth = references[-1]["outputs"]
+    strains = np.array([output.startswith("strain") for output in truth["output"].values])
+    scale = signal_range(truth.values)
+    scale[scale == 0.0] = 1.0
+    errors = np.full((*order.shape, len(GROUPS)), np.nan)
+    for place, found in outputs.items():
+        relative = rms(found - truth.values) / scale
+        errors[place] = [relative[group].max(initial=0.0) for group in (~strains, strains)]
     with warnings.catch_warnings():
         # What is not made of a mesh was never timed.
         warnings.filterwarnings("ignore", "All-NaN slice")
@@ -139,53 +144,36 @@ def _reference(model: Any, maneuver: Maneuver, step: float, folder: Path) -> xr.
     return stored(folder / "references" / f"{key}.nc", "reference", key, make)
 
 
-def _fits(study: StudyFile, model: Any) -> list[ReducedOrderModel | None]:
-    """Every method of a study fitted to a mesh; none where the mesh is larger than it is made."""
-    assert study.size is not None
-    found: list[ReducedOrderModel | None] = []
-    learned = component("maneuver", str(study.training))
-    runs = (TrainingRun(model, learned, model.starts[0]),)
-    for entry in study.methods:
-        method = component("method", entry.method)
-        label, (accepted, _) = entry.label or entry.method, method.accepts(model)
-        if not accepted or model.size > study.size.up_to.get(label, model.size):
-            found.append(None)
-            continue
-        tell(f"{label} of {model.name}, n = {model.size}", 0, 1)
-        own = {"step_size": study.size.step, **entry.settings}
-        settings = validated(method, model.kind, own, entry.preset)
-        reduced = fitted(method, model, runs, settings)
-        found.append(ReducedOrderModel(model, entry.method, settings.model_dump(), (), reduced))
-    return found
+def _fit(study: StudyFile, size: Size, entry: MethodEntry, model: Any) -> ReducedOrderModel | None:
+    """A method fitted to a mesh; none where the mesh is larger than it is made."""
+    method, label = component("method", entry.method), entry.label or entry.method
+    if not method.accepts(model)[0] or model.size > size.up_to.get(label, model.size):
+        return None
+    tell(f"{label} of {model.name}, n = {model.size}", 0, 1)
+    runs = (TrainingRun(model, component("maneuver", str(study.training)), model.starts[0]),)
+    own = {"step_size": size.step, **entry.settings}
+    settings = validated(method, model.kind, own, entry.preset)
+    reduced = fitted(method, model, runs, settings)
+    return ReducedOrderModel(model, entry.method, settings.model_dump(), (), reduced)
 
 
-def _timed(
-    name: str,
-    size: Any,
-    models: Sequence[tuple[Any, list[ReducedOrderModel | None]]],
-    beside: Sequence[tuple[ReducedOrderModel, ReducedOrderModel]],
-    maneuver: Maneuver,
-    n: Sequence[int],
-) -> np.ndarray:
-    """Seconds of whole runs (rounds, meshes, labels); NaN where there is none."""
+def _full(model: Any, maneuver: Maneuver, size: Size) -> Call:
+    """The full order of a mesh: of a large one its beginning."""
+    if model.size <= size.whole:
+        return partial(model.run, maneuver, step=size.step), 1.0
     samples = round(size.window / maneuver.duration * (maneuver.samples - 1)) + 1
     begun = replace(maneuver, duration=size.window, samples=samples)
-    calls: dict[tuple[int, int], tuple[Any, float]] = {}
-    for row, (model, fits) in enumerate(models):
-        short = n[row] > size.whole
-        run, factor = (begun, maneuver.duration / size.window) if short else (maneuver, 1.0)
-        calls[row, 0] = partial(model.run, run, step=size.step), factor
-        for column, reduced in enumerate(fits, start=1):
-            if reduced is not None:
-                calls[row, column] = partial(reduced.simulate, maneuver), 1.0
-    for row, pair in enumerate(beside, start=len(models)):
-        for column, reduced in enumerate(pair):
-            calls[row, column] = partial(reduced.simulate), 1.0
-    columns = 1 + max(column for _, column in calls)
-    seconds = np.full((ROUNDS, len(n), columns), np.nan)
+    return partial(model.run, begun, step=size.step), maneuver.duration / size.window
+
+
+def _timed(name: str, calls: Mapping[tuple[int, int], Call], shape: tuple[int, int]) -> np.ndarray:
+    """Seconds of whole runs (rounds, meshes, labels); NaN where there is none."""
+    seconds = np.full((ROUNDS, *shape), np.nan)
     for turn in range(ROUNDS):
-        for done, ((row, column), (call, factor)) in enumerate(calls.items()):
+        for done, (place, (call, factor)) in enumerate(
+            (place, calls[place]) for place in sorted(calls)
+        ):
             tell(f"{name}: round {turn + 1} of {ROUNDS}", done, len(calls))
             found = called(call, 2)
-            seconds[turn, row, column] = np.nan if isinstance(found, Failure) else factor * found[0]
+            seconds[turn, *place] = np.nan if isinstance(found, Failure) else factor * found[0]
     return seconds

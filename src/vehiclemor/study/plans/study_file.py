@@ -5,21 +5,25 @@ validation set and a test set, which are lists or sampled from boxes.
 """
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
-from vehiclemor.study.plans.mesh_sizes import Size
-from vehiclemor.study.plans.ranges import Drawn, Numbers, Range, without_speed
+from vehiclemor.study.plans.study_runs import (
+    MOST_POINTS,
+    PARAMETER,
+    Axis,
+    Draw,
+    Group,
+    Limit,
+    Sampling,
+    Size,
+    list_of,
+    table_of,
+    values,
+)
 from vehiclemor.toml_files import FileSchema, Line
 
-FACTORS = ("frequency_factor", "amplitude_factor")
-# Axes that say what is run and what is trained on; and how the name of a parameter's begins.
-TEXTS = ("maneuver", "start", "training")
-PARAMETER = "parameters."
-# A grid of more points than this is a mistake in a file, not a study.
-MOST_POINTS = 1_000_000
 # Of the test sets of every study that gives none.
 SEED, MOST_SEED = 20261122, 2**63 - 1
 # Sets of scenarios that a study with bounds lists, and those that it samples.
@@ -33,57 +37,6 @@ OF_TESTS = (
 )
 OF_SIZES = {"title", "model", "maneuver", "training", "size", "methods"}
 OF_ENTRIES = ("candidates", "role")
-
-
-def _list(description: str) -> Any:
-    """Field with a list, empty by default."""
-    return Field(default_factory=list, description=description)
-
-
-def _table(description: str) -> Any:
-    """Field with a table, empty by default."""
-    return Field(default_factory=dict, description=description)
-
-
-class Span(FileSchema):
-    """Equidistant values, both ends included."""
-
-    first: float = Field(allow_inf_nan=False)
-    last: float = Field(allow_inf_nan=False)
-    count: int = Field(ge=1, le=10_000)
-
-
-# By its form, so that what is wrong with one is not read as the other.
-Axis = Annotated[
-    Annotated[list[int | float | str], Tag("values")] | Annotated[Span, Tag("span")],
-    Discriminator(lambda value: "span" if isinstance(value, Span | dict) else "values"),
-]
-
-
-class Sampling(FileSchema):
-    """Points spread over ranges, in place of every combination of some values."""
-
-    plan: Literal["latin_hypercube", "sobol"] = Field(description="how points are spread")
-    count: int = Field(ge=1, le=MOST_POINTS, description="how many; of sobol a power of two")
-    seed: int = Field(ge=0, description="the same seed gives the same points")
-    ranges: dict[str, list[float]] = Field(
-        description="[from, to] of parameters.NAME, frequency_factor or amplitude_factor"
-    )
-
-    @model_validator(mode="after")
-    def _sound(self) -> "Sampling":
-        if not self.ranges:
-            raise ValueError("ranges is empty")
-        for name, limits in self.ranges.items():
-            # Of a range that overflows no point could be taken.
-            if len(limits) != 2 or not 0.0 < limits[1] - limits[0] < math.inf:
-                raise ValueError(f"ranges: {name} is not [from, to]")
-            if name not in FACTORS and not name.startswith(PARAMETER):
-                raise ValueError(f"ranges: {name} is neither parameters.NAME nor a factor")
-        if self.plan == "sobol" and self.count & (self.count - 1):
-            raise ValueError(f"count: {self.count} is no power of two, as a sobol plan needs it")
-        return self
-
 
 Training = str | Annotated[list[str], Field(min_length=1)]
 Settings = dict[str, int | float | str]
@@ -102,82 +55,11 @@ class Bound(FileSchema):
     reason: str = Field("ours", min_length=1, description="where the number comes from")
 
 
-class Group(FileSchema):
-    """Scenarios of one maneuver: every point, from every start.
-
-    Points are rows (frequency, amplitude) or (frequency, amplitude, speed); without them they are
-    all combinations of the three lists.
-    """
-
-    maneuver: str = Field(description="registered name")
-    start: list[str] = _list("initial conditions; the model's first by default")
-    points: list[list[float]] = _list("[frequency, amplitude] or [frequency, amplitude, speed]")
-    frequency: list[float] = _list("factors, 1 by default")
-    amplitude: list[float] = _list("factors, 1 by default")
-    speed: list[float] = _list("m/s, the model's own by default")
-    parameters: Annotated[dict[str, list[float]], AfterValidator(without_speed)] = _table(
-        "parameter -> values in SI units, to combine with all else; the model's own by default"
-    )
-
-    @property
-    def scenarios(self) -> int:
-        """How many scenarios it is."""
-        lists = (self.frequency, self.amplitude, self.speed)
-        points = len(self.points) or math.prod(len(entry) or 1 for entry in lists)
-        samples = math.prod(len(entry) for entry in self.parameters.values())
-        return points * samples * (len(self.start) or 1)
-
-    @model_validator(mode="after")
-    def _either(self) -> "Group":
-        for name in self.model_fields_set - {"maneuver"}:
-            if not getattr(self, name):
-                raise ValueError(f"{name} is empty")
-        for name, values in self.parameters.items():
-            if not values or not all(map(math.isfinite, values)):
-                raise ValueError(f"parameters: {name} is not a list of finite numbers")
-        if self.points and (self.frequency or self.amplitude or self.speed):
-            raise ValueError("give points or lists of factors, not both")
-        if any(len(point) not in (2, 3) for point in self.points):
-            raise ValueError("a point is [frequency, amplitude] or [frequency, amplitude, speed]")
-        return self
-
-
 Groups = Annotated[list[Group], Field(min_length=1)]
 Learned = Annotated[
     Annotated[Training, Tag("names")] | Annotated[Groups, Tag("runs")],
     Discriminator(lambda value: "runs" if _is_listed(value) else "names"),
 ]
-Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-
-
-class Box(FileSchema):
-    """Runs of one maneuver, its numbers uniformly distributed in ranges [from, to]."""
-
-    maneuver: str = Field(description="registered name")
-    share: Limit = Field(1.0, description="of the runs, against the other boxes' shares")
-    frequency: Range = Field([1.0, 1.0], description="factors, from and to")
-    amplitude: Range = Field([1.0, 1.0], description="factors, from and to")
-    both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
-    speed: Range | None = Field(None, description="m/s, the model's own by default")
-    start: list[str] = _list("initial conditions, equally likely; the model's first")
-    members: Numbers | None = Field(
-        None, description="of a family: numbers of its members, from and to; MANEUVER:NUMBER is run"
-    )
-    parameters: Drawn = _table("parameter -> [from, to] in SI units; the model's own by default")
-
-    @field_validator("frequency")
-    @classmethod
-    def _positive(cls, value: list[float]) -> list[float]:
-        if value[0] <= 0.0:
-            raise ValueError("frequency factors are positive")
-        return value
-
-
-class Draw(FileSchema):
-    """Runs sampled from boxes."""
-
-    runs: int = Field(ge=1, le=100_000, description="how many")
-    boxes: list[Box] = Field(min_length=1, description="what they are sampled from")
 
 
 class SpeedTarget(FileSchema):
@@ -206,7 +88,7 @@ class MethodEntry(FileSchema):
     method: str = Field(description="registered name")
     label: Line = Field("", description="name of its results; the method's by default")
     preset: str = Field("recommended", description="preset that its settings differ from")
-    settings: Settings = _table("setting -> value; see vehiclemor show METHOD")
+    settings: Settings = table_of("setting -> value; see vehiclemor show METHOD")
     training: Training = Field(
         "",
         description="as of the study, whose it is by default; of a training set the maneuvers that "
@@ -233,50 +115,50 @@ class StudyFile(FileSchema):
 
     title: Line = Field(description="one line")
     extends: str = Field("", description="study or file that gives all but methods, where not here")
-    rows: list[str] = _list("labels of methods of the extended study that are rows here too")
-    studies: list[str] = _list("of a collection: names of studies, or TOML files")
+    rows: list[str] = list_of("labels of methods of the extended study that are rows here too")
+    studies: list[str] = list_of("of a collection: names of studies, or TOML files")
     model: str = Field("", description="registered name; needed for a grid")
-    parameters: dict[str, float | list[float]] = _table(
+    parameters: dict[str, float | list[float]] = table_of(
         "parameter -> value in SI units where the study's are not the model's"
     )
     maneuver: str = Field("", description="registered name; the model's own by default")
-    start: list[str] = _list("initial conditions; the model's first by default")
+    start: list[str] = list_of("initial conditions; the model's first by default")
     training: Learned = Field(
         "matched",
         description="input that is trained on: matched (the tested one), nominal (the model's own "
         "maneuver), the name of a maneuver, protocol (the training of the model's protocol), set, "
         "or a list of these; with bounds: the runs that methods learn from",
     )
-    training_set: list[list[float]] = _list(
+    training_set: list[list[float]] = list_of(
         "of training = set: pairs [frequency factor, amplitude factor]"
     )
     keep: Literal["trajectories", "metrics"] = Field(
         "trajectories", description="histories and errors, or errors alone"
     )
-    grid: dict[str, Axis] = _table(
+    grid: dict[str, Axis] = table_of(
         "dimension -> values; frequency_factor, amplitude_factor, parameters.NAME, "
         "maneuver, start, training, or any setting"
     )
     sampling: Sampling | None = Field(
         None, description="points of a dimension `sample` beside those of the grid"
     )
-    methods: list[MethodEntry] = _list("each is run in every scenario")
-    bounds: dict[str, Bound] = _table("of a test: output -> largest allowed error")
-    reported: list[str] = _list("outputs whose RMS errors are printed beside the bounded")
-    validation: list[Group] = _list("what candidates are chosen by")
-    test: list[Group] = _list("listed test runs; judged if none are drawn")
-    outside: list[Group] = _list("beyond what was trained: reported, not judged")
+    methods: list[MethodEntry] = list_of("each is run in every scenario")
+    bounds: dict[str, Bound] = table_of("of a test: output -> largest allowed error")
+    reported: list[str] = list_of("outputs whose RMS errors are printed beside the bounded")
+    validation: list[Group] = list_of("what candidates are chosen by")
+    test: list[Group] = list_of("listed test runs; judged if none are drawn")
+    outside: list[Group] = list_of("beyond what was trained: reported, not judged")
     version: int = Field(1, ge=1, description="of the drawn test set, part of its name")
     seed: int = Field(SEED, ge=0, le=MOST_SEED, description="of the drawn runs")
     drawn: Draw | None = Field(None, description="test set: drawn from boxes")
     drawn_outside: Draw | None = Field(
         None, description="the same beyond the boxes: whether models warn"
     )
-    sensitive: dict[str, Limit] = _table(
+    sensitive: dict[str, Limit] = table_of(
         "output -> largest value of the full order's run in the first 10 s; beyond it "
         "(spin, rollover) a drawn run is not judged"
     )
-    targets: list[SpeedTarget] = _list("speed that is aimed at")
+    targets: list[SpeedTarget] = list_of("speed that is aimed at")
     failure_rate: float | None = Field(
         None, gt=0.0, le=1.0, description="rate of misses that the runs must exclude at 95 %"
     )
@@ -384,14 +266,6 @@ class StudyFile(FileSchema):
             for other, more in others.items():
                 for name in sorted(names & more) if other != one else ():
                     raise ValueError(f"{name} is set twice: in the {one} and in the {other}")
-
-
-def values(entry: Axis) -> list[int | float | str]:
-    """Values of one grid entry."""
-    if isinstance(entry, Span):
-        # Rounded, so that 1.1 is 1.1 and a grid holds the nominal point exactly.
-        return [round(float(v), 12) for v in np.linspace(entry.first, entry.last, entry.count)]
-    return list(entry)
 
 
 def _is_listed(value: object) -> bool:

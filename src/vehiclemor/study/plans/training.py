@@ -31,14 +31,8 @@ def training_set(
 ) -> tuple[Scenario, ...]:
     """Training scenarios of a method for a model, see `simulate` and `reduce`.
 
-    Parameters
-    ----------
-    given
-        None is the training of the model's protocol if the method competes there, else `nominal`.
-    test
-        What is tested: maneuvers are run from its start, at its speed, with its parameters.
-    factors
-        Of `set`: pairs (frequency, amplitude).
+    None is the training of the model's protocol if the method competes there, else `nominal`.
+    Maneuvers are run as the `test` is: from its start, at its speed, with its parameters.
     """
     if given is None:
         given = "protocol" if _of_protocol(model.name, method) else "nominal"

@@ -11,13 +11,7 @@ from tests.reducing import training_runs
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.learned.learned_model import Learning, columns, monomials
-from vehiclemor.reduction.methods import (
-    dynamic_mode_decomposition,
-    gaussian_process,
-    neural_network,
-    operator_inference,
-    sparse_identification,
-)
+from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import FINISHED
 
@@ -29,11 +23,12 @@ LINEAR = {
 CAR = "independent_suspension_vehicle"
 
 
-def learned(module, model, runs, **settings):
+def learned(name, model, runs, **settings):
     """What a method fits to runs, and what it has seen."""
-    chosen = module.METHOD.settings[model.kind](**settings)
-    mapped = module not in (operator_inference, sparse_identification)
-    return module.fit(model, runs, chosen), Learning.of(model, runs, chosen, mapped, "numpy")
+    method = component("method", name)
+    chosen = method.settings[model.kind](**settings)
+    mapped = name not in ("operator_inference", "sparse_identification")
+    return method.fit(model, runs, chosen), Learning.of(model, runs, chosen, mapped, "numpy")
 
 
 @pytest.fixture(scope="module")
@@ -67,9 +62,9 @@ def test_the_loop_evaluates_what_the_libraries_have_fitted(car, runs):
     from sklearn.neural_network import MLPRegressor
 
     few = {"rank": 4, "steps": 1}
-    reduced, learning = learned(neural_network, car, runs, epochs=20, **few)
+    reduced, learning = learned("neural_network", car, runs, epochs=20, **few)
     linear, left = learning.linear
-    x, scale = learning.regression.arguments, left.std(axis=0)
+    (x, expected), scale = learning.regression, left.std(axis=0)
     network = MLPRegressor(
         hidden_layer_sizes=(32, 32), activation="tanh", alpha=1e-5, max_iter=20, random_state=0
     )
@@ -79,18 +74,20 @@ def test_the_loop_evaluates_what_the_libraries_have_fitted(car, runs):
     np.testing.assert_allclose(reduced._values(x), found, atol=1e-10)
     # At its own samples a process is what was given, but for its noise.
     reduced, learning = learned(
-        gaussian_process, car, runs, samples=300, length=1.0, noise=1e-9, **few
+        "gaussian_process", car, runs, samples=300, length=1.0, noise=1e-9, **few
     )
     rows = np.random.default_rng(0).permutation(len(x))[:300]
-    results = learning.regression.results[rows] + straight
+    results = expected[rows] + straight
     error = np.abs(reduced._values(x[rows]) - results).max(axis=0)
-    assert (error < 2e-2 * learning.regression.results.std(axis=0)).all()
+    assert (error < 2e-2 * expected.std(axis=0)).all()
 
 
 def test_quadratic_operators_are_those_of_the_library(car, runs):
     import opinf
 
-    reduced, learning = learned(operator_inference, car, runs, rank=3, form="quadratic", ridge=1e-3)
+    reduced, learning = learned(
+        "operator_inference", car, runs, rank=3, form="quadratic", ridge=1e-3
+    )
     (x, results), r = learning.regression, 3
     library = opinf.models.ContinuousModel("AHBN", solver=opinf.lstsq.L2Solver(1e-3))
     library.fit(x[:, :r].T, results[:, :r].T, x[:, r:].T)
@@ -100,16 +97,16 @@ def test_quadratic_operators_are_those_of_the_library(car, runs):
 
 def test_observables_are_monomials_and_begin_as_those_of_the_start(car, runs):
     settings = {"rank": 3, "degree": 2, "steps": 1}
-    reduced, learning = learned(dynamic_mode_decomposition, car, runs, **settings)
+    reduced, learning = learned("dynamic_mode_decomposition", car, runs, **settings)
     assert reduced.order == 3 + 6
     state = car.start("dropped")
-    z = learning.components.forward @ (reduced.states.of(state[None])[0])
+    z = learning.forward @ (reduced.states.of(state[None])[0])
     products = [z[i] * z[j] for i in range(3) for j in range(i, 3)]
     np.testing.assert_allclose(reduced._encoded(state)[:9], [*z, *products], rtol=1e-12)
 
 
 def test_a_learned_car_drives_straight_on_and_turns_with_its_heading(car, runs):
-    reduced, _ = learned(operator_inference, car, runs, rank=4, form="linear", steps=1)
+    reduced, _ = learned("operator_inference", car, runs, rank=4, form="linear", steps=1)
     straight = reduced.simulate(vm.maneuver("straight_ahead"), "equilibrium")
     distance = straight["longitudinal_position"][-1]
     assert abs(straight["lateral_position"]).max() < 1e-9
@@ -127,7 +124,7 @@ def test_a_learned_car_drives_straight_on_and_turns_with_its_heading(car, runs):
 
 
 def test_a_diverged_run_is_recorded_up_to_where_it_left(car, runs):
-    reduced, _ = learned(operator_inference, car, runs, rank=4, form="linear", steps=1)
+    reduced, _ = learned("operator_inference", car, runs, rank=4, form="linear", steps=1)
     grown = reduced.equations._replace(coefficients=3e2 * abs(reduced.equations.coefficients))
     run = replace(reduced, equations=grown).simulate(lane_change, "dropped")
     assert run.status == "diverged"
@@ -161,7 +158,7 @@ def test_reduced_lateral_dynamics_answer_slow_steering_as_all_modes_do(car, meth
 
 
 def test_a_run_beyond_the_states_of_training_is_not_trusted(car, runs):
-    reduced, _ = learned(operator_inference, car, runs, rank=4, form="linear")
+    reduced, _ = learned("operator_inference", car, runs, rank=4, form="linear")
     assert reduced.simulate(runs[0].maneuver, "equilibrium").status == "ok"
     run = reduced.simulate(lane_change, "dropped")
     assert (run.status, run.trust.until) == ("untrusted", 0.0)
@@ -187,7 +184,7 @@ def test_a_truck_without_the_payload_of_training_is_not_trusted():
 def test_what_cannot_be_learned_is_said_in_one_line(car, runs, monkeypatch):
     faster = replace(runs[1], maneuver=replace(runs[1].maneuver, samples=501))
     with pytest.raises(InputError, match=r"of one spacing, not 0\.02 and 0\.05 s"):
-        learned(operator_inference, car, [runs[0], faster], steps=1)
+        learned("operator_inference", car, [runs[0], faster], steps=1)
     with monkeypatch.context() as patch:
         patch.setitem(sys.modules, "opinf", None)
         with pytest.raises(InputError, match=r'this method needs opinf; .*\[contenders\]"'):

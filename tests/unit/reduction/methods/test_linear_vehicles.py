@@ -14,7 +14,8 @@ from vehiclemor.inputs.steering import (
     rack_straight_ahead,
     straight_ahead,
 )
-from vehiclemor.reduction.methods.modal_truncation import lateral_modes, truncated
+from vehiclemor.reduction.methods.linear import truncated
+from vehiclemor.reduction.vehicle.linear_modes import lateral_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 VEHICLES = {
@@ -95,15 +96,15 @@ def test_single_track_at_another_speed_is_that_vehicle_condensed(shape):
 
 
 def test_steering_without_its_derivatives_drives_lateral_modes_alone(shape):
-    linear, lateral = shape.linearised, lateral_modes(shape)
+    linear, (lateral, _) = shape.linearised, lateral_modes(shape)
     drive = sum(np.linalg.matrix_power(linear.a, j) @ b for j, b in enumerate(linear.b.T))
-    gap = drive - lateral.right @ lateral.b
+    gap = drive - lateral.right @ lateral.input_matrix
     assert np.linalg.norm(gap) < 1e-6 * np.linalg.norm(drive)
 
 
 def test_static_correction_keeps_steady_cornering(shape):
-    kept = truncated(lateral_modes(shape), 20.0, static=True)
-    moved = kept.follow[:, 0] - kept.right @ np.linalg.solve(kept.a, kept.b)
+    kept, follow = truncated(*lateral_modes(shape), 20.0, static=True)
+    moved = follow[:, 0] - kept.right @ np.linalg.solve(kept.rates, kept.input_matrix)
     assert shape.linearised.motion_a[0] @ moved == pytest.approx(steady_turn(shape), rel=1e-5)
 
 

@@ -12,10 +12,10 @@ from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.reduction.vehicle.features import feature_columns
+from vehiclemor.reduction.vehicle.fitting import _sensitivities, improved, targets_of
+from vehiclemor.reduction.vehicle.linear_modes import slow_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_features import SlowFeatures, add_fiala
-from vehiclemor.reduction.vehicle.slow_modes import slow_modes
-from vehiclemor.reduction.vehicle.trajectory_fit import _sensitivities, improved, targets_of
 from vehiclemor.simulation.build import build
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 

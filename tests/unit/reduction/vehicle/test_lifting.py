@@ -7,8 +7,8 @@ import pytest
 
 from tests.reducing import CARS
 from vehiclemor.exceptions import InputError
+from vehiclemor.reduction.vehicle.decoding import NOTHING_KNOWN
 from vehiclemor.reduction.vehicle.features import feature_columns
-from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN
 from vehiclemor.simulation.build import build
 
 

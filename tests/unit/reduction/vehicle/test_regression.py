@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vehiclemor.reduction.vehicle.regression import forward_selection
+from vehiclemor.reduction.vehicle.fitting import forward_selection
 
 
 def left_over(columns, values, chosen):

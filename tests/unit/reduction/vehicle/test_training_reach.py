@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from tests.reducing import CARS
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.reduction.vehicle.decoding import NOTHING_KNOWN, durations
 from vehiclemor.reduction.vehicle.decoding_loops import LEVELS
 from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED
-from vehiclemor.reduction.vehicle.training_reach import NOTHING_KNOWN, durations
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ that hop of the wheels, spins and stabilised constraints leave no trace in z.  T
 of eigenvalue zero.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 # Modes that steering moves by less than this (relative) are symmetric: they don't steer.
 CONTROLLED = 1e-6
+# Of all modes those that steering moves by less than this (relative) are none of its own.
+MOVED = 1e-8
 # Eigenvalues (1/s) nearer to each other belong to the cluster of stabilised constraints.
 APART = 1e-2
 # Smaller eigenvalues (1/s) count as zero.
@@ -133,3 +135,39 @@ def apart(values: np.ndarray) -> np.ndarray:
     """Eigenvalues outside of clusters: those of stabilised constraints are no motion."""
     distance = np.abs(values[:, None] - values[None, :]) + 1e9 * np.eye(len(values))
     return distance.min(axis=1) > APART
+
+
+def lateral_modes(shape: VehicleShape) -> tuple[SlowModes, np.ndarray]:
+    """All modes that steering moves, and what of the shape (n, inputs) follows inputs at once."""
+    linear = shape.linearised
+    follow, drive = without_derivatives(linear.a, linear.b)
+    values, vectors = np.linalg.eig(linear.a.T)
+    w = vectors.T
+    v = np.linalg.inv(w)
+    motion = apart(values) & (np.abs(values) > APART)
+    moved = np.abs(w @ drive) * np.linalg.norm(v, axis=0) / np.maximum(np.abs(values), APART)
+    moved[~motion] = 0.0
+    left, right = real_modes(values, w, v, moved > MOVED * moved.max())
+    modes = replace(
+        slow_modes(shape, np.inf),
+        lateral=len(left),
+        rates=left @ linear.a @ right,
+        left=left,
+        right=right,
+        input_matrix=left @ drive,
+        input_shift=np.vstack([left @ follow, np.zeros(follow.shape[1])]),
+    )
+    return modes, follow
+
+
+def within(modes: SlowModes, test: np.ndarray, trial: np.ndarray) -> SlowModes:
+    """The modes in fewer coordinates: test (r, k) times the old ones, which are trial times new."""
+    return replace(
+        modes,
+        lateral=len(test),
+        rates=test @ modes.rates @ trial,
+        left=test @ modes.left,
+        right=modes.right @ trial,
+        input_matrix=test @ modes.input_matrix,
+        input_shift=np.vstack([test @ modes.input_shift[:-1], modes.input_shift[-1:]]),
+    )

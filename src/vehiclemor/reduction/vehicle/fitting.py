@@ -1,0 +1,377 @@
+"""What reduced vehicles learn: regression on features, whole runs, what training runs have shown.
+
+A fit of rates leaves small errors that add up along a run: a heading that is off by 1e-4 rad is a
+lateral position that is off by 1 cm after 5 s.  So the coefficients are changed to bring the
+reduced runs themselves nearer to the training runs.  The sensitivities of a run follow from its
+variational equations, solved at the output times (E. Hairer, S. Norsett, G. Wanner, Solving
+Ordinary Differential Equations I (2nd ed., Springer 1993), section I.14); steps are damped after
+Levenberg and Marquardt.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from vehiclemor.reduction.training import Training, TrainingRun
+from vehiclemor.reduction.trust import largest_inputs
+from vehiclemor.reduction.vehicle.decoding import (
+    LONGER,
+    NOTHING_KNOWN,
+    ROUNDING,
+    UNLIKE,
+    TrainingReach,
+    Transient,
+    decoding_loops,
+    durations,
+)
+from vehiclemor.reduction.vehicle.decoding_loops import MOVING
+from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
+from vehiclemor.reduction.vehicle.linear_modes import SlowModes
+from vehiclemor.reduction.vehicle.reduced_vehicle import NOTHING_EXCITED, ReducedVehicle
+from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.simulation.run_timer import one_thread
+from vehiclemor.simulation.trajectory import Trajectory
+
+# Columns of which less than this share is left are sums of those chosen before.
+DEPENDENT = 1e-8
+# Errors that count the same: heading in rad, place in m, part of a slow coordinate's range.
+HEADING, PLACE, PART = 7.6e-5, 0.03, 0.02
+# The variational equations step over so many output times, runs are compared at every so many of
+# their steps.
+STRIDE, COMPARED = 2, 4
+# Where the slow coordinates have come to rest, to this part of their range, steps are longer.
+REST, LONG_STRIDE = 3e-4, 25
+DIFFERENCE = 1e-6
+# Least sum of squares that a weight is made of.
+NOTHING = 1e-12
+DAMPING = 1e-4
+MOST_DAMPING = 1e2
+# Time (s) after which a car has landed; modes that have decayed by then, to exp(-DECAYED), are
+# those of the linearised car.
+LANDED, DECAYED = 0.1, 4.0
+# Starts whose symmetric deviation is below this (in units of the states) are straight running.
+LANDING_STILL = 1e-6
+# Longest time (s) for which a run is looked at.
+LONGEST = 1.0
+# Time (s) that a run may spend where no training run has been.
+SHORTEST = 0.1
+# Parts of the sizes of the training runs' steering that a run's may have: few of them are as quick
+# as the quickest; its derivatives are as in these.
+KNOWN = np.array([[0.95, 1.0, 1.0], [0.75, 1.0, 1.0], [0.75, 1.0, 1.0]])
+# Part of the steered motion's own amplitudes that a start's transient may have beside it.
+BESIDE = 0.3
+# Histories of a trajectory.
+PATHS = ("times", "inputs", "coordinates", "speeds", "outputs")
+# Relative singular values of the starts' deviations below this are rounding.
+RANK = 1e-7
+# (indices of features, column) of the coefficients that may change.
+Free = Sequence[tuple[Sequence[int], int]]
+
+
+def ridge_fit(columns: np.ndarray, values: np.ndarray, weight: float) -> np.ndarray:
+    """Coefficients (terms, ...) of the fit of values (samples, ...) on columns (samples, terms).
+
+    Minimises the mean square error plus `weight` times the squares of the coefficients (ridge
+    regression: A. E. Hoerl, R. W. Kennard, Technometrics 12 (1970), 55-67).
+    """
+    normal = columns.T @ columns + weight * len(columns) * np.eye(columns.shape[1])
+    return np.linalg.solve(normal, columns.T @ values)
+
+
+def largest(values: np.ndarray) -> np.ndarray:
+    """Largest magnitude in each column (samples, n) -> (n,); 1 where a column is zero."""
+    found = np.abs(values).max(axis=0)
+    return np.where(found > 0.0, found, 1.0)
+
+
+def sizes(values: np.ndarray) -> np.ndarray:
+    """Root mean square of each column (samples, n) -> (n,); 1 where a column is zero."""
+    found = np.sqrt(np.mean(values**2, axis=0))
+    return np.where(found > 0.0, found, 1.0)
+
+
+def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more: int) -> list[int]:
+    """Indices of the columns that explain most, one after the other (orthogonal least squares).
+
+    S. Chen, S. A. Billings, W. Luo, Int. J. Control 50 (1989), 1873-1896.
+
+    The first `given` columns (samples, terms) are chosen already, `more` beside them; all values
+    (samples, targets) count the same, whatever their sizes.
+    """
+    columns = columns / sizes(columns)
+    normal, products = columns.T @ columns, columns.T @ (values / sizes(values))
+    least = DEPENDENT * len(columns)
+    chosen: list[int] = []
+    while len(chosen) < min(given + more, len(normal)):
+        if len(chosen) < given:
+            best = len(chosen)
+        else:
+            left = np.diag(normal)
+            gains = np.sum(products**2, axis=1) / np.maximum(left, least)
+            gains[(left <= least) | np.isin(np.arange(len(gains)), chosen)] = -1.0
+            best = int(np.argmax(gains))
+        chosen.append(best)
+        if normal[best, best] > least:
+            row = normal[best] / normal[best, best]
+            products = products - np.outer(row, products[best])
+            normal = normal - np.outer(row, normal[best])
+    return chosen
+
+
+@dataclass(frozen=True)
+class Target:
+    """One training run in reduced states (samples, states + 3), as a reduced run should be.
+
+    `steps` are indices of the output times that the variational equations step on.
+    """
+
+    run: TrainingRun
+    times: np.ndarray
+    inputs: np.ndarray
+    states: np.ndarray
+    steps: np.ndarray
+
+    @cached_property
+    def compared(self) -> np.ndarray:
+        """Indices of the output times at which runs are compared, the last one among them."""
+        return self.steps[(len(self.steps) - 1) % COMPARED :: COMPARED]
+
+    @cached_property
+    def shares(self) -> np.ndarray:
+        """Root of the part of the run's time that each of them stands for."""
+        widths = np.gradient(self.times[self.compared])
+        return np.sqrt(widths / widths.sum())
+
+
+def targets_of(
+    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory]
+) -> list[Target]:
+    """Training runs in reduced states."""
+    k, result = reduced.features.states - 1, []
+    for run, true in zip(training, runs, strict=True):
+        states = reduced.encoded_path(true.states, true.inputs)
+        z = states[:, : k + 1]
+        moved = np.abs(z[:, :k] - z[-1, :k]).max(axis=1)
+        restless = np.flatnonzero(moved > REST * moved.max())
+        last = len(z) - 1
+        rest = int(restless[-1]) if len(restless) else 0
+        steps = [*range(0, rest, STRIDE), *range(rest, last, LONG_STRIDE), last]
+        result.append(Target(run, true.times, true.inputs, states, np.array(steps)))
+    return result
+
+
+def improved(
+    reduced: ReducedVehicle, targets: Sequence[Target], free: Free, steps: int, power: float = 2.0
+) -> ReducedVehicle:
+    """The reduced vehicle after so many damped Gauss-Newton steps of its free coefficients.
+
+    The sum that is made small is of so high a power of the runs' errors.  With 1 the worst runs
+    count no more than the others (iteratively reweighted least squares): of use from a first guess
+    on, where the errors of some are too large to say much.
+    """
+    paths, error = _compared(reduced, targets, power)
+    terms = np.concatenate([some for some, _ in free])
+    targeted = np.repeat([column for _, column in free], [len(some) for some, _ in free])
+    change, moved, damping = np.zeros(len(terms)), reduced, DAMPING
+    for _ in range(steps):
+        if not np.isfinite(error):
+            break
+        normal, gradient = normal_equations(moved, targets, paths, free, power)
+        scale = np.sqrt(np.diag(normal))
+        # Of a feature that is zero in all samples.
+        scale[scale == 0.0] = 1.0
+        scaled = normal / np.outer(scale, scale)
+        while damping < MOST_DAMPING:
+            step = np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient / scale) / scale
+            coefficients = reduced.coefficients.copy()
+            coefficients[terms, targeted] += change - step
+            candidate = replace(reduced, coefficients=coefficients)
+            new, new_error = _compared(candidate, targets, power)
+            if new_error < error:
+                change, moved, paths, error = change - step, candidate, new, new_error
+                damping *= 0.1
+                break
+            damping *= 10.0
+    return moved
+
+
+def _compared(
+    reduced: ReducedVehicle, targets: Sequence[Target], power: float = 2.0
+) -> tuple[list[np.ndarray], float]:
+    """Reduced runs, and the sum of powers of their errors; infinite if one has failed."""
+    paths, total = [], 0.0
+    scale = _scale(targets)
+    for target in targets:
+        path = reduced.path(target.run.maneuver, target.run.start)
+        if path is None:
+            return [], np.inf
+        paths.append(path)
+        total += float(np.sum(_errors(target, path, scale) ** 2) ** (0.5 * power))
+    return paths, total
+
+
+def _scale(targets: Sequence[Target]) -> np.ndarray:
+    """Weights (states + 3,) of errors; the speed counts by the place."""
+    slow = targets[0].states.shape[1] - PLANAR - 1
+    ranges = np.max([np.abs(target.states[:, :slow]).max(axis=0) for target in targets], axis=0)
+    return np.concatenate([1.0 / (PART * ranges), [0.0, 1.0 / HEADING, 1.0 / PLACE, 1.0 / PLACE]])
+
+
+def _errors(target: Target, path: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Weighted errors (compared times, states + 3) of a reduced run."""
+    return (path - target.states)[target.compared] * scale * target.shares[:, None]
+
+
+def normal_equations(
+    reduced: ReducedVehicle,
+    targets: Sequence[Target],
+    paths: Sequence[np.ndarray],
+    free: Free,
+    power: float = 2.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Normal matrix and gradient of the sum of squares by the free coefficients."""
+    scale = _scale(targets)
+    size = sum(len(terms) for terms, _ in free)
+    normal, gradient = np.zeros((size, size)), np.zeros(size)
+    for target, path in zip(targets, paths, strict=True):
+        rows = _sensitivities(reduced, target, path, free, target.shares[:, None] * scale)
+        rows = rows.reshape(-1, size)
+        error = _errors(target, path, scale).ravel()
+        weight = max(error @ error, NOTHING) ** (0.5 * power - 1.0)
+        normal += weight * (rows.T @ rows)
+        gradient += weight * (rows.T @ error)
+    return normal, gradient
+
+
+def _sensitivities(
+    reduced: ReducedVehicle, target: Target, path: np.ndarray, free: Free, weights: np.ndarray
+) -> np.ndarray:
+    """Derivatives (compared times, states + 3, free coefficients) of a reduced run.
+
+    Those of each state at each time come times its weight (compared times, states + 3).
+    """
+    k, c = reduced.features.states, reduced.coefficients
+    steps = target.steps
+    path, inputs, times = path[steps], target.inputs[steps], target.times[steps]
+    z, samples = path[:, :k], len(times)
+    # One copy as it is, then one with each coordinate moved.
+    widths = DIFFERENCE * np.maximum(1.0, np.abs(z).max(axis=0))
+    shifts = np.vstack([np.zeros(k), np.diag(widths)])
+    moved = (z + shifts[:, None]).reshape(-1, k)
+    columns = feature_columns(
+        reduced.features, moved, np.tile(inputs, (k + 1, 1)), reduced.parameters
+    )
+    rates = (columns @ c).reshape(k + 1, samples, -1)
+    values, others = rates[0], rates[1:]
+    slopes = ((others - values) / widths[:, None, None]).transpose(1, 2, 0)
+    # (z', psi', U, V) turned into rates of the state.
+    dim, cosine, sine = k + PLANAR, np.cos(path[:, k]), np.sin(path[:, k])
+    turns = np.tile(np.eye(dim), (samples, 1, 1))
+    turns[:, -2:, -2:] = np.moveaxis(np.array([[cosine, -sine], [sine, cosine]]), -1, 0)
+    jacobian = np.zeros((samples, dim, dim))
+    jacobian[:, :, :k] = turns @ slopes
+    # Turning by a right angle is the derivative by the heading.
+    jacobian[:, -2:, k] = np.einsum("nij,nj->ni", turns[:, -2:, -2:], values[:, [-1, -2]] * [-1, 1])
+    half = 0.5 * np.diff(times)[:, None, None]
+    inverse = np.linalg.inv(np.eye(dim) - half * jacobian[1:])
+    advance = inverse @ (np.eye(dim) + half * jacobian[:-1])
+    now, before = half * inverse @ turns[1:], half * inverse @ turns[:-1]
+    targets = np.repeat([column for _, column in free], [len(some) for some, _ in free])
+    driven = columns[:samples, None, np.concatenate([some for some, _ in free])]
+    forcing = np.take(now, targets, axis=2) * driven[1:]
+    forcing += np.take(before, targets, axis=2) * driven[:-1]
+    result = np.zeros((samples, dim, len(targets)))
+    decoding_loops()["recurrence"](advance, forcing, result)
+    return weights[:, :, None] * result[(samples - 1) % COMPARED :: COMPARED]
+
+
+def after_transient(transient: Transient, shape: VehicleShape, run: Trajectory) -> Trajectory:
+    """A run without what its car does in the air; the same if it starts on the ground."""
+    deviation = shape.of(run.states[:1])[0] - shape.reference
+    if np.abs(transient.left @ deviation).max(initial=0.0) < LANDING_STILL:
+        return run
+    later = run.times > 2.0 * LANDED
+    return replace(run, **{name: getattr(run, name)[later] for name in PATHS})
+
+
+def with_transients(
+    reduced: ReducedVehicle, modes: SlowModes, runs: Sequence[Trajectory]
+) -> ReducedVehicle:
+    """The reduced vehicle with the transients and coordinates of runs before they are steered."""
+    from scipy.linalg import block_diag, expm
+
+    transient, shape, k = reduced.transient, reduced.shape, modes.lateral
+    slow = np.abs(np.real(transient.rates)) * LANDED < DECAYED
+    # What is seen of a deviation, and how it moves; the speed, which is last, does not.
+    seeing = np.vstack([transient.left[slow], reduced.encoding[k:]])
+    rates = block_diag(np.diag(transient.rates[slow]), modes.rates[k:, k:], 0.0)
+    # Another speed excites nothing.
+    starts, changes = [modes.speed_right], [np.zeros(len(seeing), dtype=complex)]
+    for run in runs:
+        steered = run.times[run.inputs.any(axis=1)]
+        still = (run.times >= LANDED) & (run.times < np.append(steered, LONGEST)[0])
+        if not still.any():
+            continue
+        start = shape.of(run.states[:1])[0] - shape.reference
+        seen = (shape.of(run.states[still]) - shape.reference) @ seeing.T
+        # The library of SciPy is loaded only now.
+        with one_thread():
+            moves = np.vstack([expm(rates * time) for time in run.times[still]])
+        starts.append(start)
+        changes.append(np.linalg.lstsq(moves, seen.ravel())[0] - seeing @ start)
+    change = (np.linalg.pinv(np.array(starts), rcond=RANK) @ np.array(changes)).T
+    left, encoding = transient.left.copy(), reduced.encoding.copy()
+    left[slow] += change[: slow.sum()]
+    encoding[k:] += change[slow.sum() :].real
+    return replace(reduced, transient=replace(transient, left=left), encoding=encoding)
+
+
+def training_reach(
+    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory]
+) -> TrainingReach:
+    """What the training runs have shown, as the reduced vehicle sees them."""
+    shape, features, transient = reduced.shape, reduced.features, reduced.transient
+    lateral = features.lateral
+    lasted, sideways, decaying, left, starts = [], [MOVING], [], [], []
+    maneuvers = [given.maneuver for given in training]
+    faded, amplitudes = [], []
+    for given, run in zip(training, runs, strict=True):
+        path = reduced.path(given.maneuver, given.start)
+        if path is None:
+            return NOTHING_KNOWN
+        sizes = reduced.decoder.states(run.times, path, run.inputs, NOTHING_EXCITED)[0]
+        sizes = np.abs(sizes[:, shape.layout.size :])[:, :lateral]
+        lasted.append(durations(run.times, sizes)[-1])
+        sideways.append(float(sizes[0].max(initial=0.0)))
+        excited = reduced.excited(run.states[0])
+        at = run.times[(sizes > MOVING).any(axis=1)]
+        if excited.size and len(at):
+            faded.append(float(at[0]))
+            amplitudes.append(np.hypot(*excited[1].T))
+        later = after_transient(transient, shape, run)
+        moving = (sizes[-len(later.times) :] > MOVING).any(axis=1)
+        deviations = shape.of(later.states) - shape.reference
+        decaying.append(np.abs(deviations[moving] @ transient.left.T).max(axis=0, initial=0.0))
+        left.append(np.abs(reduced.remainder(later.states, later.inputs)).max(axis=0))
+        starts.append(reduced.remainder(run.states[:1], run.inputs[:1], excited)[0])
+    leaves, steered = np.max(left, axis=0), np.max(decaying, axis=0)
+    # Directions in which starts leave more than runs do.
+    _, factors, directions = np.linalg.svd(starts / leaves, full_matrices=False)
+    directions = directions[factors > UNLIKE]
+    lasted, longest = np.max(lasted, axis=0), max(run.times[-1] for run in runs)
+    # A little may last as long as any run does, and no longer.
+    lasted[:lateral, 0], lasted[lateral:, 0] = longest, longest**2
+    amplitudes = np.max(amplitudes or [np.zeros_like(steered)], axis=0)
+    return TrainingReach(
+        LONGER * np.maximum(lasted, SHORTEST),
+        max(sideways),
+        BESIDE * np.maximum(steered, ROUNDING * steered.max(initial=1.0)),
+        min(faded, default=0.0) / LONGER,
+        np.maximum(amplitudes, ROUNDING * amplitudes.max(initial=0.0)),
+        leaves,
+        directions,
+        np.abs(starts / leaves @ directions.T).max(axis=0),
+        KNOWN[:, : len(shape.model.inputs)] * largest_inputs(maneuvers),
+    )

@@ -1,0 +1,132 @@
+"""What runs cost: methods of a protocol by error and time, and the times over the model's size."""
+
+import json
+import textwrap
+from itertools import cycle
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.figure import Figure
+
+from vehiclemor.report.figures import theme
+from vehiclemor.report.figures.theme import Style
+from vehiclemor.report.sizes import KINDS, growth, size_rows
+from vehiclemor.report.unseen import method_rows, protocol_of
+from vehiclemor.study.plans.protocol import FULL_ORDER
+from vehiclemor.study.plans.size import FULL
+
+# Letters of a title in a line.
+TITLE = 60
+# Full-order integrators: of twelve no two look alike.
+GREYS: list[Style] = [
+    {"color": color, "linestyle": line, "marker": marker, "markersize": 4, "linewidth": 0.8}
+    for line, marker in (("-", "o"), ("--", "*"), (":", "X"))
+    for color in ("#000000", "#777777", "#AAAAAA", "#444444")
+]
+# Of meshes of one kind; and places of names beside marks, in points.
+LOOKS: tuple[Style, ...] = (
+    {"color": "#0072B2", "marker": "o"},
+    {"color": "#D55E00", "marker": "s"},
+    {"color": "#CC79A7", "marker": "^"},
+)
+OFFSETS = (4, 4), (-16, -13), (4, -17)
+VEHICLES = {"double_wishbone": "suspension", "independent_suspension_vehicle": "14-DOF"}
+VEHICLES |= {"high_fidelity_vehicle": "high-fidelity"}
+
+
+def figure_pareto(dataset: xr.Dataset) -> Figure:
+    """Score (worst error over its bound) over the mean time of a whole call, one model.
+
+    Each full-order integrator is a line through its tolerances; a cross below the upper edge is a
+    reduced model of which a run has failed.  Bars: between the quartiles of the rounds.
+    """
+    rows: Any = pd.DataFrame(method_rows(dataset, protocol_of(dataset)))
+    rows["time"] = 1e6 * rows["seconds"]
+    rows["bar"] = 0.5 * rows["spread"] * rows["time"]
+    rows["tolerance"] = [json.loads(text).get("tolerance", 0.0) for text in rows["settings"]]
+    known = rows[np.isfinite(rows["score"]) & (rows["score"] > 0.0)]
+    top = 10.0 ** np.ceil(np.log10(max([1.0, *known["score"]])) + 0.5)
+    figure, axes = theme.panels(1, 1, (6.7, 4.2))
+    axis = axes[0, 0]
+    full = known[known["role"] == FULL_ORDER].sort_values("tolerance")
+    for (name, line), look in zip(full.groupby("series", sort=False), cycle(GREYS)):
+        bars: Style = {"xerr": line["bar"], "elinewidth": 0.8, "capsize": 1.5, **look}
+        label = f"full order, {str(name).removeprefix('full order')}".removesuffix(", ")
+        axis.errorbar(line["time"], line["score"], label=label, **bars)
+    for score in rows["score"][rows["method"] == "replay"]:
+        axis.axhline(score, color="#666666", linestyle=":", label="replay (no time)")
+    reduced = rows[(rows["role"] != FULL_ORDER) & (rows["method"] != "replay")]
+    looks = zip(cycle(theme.COLORS), cycle(theme.MARKERS))
+    for row in reduced[np.isfinite(reduced["time"])].itertuples():
+        color, marker = next(looks)
+        failed = not np.isfinite(row.score)
+        # Hollow, so that one shows through the other.
+        look = {"color": color, "marker": "x" if failed else marker, "linestyle": "none"}
+        look |= {"markersize": 11, "markeredgewidth": 2.4} if row.winner else {"markersize": 7}
+        look |= {"xerr": row.bar, "elinewidth": 1.0, "capsize": 2, "markerfacecolor": "none"}
+        label = f"{row.label}{' (fails)' * failed}{' (chosen)' * bool(row.winner)}"
+        axis.errorbar(row.time, top / 1.5 if failed else row.score, label=label, **look)
+    axis.axhline(1.0, **theme.THIN)
+    axis.text(0.99, 1.08, "bounds", fontsize=7, ha="right", transform=axis.get_yaxis_transform())
+    axis.set_yscale("log")
+    axis.set_xscale("log")
+    axis.set_ylim(0.5 * min([1.0, *known["score"]]), top)
+    axis.set_xlabel("mean CPU time of a whole call, all outputs delivered, in µs")
+    axis.set_ylabel("worst error / bound, judged runs")
+    theme.tick_decades(axis.xaxis, *axis.get_xlim())
+    # Of what is chosen the mark is larger than a line of the legend.
+    figure.legend(loc="outside right upper", fontsize=7, markerscale=0.7)
+    # The legend stands beside the axes, whose title can't be wrapped by itself.
+    axis.set_title(textwrap.fill(str(dataset.attrs["title"]), TITLE))
+    return figure
+
+
+def figure_size(dataset: xr.Dataset) -> Figure:
+    """CPU time of a whole run over the number of coordinates, and how many times reduction gains.
+
+    The three models of the paper stand beside the truck.  Hollow marks: the reduced model, the
+    first of the study.
+    """
+    figure, axes = theme.panels(1, 2, (7.2, 3.6))
+    left, right = axes[0]
+    n, kinds = dataset["coordinates_of_mesh"].values, dataset["kind"].values
+    full = dataset["seconds_median"].sel(label=FULL).values
+    name = str(dataset["label"].values[1])
+    reduced = dataset["seconds_median"].sel(label=name).values
+    meshes = [kind for kind in dict.fromkeys(kinds.tolist()) if kind != "vehicle"]
+    for kind, look in zip(meshes, LOOKS, strict=False):
+        own, word = kinds == kind, KINDS.get(kind, (kind, ""))[0]
+        slope = f"{word}, full: n^{growth(dataset, kind, FULL):.1f}"
+        left.plot(n[own], full[own], label=slope, **look)
+        hollow: Style = look | {"markerfacecolor": "none", "linestyle": "--"}
+        left.plot(n[own], reduced[own], label=f"{word}, {name}", **hollow)
+        right.plot(n[own], full[own] / reduced[own], label=f"{word}, the same mesh", **look)
+    cars = kinds == "vehicle"
+    black: Style = {"color": "black", "linestyle": "none", "marker": "D", "markersize": 4}
+    left.plot(n[cars], full[cars], label="the paper's models, full", **black)
+    left.plot(n[cars], reduced[cars], markerfacecolor="none", label="reduced", **black)
+    right.plot(n[cars], full[cars] / reduced[cars], label="the paper's models", **black)
+    for car, place in zip(dataset["mesh"].values[cars], np.flatnonzero(cars), strict=True):
+        at = n[place], full[place] / reduced[place]
+        text = VEHICLES.get(str(car), str(car))
+        # So that neither marks nor the line of no gain cross a name.
+        beside = OFFSETS[sum(n[cars] < n[place]) % len(OFFSETS)]
+        right.annotate(text, at, beside, textcoords="offset points", fontsize=7)
+    rivals = [row for row in size_rows(dataset) if row["label"] == name]
+    for group, marker in (("motion", "x"), ("strain", "+")):
+        at = [(row["coordinates"], row[f"gain_{group}"]) for row in rivals]
+        style: Style = {"linestyle": "none", "marker": marker, "color": "#009E73"}
+        label = f"cheapest mesh of equal error, {group}"
+        right.plot(*zip(*at, strict=True), label=label, markersize=7, **style)
+    right.axhline(1.0, **theme.THIN)
+    right.set_ylim(0.5, 2.0 * float(np.nanmax(full / reduced)))
+    for axis in (left, right):
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        axis.set_xlabel("coordinates of the full model")
+        axis.legend(fontsize=6.5)
+    left.set_title("(a) CPU time of a whole run in s", loc="left")
+    right.set_title("(b) times that the reduced model is faster", loc="left")
+    return figure

@@ -1,0 +1,196 @@
+"""What a study file runs: axes and samples of a grid, groups and boxes of a test, meshes."""
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
+
+from vehiclemor.reduction.training import SPEED
+from vehiclemor.toml_files import FileSchema
+
+FACTORS = ("frequency_factor", "amplitude_factor")
+# Axes that say what is run and what is trained on; and how the name of a parameter's begins.
+TEXTS = ("maneuver", "start", "training")
+PARAMETER = "parameters."
+# A grid of more points than this is a mistake in a file, not a study.
+MOST_POINTS = 1_000_000
+# Decimals of sampled factors, speeds and parameters: what a table prints is what was run.
+DECIMALS = 3
+
+
+def _ordered(limits: list[Any]) -> list[Any]:
+    if not (math.isfinite(limits[0]) and limits[0] <= limits[1] < math.inf):
+        raise ValueError("a range is [from, to] with finite numbers in order")
+    return limits
+
+
+def _printable(limits: list[float]) -> list[float]:
+    if any(round(limit, DECIMALS) != limit for limit in limits):
+        raise ValueError(f"values are drawn with {DECIMALS} decimals: from and to have no more")
+    return limits
+
+
+def without_speed(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Parameters of scenarios; `ValueError` if the speed is among them, which has its own key."""
+    if SPEED in parameters:
+        raise ValueError(f"{SPEED} is not given as a parameter, but by speed = [...]")
+    return parameters
+
+
+Range = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
+# Of members of a family.
+Number = Annotated[int, Field(ge=0, le=10**15)]
+Numbers = Annotated[list[Number], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
+# Of parameters by name.
+Printable = Annotated[Range, AfterValidator(_printable)]
+Drawn = Annotated[dict[str, Printable], AfterValidator(without_speed)]
+Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+def list_of(description: str) -> Any:
+    """Field with a list, empty by default."""
+    return Field(default_factory=list, description=description)
+
+
+def table_of(description: str) -> Any:
+    """Field with a table, empty by default."""
+    return Field(default_factory=dict, description=description)
+
+
+class Span(FileSchema):
+    """Equidistant values, both ends included."""
+
+    first: float = Field(allow_inf_nan=False)
+    last: float = Field(allow_inf_nan=False)
+    count: int = Field(ge=1, le=10_000)
+
+
+# By its form, so that what is wrong with one is not read as the other.
+Axis = Annotated[
+    Annotated[list[int | float | str], Tag("values")] | Annotated[Span, Tag("span")],
+    Discriminator(lambda value: "span" if isinstance(value, Span | dict) else "values"),
+]
+
+
+class Sampling(FileSchema):
+    """Points spread over ranges, in place of every combination of some values."""
+
+    plan: Literal["latin_hypercube", "sobol"] = Field(description="how points are spread")
+    count: int = Field(ge=1, le=MOST_POINTS, description="how many; of sobol a power of two")
+    seed: int = Field(ge=0, description="the same seed gives the same points")
+    ranges: dict[str, list[float]] = Field(
+        description="[from, to] of parameters.NAME, frequency_factor or amplitude_factor"
+    )
+
+    @model_validator(mode="after")
+    def _sound(self) -> "Sampling":
+        if not self.ranges:
+            raise ValueError("ranges is empty")
+        for name, limits in self.ranges.items():
+            # Of a range that overflows no point could be taken.
+            if len(limits) != 2 or not 0.0 < limits[1] - limits[0] < math.inf:
+                raise ValueError(f"ranges: {name} is not [from, to]")
+            if name not in FACTORS and not name.startswith(PARAMETER):
+                raise ValueError(f"ranges: {name} is neither parameters.NAME nor a factor")
+        if self.plan == "sobol" and self.count & (self.count - 1):
+            raise ValueError(f"count: {self.count} is no power of two, as a sobol plan needs it")
+        return self
+
+
+def values(entry: Axis) -> list[int | float | str]:
+    """Values of one grid entry."""
+    if isinstance(entry, Span):
+        # Rounded, so that 1.1 is 1.1 and a grid holds the nominal point exactly.
+        return [round(float(v), 12) for v in np.linspace(entry.first, entry.last, entry.count)]
+    return list(entry)
+
+
+class Group(FileSchema):
+    """Scenarios of one maneuver: every point, from every start.
+
+    Points are rows (frequency, amplitude) or (frequency, amplitude, speed); without them they are
+    all combinations of the three lists.
+    """
+
+    maneuver: str = Field(description="registered name")
+    start: list[str] = list_of("initial conditions; the model's first by default")
+    points: list[list[float]] = list_of("[frequency, amplitude] or [frequency, amplitude, speed]")
+    frequency: list[float] = list_of("factors, 1 by default")
+    amplitude: list[float] = list_of("factors, 1 by default")
+    speed: list[float] = list_of("m/s, the model's own by default")
+    parameters: Annotated[dict[str, list[float]], AfterValidator(without_speed)] = table_of(
+        "parameter -> values in SI units, to combine with all else; the model's own by default"
+    )
+
+    @property
+    def scenarios(self) -> int:
+        """How many scenarios it is."""
+        lists = (self.frequency, self.amplitude, self.speed)
+        points = len(self.points) or math.prod(len(entry) or 1 for entry in lists)
+        samples = math.prod(len(entry) for entry in self.parameters.values())
+        return points * samples * (len(self.start) or 1)
+
+    @model_validator(mode="after")
+    def _either(self) -> "Group":
+        for name in self.model_fields_set - {"maneuver"}:
+            if not getattr(self, name):
+                raise ValueError(f"{name} is empty")
+        for name, values in self.parameters.items():
+            if not values or not all(map(math.isfinite, values)):
+                raise ValueError(f"parameters: {name} is not a list of finite numbers")
+        if self.points and (self.frequency or self.amplitude or self.speed):
+            raise ValueError("give points or lists of factors, not both")
+        if any(len(point) not in (2, 3) for point in self.points):
+            raise ValueError("a point is [frequency, amplitude] or [frequency, amplitude, speed]")
+        return self
+
+
+class Box(FileSchema):
+    """Runs of one maneuver, its numbers uniformly distributed in ranges [from, to]."""
+
+    maneuver: str = Field(description="registered name")
+    share: Limit = Field(1.0, description="of the runs, against the other boxes' shares")
+    frequency: Range = Field([1.0, 1.0], description="factors, from and to")
+    amplitude: Range = Field([1.0, 1.0], description="factors, from and to")
+    both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
+    speed: Range | None = Field(None, description="m/s, the model's own by default")
+    start: list[str] = list_of("initial conditions, equally likely; the model's first")
+    members: Numbers | None = Field(
+        None, description="of a family: numbers of its members, from and to; MANEUVER:NUMBER is run"
+    )
+    parameters: Drawn = table_of("parameter -> [from, to] in SI units; the model's own by default")
+
+    @field_validator("frequency")
+    @classmethod
+    def _positive(cls, value: list[float]) -> list[float]:
+        if value[0] <= 0.0:
+            raise ValueError("frequency factors are positive")
+        return value
+
+
+class Draw(FileSchema):
+    """Runs sampled from boxes."""
+
+    runs: int = Field(ge=1, le=100_000, description="how many")
+    boxes: list[Box] = Field(min_length=1, description="what they are sampled from")
+
+
+class Size(FileSchema):
+    """Meshes of a structure, over which full and reduced runs are timed; see `plans/size.py`."""
+
+    meshes: list[Annotated[dict[str, float], Field(min_length=1)]] = Field(
+        min_length=1, description="parameters of each mesh, the finest last: what is refined first"
+    )
+    frequency: float = Field(1.0, gt=0.0, description="factor of the maneuver")
+    amplitude: float = Field(1.0, description="factor of the maneuver")
+    step: float = Field(1e-3, ge=1e-6, le=0.1, description="s, the same of all runs")
+    whole: int = Field(1000, description="coordinates up to which full order is timed over the run")
+    window: float = Field(1.0, ge=0.1, description="s of the run, over which it is timed beyond")
+    up_to: dict[str, int] = Field(
+        default_factory=dict,
+        description="label -> coordinates of the largest mesh that it is made of",
+    )
+    beside: list[str] = Field(
+        default_factory=list, description="models whose shipped reduced models are timed beside"
+    )
