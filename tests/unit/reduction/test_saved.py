@@ -221,7 +221,6 @@ def test_what_cant_be_written_is_named_and_leaves_no_file(wrong, what, car, tmp_
         other.save(tmp_path / "car.nc")
     start = f"linear_single_track of {CAR}: it can't be saved: reduced.{what} is "
     assert str(error.value).startswith(start)
-    assert "\n" not in str(error.value)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -425,7 +424,16 @@ def alone(kind):
 
 # Operations 0, 1 and 2 of the bicycle are reduced coordinates, the last one multiplies.
 OPERATIONS = [
-    *("kinds=a+99", "kinds=a[None]", "arguments=a+99", "arguments=1.0*a", "numbers=a[:-1]"),
+    *(
+        "kinds=a+99",
+        "kinds=-1-a",
+        "kinds=1.0*a",
+        "kinds=a[None]",
+        "numbers=a.astype(int)",
+        "arguments=a+99",
+        "arguments=1.0*a",
+        "numbers=a[:-1]",
+    ),
     # What they were not given, and what is not there yet.
     *(row(0, *entry) for entry in ((0, 9, 0), (1, 9, 0), (2, 99999, 0), (3, 0, 0))),
     row("len(a)+1", 0, 9999, 0),

@@ -43,18 +43,6 @@ def numbers(run: Trajectory) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_later_run_leaves_an_earlier_one_alone(name):
-    calls = runs(name)
-    first = [call() for call in calls]
-    kept = [numbers(run).copy() for run in first]
-    again = [call() for call in reversed(calls)][::-1]
-    for run, repeated, known in zip(first, again, kept, strict=True):
-        np.testing.assert_array_equal(numbers(run), known)
-        np.testing.assert_array_equal(numbers(repeated), known)
-        assert repeated.counts == run.counts
-
-
-@pytest.mark.parametrize("name", CASES)
 def test_threads_do_not_share_what_they_write(name):
     calls = runs(name)
     known = [numbers(call()) for call in calls]
