@@ -119,7 +119,11 @@ def refusal(path):
 def refused_untouched(path):
     """Why a file is refused of which nothing is compiled, run or left in its folder."""
     before = [*path.parent.iterdir()]
-    places = "codegen.kernels.fetched", "codegen.loops.fetched", "reduction.model_file.response"
+    places = (
+        "codegen.kernels.MachineCode",
+        "codegen.loops.MachineCode",
+        "reduction.model_file.response",
+    )
     with ExitStack() as stack:
         stack.enter_context(chdir(path.parent))
         mocks = [stack.enter_context(mock.patch(f"vehiclemor.{place}")) for place in places]

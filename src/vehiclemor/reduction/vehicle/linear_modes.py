@@ -102,9 +102,7 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
 def eigenmodes(a: np.ndarray) -> tuple[Any, Any, Any]:
     """Eigenvalues (n,), left eigenvectors by rows (n, n), and the inverse of these."""
     values, vectors = np.linalg.eig(a.T)
-    # Signs and phases are free, and processors find others: one component becomes positive.
-    along = vectors.T @ np.cos(np.arange(len(a)))
-    left = (vectors * (np.abs(along) / along)).T
+    left = vectors.T
     return values, left, np.linalg.inv(left)
 
 
