@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import math
+import os
 import subprocess
 import sys
 from contextlib import ExitStack, chdir
@@ -502,6 +503,14 @@ def test_a_shipped_model_is_what_a_fit_gives(name):
     if other or name == "double_wishbone":
         made = reduced_models.fitted(choice)
         assert reduced_models.difference(choice, vm.rom(name), made) <= reduced_models.SAME, mend
+
+
+@pytest.mark.parametrize("processor", ["Prescott", "SkylakeX"])
+def test_shipped_models_can_be_read_on_other_processors(processor):
+    # OpenBLAS then computes as there; other libraries of linear algebra ignore this.
+    environment = os.environ | {"OPENBLAS_CORETYPE": processor}
+    read = f"import vehiclemor as vm; [vm.rom(name) for name in {SHIPPED}]"
+    subprocess.run([sys.executable, "-c", read], env=environment, check=True)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
