@@ -32,8 +32,9 @@ from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.scenario import Scenario, parameters_of, start_of
 
 COMMAND = "python paper/reduced_models.py"
-# Largest difference of two fits, in bounds.  Rounding differs by processor, and fits amplify it.
-SAME = 0.1
+# Largest difference of two fits, in bounds.  Fits amplify rounding, which differs between
+# processors and libraries of linear algebra: 0.25 is the most that was seen.
+SAME = 0.5
 # Validation runs by which fits are compared.
 COMPARED = 3
 

@@ -14,6 +14,7 @@ import pytest
 
 from tests.plugin.installation import installed
 from vehiclemor.cli import main
+from vehiclemor.exceptions import VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -67,6 +68,20 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
             return "report" if nodeid.startswith("tests/report/") else nodeid.partition("::")[0]
 
     return ByFile(config, log)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _every_error_is_one_line() -> Iterator[None]:
+    """Errors that the package raises in any test are one line, which no test checks itself."""
+    plain = VehiclemorError.__init__
+
+    def checked(self: VehiclemorError, *given: object) -> None:
+        plain(self, *given)
+        assert "\n" not in str(self)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(VehiclemorError, "__init__", checked)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -50,9 +50,14 @@ def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None
     """
     whole = path.absolute()
     temporary = temporary_path((folder or whole.parent) / whole.name)
+    old = temporary.with_name(f"{temporary.name}.old")
     try:
         write(temporary)
+        if whole.is_dir():
+            # Nothing moves onto a folder: the old one is kept until the new one is there.
+            os.replace(path, old)
         os.replace(temporary, path)
+        shutil.rmtree(old, ignore_errors=True)
     except OSError as error:
         raise not_written(path, error) from None
     finally:

@@ -49,7 +49,9 @@ def test_newton_steps_solve_with_the_jacobian(any_model):
     for _ in range(3):
         q = any_model.design + rng.normal(0.0, 0.05, len(any_model.coordinates))
         dense = np.linalg.solve(any_model.jacobian(q, u), any_model.residual(q, u))
-        np.testing.assert_allclose(any_model.newton_step(q, u), dense, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(
+            any_model.evaluated("newton_step", q, u), dense, rtol=0, atol=1e-11
+        )
 
 
 def test_building_again_gives_the_same_kernels_whose_operations_are_counted(any_model):

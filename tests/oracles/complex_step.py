@@ -6,12 +6,13 @@ The imaginary part of F(x + i h v) / h is F's derivative along v, exact to round
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from vehiclemor.codegen.operations import Kernel
-from vehiclemor.codegen.vector_lanes import padded
+from vehiclemor.exporting import straight_line
 
 TINY = 1e-30
 
@@ -30,64 +31,31 @@ def _compared(compare: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
 
 
 NAMED = {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}
-PLAIN = ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh")
+ORDERS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    **{name: getattr(np, NAMED.get(name, name)) for name in PLAIN},
-    "add": operator.add,
-    "subtract": operator.sub,
-    "multiply": operator.mul,
-    "divide": operator.truediv,
-    "power": operator.pow,
-    "negate": operator.neg,
+    **{n: getattr(np, NAMED.get(n, n)) for n in straight_line.FUNCTIONS if hasattr(np, n)},
+    **{name: getattr(np, numpys) for name, numpys in NAMED.items()},
+    **{sign: _compared(compare) for sign, compare in ORDERS.items()},
     "abs": lambda x: np.where(np.real(x) >= 0.0, x, -x),
     "atan2": _atan2,
     "select": np.where,
-    "<": _compared(operator.lt),
-    "<=": _compared(operator.le),
-    ">": _compared(operator.gt),
-    ">=": _compared(operator.ge),
-    "==": _compared(operator.eq),
-    "!=": _compared(operator.ne),
-    "sincos": lambda x: [np.sin(x), np.cos(x)],
 }
+
+
+@lru_cache
+def _lines(kernel: Kernel) -> straight_line.StraightLine:
+    """A kernel without batches and sums."""
+    lines = straight_line.Lines()
+    given = {
+        n: lines.entries(n, size) for n, size in zip(kernel.arguments, kernel.sizes, strict=True)
+    }
+    found = lines.include(kernel, given)
+    return straight_line.StraightLine(lines.operations, [value.number for value in found])
 
 
 def results(kernel: Kernel, arrays: Mapping[str, Sequence[Any]]) -> list[Any]:
     """Results of a kernel, row by row; entries of its arguments may be arrays."""
-    values: list[Any] = []
-    stored = {}
-    for kind, arguments, detail in kernel.operations:
-        given = [values[number] for number in arguments]
-        match kind:
-            case "number":
-                found: Any = np.float64(detail)
-            case "entry":
-                found = arrays[detail[0]][detail[1]]
-            case "store":
-                found = stored[detail] = given[0]
-            case "part":
-                found = given[0][detail]
-            case "sums":
-                array, first, targets = detail
-                rows = np.array(arrays[array][first : first + len(given) * padded(targets)])
-                rows = rows.reshape(len(given), padded(targets), *rows.shape[1:])
-                found = [
-                    sum(w * f for w, f in zip(rows[:, k], given, strict=True))
-                    for k in range(targets)
-                ]
-            case "batch" if detail == "sincos":
-                found = [f(value) for f in (np.sin, np.cos) for value in given]
-            case "batch":
-                found = [np.arctan(value) for value in given]
-            case _:
-                found = FUNCTIONS[kind](*given)
-        values.append(found)
-    return [stored[place] for place in sorted(stored)]
-
-
-def value(kernel: Kernel, *arrays: np.ndarray) -> np.ndarray:
-    """Results of a kernel at its arguments, the result excepted."""
-    return np.array(results(kernel, dict(zip(kernel.arguments, arrays, strict=False))))
+    return straight_line.evaluated(_lines(kernel), arrays, FUNCTIONS)
 
 
 def derivative_along(

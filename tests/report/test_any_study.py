@@ -187,7 +187,6 @@ def test_figures_of_a_study_and_a_protocol(place, capsys):
     assert "figures --only" in capsys.readouterr().err
 
 
-pytestmark = pytest.mark.usefixtures("plug_in_package")
 CAR = "quarter_car"
 METHODS = {"full_order", "full_order_strongest", "replay", "pod", "pod_literal", "fixed_basis"}
 

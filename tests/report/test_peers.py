@@ -47,28 +47,6 @@ def test_a_peer_that_is_faster_stands_first_and_is_said_so():
     assert rows[0][1] == "400 us"
 
 
-def test_the_summary_names_the_faster_first():
-    text = report.summary(
-        {"slower": case(ours=1e-3, peer=4e-4), "faster": case(ours=1e-3, peer=2e-3)}
-    )
-    slower, faster = text.splitlines()[-2:]
-    assert slower.index("peer 400 us") < slower.index("ours 1.00 ms") < slower.index("FASTER")
-    assert faster.index("ours 1.00 ms") < faster.index("peer 2.00 ms")
-
-
-def test_where_ours_do_not_reach_the_error_the_peer_is_first():
-    unreached = case(ours=1e-3, peer=2e-3)
-    unreached["curves"]["ours"]["points"] = points((1e-3, 1e-2, 1e-3))
-    assert report.rows(unreached, 1e-3, "states")[0][3] == "OURS DO NOT REACH IT"
-    assert report.summary({"car": unreached}).splitlines()[-1].count("DO NOT REACH") == 1
-
-
-def test_who_does_not_reach_the_error_and_who_is_missing_are_rows():
-    text = report.case_text(case(ours=1e-3, peer=1e-3) | {"targets": [1e-5]})
-    assert text.count("not reached") == 2
-    assert "| other        | not installed (No module) |" in text
-
-
 def test_a_missing_peer_is_a_row_and_one_that_fails_too(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "failing_peer.py").write_text("def run(case):\n    raise ValueError('no')\n")

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,13 +12,13 @@ from scipy.io import mmread
 
 import vehiclemor as vm
 from tests.study.small import small_study
-from tests.texts.markdown import ROOT
 from vehiclemor.cli import main
 from vehiclemor.report.published import fixed_test_sets
 from vehiclemor.study import timing
 from vehiclemor.study.dataset import digest_of
 from vehiclemor.study.plans.protocol import load_protocol, protocol_names, sampled_sets
 
+OUTSIDE = Path(__file__).parents[2] / "examples" / "outside_method.py"
 BOUNDED = ("spindle_y", "second_euler_angle")
 CAR = """
 bounds.yaw = { measure = "rms", bound = 1e-4 }
@@ -118,7 +119,7 @@ def test_wrong_predictions_are_refused_in_one_line(truth, change, words, capsys)
 
 
 def test_a_method_of_another_program_competes(truth, capsys):
-    command = [sys.executable, str(ROOT / "examples" / "outside_method.py"), "data", "out.nc"]
+    command = [sys.executable, str(OUTSIDE), "data", "out.nc"]
     subprocess.run(command, check=True)
     assert main(["judge", "out.nc", "--dataset", "data", "--results", ".", "--json"]) == 0
     row, other, *_ = json.loads(capsys.readouterr().out)

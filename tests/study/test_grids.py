@@ -5,7 +5,6 @@ import pytest
 
 import vehiclemor as vm
 from tests.study.small import small_study
-from vehiclemor.exceptions import FileError
 from vehiclemor.study.plans.grid import expand, sampled
 from vehiclemor.study.plans.loading import load_studies, write_study
 from vehiclemor.study.plans.results import flattened
@@ -98,38 +97,3 @@ def test_a_study_that_is_written_is_the_same_again(tmp_path, protocol_text):
     for definition in (study for name in names for study in load_studies(name).values()):
         path = write_study(definition, tmp_path / "b.toml")
         assert read_toml(path, StudyFile) == definition
-
-
-# What can't be
-
-MASSES = '{ "parameters.sprung_mass" = [1e3, 1e5] }'
-SAMPLES = f'{{ plan = "sobol", count = 2, seed = 1, ranges = {MASSES} }}'
-TWICE = 'grid = { start = ["equilibrium"] }\nstart = ["equilibrium"]'
-LARGE = """[grid]
-frequency_factor = { first = 0.7, last = 1.3, count = 600 }
-amplitude_factor = { first = 0.5, last = 0.9, count = 60 }
-"""
-
-
-@pytest.mark.parametrize(
-    ("model", "text", "words"),
-    [
-        (WISHBONE, 'grid = { "parameters.tie_rod_iner.z" = [0.1] }', "tie_rod_inner"),
-        (WISHBONE, 'grid = { "parameters.tie_rod_inner" = [0.1] }', "tie_rod_inner"),
-        (WISHBONE, 'grid = { "parameters.tie_rod_inner.z" = [-90.0] }', "millimetres"),
-        (WISHBONE, 'grid = { training = ["mached"] }', "matched"),
-        (WISHBONE, TWICE, "start is set twice"),
-        (WISHBONE, 'start = ["equilibrium", "equilibrium"]', "start"),
-        (WISHBONE, LARGE, "GB"),
-        (CAR, 'grid = { maneuver = ["lane_change", "step_steer"] }', "metrics"),
-        (CAR, f"grid = {MASSES}", "sprung_mass = 100000"),
-        (CAR, f"sampling = {SAMPLES}", "sprung_mass = "),
-    ],
-)
-def test_what_can_not_be_run_is_told_before_the_first_cell(tmp_path, model, text, words):
-    methods = () if "methods" in text else ("full_order",)
-    path = small_study(tmp_path, f"{text}\n", *methods, model=model)
-    with pytest.raises(FileError, match=words) as error:
-        vm.run_study(path, results=tmp_path / "results")
-    assert "\n" not in str(error.value)
-    assert not (tmp_path / "results").exists()

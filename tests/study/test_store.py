@@ -141,9 +141,8 @@ def test_a_combined_dataset_with_any_damage_is_made_again(done, place, computed,
         damaged += [bytes(flipped), whole[:at] + b"damage" + whole[at + 6 :]]
     for number, content in enumerate(damaged, start=1):
         path.write_bytes(content)
-        with pytest.raises(CorruptError) as error:
+        with pytest.raises(CorruptError):
             read_dataset(path, "source", "vehiclemor")
-        assert "\n" not in str(error.value)
         xr.testing.assert_identical(run(study, place / "out"), reread(done))
         xr.testing.assert_identical(reread(place), reread(done))
         aside = sorted((path.parent / QUARANTINE).iterdir())

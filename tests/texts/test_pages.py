@@ -3,28 +3,58 @@
 import ast
 import re
 import runpy
+import shlex
 import tomllib
 from configparser import ConfigParser
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import vehiclemor as vm
 from tests.plugin.installation import installed
-from tests.texts.markdown import (
-    DOCS,
-    NAMES,
-    ROOT,
-    TEXTS,
-    blocks,
-    console_commands,
-    inline_commands,
-)
 from vehiclemor.cli.app import app, main
 from vehiclemor.exporting import fmu
 from vehiclemor.report.figures import theme
 from vehiclemor.report.published import citations
 from vehiclemor.study.plans.loading import study_path
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+GENERATED = DOCS / "study-file-reference.md"
+TEXTS = [ROOT / "README.md", *sorted({*DOCS.glob("*.md")} - {GENERATED})]
+NAMES = [str(path.relative_to(ROOT)) for path in TEXTS]
+FENCED = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+class Block(NamedTuple):
+    """A fenced block, and the line above it."""
+
+    language: str
+    content: str
+    above: str
+
+
+def blocks(path: Path) -> list[Block]:
+    text = path.read_text(encoding="utf-8")
+    found = FENCED.finditer(text)
+    return [Block(m[1], m[2], text[: m.start()].rstrip().rpartition("\n")[2]) for m in found]
+
+
+def console_commands(path: Path) -> list[list[str]]:
+    """Commands of the `console` blocks, in order."""
+    lines = "".join(b.content for b in blocks(path) if b.language == "console").splitlines()
+    return [shlex.split(line[2:], comments=True) for line in lines if line.startswith("$ ")]
+
+
+def inline_commands(path: Path) -> list[list[str]]:
+    """Commands of this package in running text; capitals stand for what a reader puts there."""
+    prose = FENCED.sub("", path.read_text(encoding="utf-8"))
+    spans = (" ".join(span.split()) for span in re.findall(r"`([^`]+)`", prose))
+    commands = [shlex.split(span) for span in spans if span.startswith("vehiclemor ")]
+    return [words for words in commands if not any(w.isupper() and len(w) > 1 for w in words)]
+
 
 README, EXTENDING, STUDIES = ROOT / "README.md", DOCS / "extending.md", DOCS / "studies.md"
 PAGES = pytest.mark.parametrize("path", TEXTS, ids=NAMES)
@@ -54,6 +84,16 @@ def test_files_scripts_and_environments_that_a_page_names_are_there(path):
             assert block.content == (ROOT / quoted[1]).read_text(encoding="utf-8"), quoted[1]
         if block.language == "toml":
             tomllib.loads(block.content)
+
+
+def test_functions_that_the_page_on_the_method_names_are_in_their_files():
+    page = (DOCS / "method.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\|.*\| `([\w/]+\.py)` \| (`.*`) \|$", page, re.MULTILINE)
+    assert len(rows) > 8
+    for file, functions in rows:
+        source = (ROOT / "src" / "vehiclemor" / file).read_text(encoding="utf-8")
+        for name in re.findall(r"`([\w.]+)`", functions):
+            assert re.search(rf"(def|class) {name.split('.')[-1]}\b", source), (file, name)
 
 
 # Parsed and not run, here: what takes long.  Their options are checked, and the names of studies.

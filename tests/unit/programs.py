@@ -6,18 +6,10 @@ import mpmath as mp
 import numpy as np
 import sympy as sp
 
-from vehiclemor.symbolic.elimination import Pivots
 from vehiclemor.symbolic.program import Function, Program
 from vehiclemor.symbolic.tape import Tape, dependencies
 
 DIGITS = 30
-
-
-def inlined(expression: sp.Expr, tape: Tape) -> sp.Expr:
-    """The expression with every name of the tape replaced by what it stands for."""
-    for symbol, definition in reversed(tape.definitions.items()):
-        expression = expression.xreplace({symbol: definition})
-    return expression
 
 
 def precise(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, float]) -> np.ndarray:
@@ -56,34 +48,3 @@ def _computed(function: Function, values: Mapping[sp.Symbol, float]) -> np.ndarr
     lines = list(function.assignments), list(function.results)
     computed = sp.lambdify(list(values), lines[1], "math", cse=lambda _: lines)
     return np.array(computed(*values.values()), dtype=float)
-
-
-def pivot_shares(matrix: np.ndarray, pivots: Pivots) -> list[float]:
-    """Each pivot's size beside the largest entry of its column in the rows that remain."""
-    work, rows, shares = matrix.copy(), list(range(len(matrix))), []
-    for row, column in pivots:
-        shares.append(abs(work[row, column]) / np.abs(work[rows, column]).max())
-        rows.remove(row)
-        for other in rows:
-            work[other] -= work[other, column] / work[row, column] * work[row]
-    return shares
-
-
-def random_program(seed: int, symbols: Sequence[sp.Symbol], length: int = 14) -> tuple[Tape, list]:
-    """Tape of random operations, smooth everywhere, and its last three names."""
-    rng = np.random.default_rng(seed)
-    tape, known = Tape(), list(symbols)
-    while len(tape.definitions) < length:
-        a, b = (known[int(k)] for k in rng.integers(len(known), size=2))
-        choices = [
-            a * b,
-            a - 2 * b,
-            sp.sin(a),
-            sp.cos(a) + b,
-            sp.sqrt(1 + a * a),
-            a / (2 + sp.cos(b)),
-            sp.atan2(a, 3 + b * b),
-            1 / (1 + a**2),
-        ]
-        known.append(tape.let(choices[int(rng.integers(len(choices)))]))
-    return tape, known[-3:]

@@ -80,6 +80,17 @@ def trained(points):
             ["PCX1", "front_stiffness", "front_damping", "nominal_load", "load_scale"],
             "above the largest allowed",
         ),
+        # The sprung mass hangs over an axle: the wheels at the other end had to hold it down.
+        (
+            lambda v: vm.model(CAR, {"front_axle_distance": v}),
+            [0.05],
+            "rear wheels leave the ground",
+        ),
+        (
+            lambda v: vm.model("high_fidelity_vehicle", {"tie_rod_outer": v}),
+            [[-150, 770, -120]],
+            "millimetres",
+        ),
         # No body has them: the largest moment is at most the sum of the others.
         (
             lambda v: vm.model(CAR, v),

@@ -83,7 +83,6 @@ def test_a_wrong_file_is_named(load, tmp_path, old, new, words):
     with pytest.raises(FileError, match=words) as error:
         load(old, new)
     assert str(error.value).startswith(f"{tmp_path / 'toy.toml'}: ")
-    assert "\n" not in str(error.value)
 
 
 def test_files_that_are_none_or_of_another_model(tmp_path: Path):
@@ -119,7 +118,6 @@ def test_a_wrong_override_is_named(load, name, value, words):
     with pytest.raises(InputError, match=words) as error:
         load(overrides={name: value})
     assert name in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_a_model_reads_its_own_file_or_another(tmp_path: Path):

@@ -26,9 +26,8 @@ from vehiclemor.registry import component, names, unknown
     ],
 )
 def test_unknown_name_lists_the_nearest(kind, name, words):
-    with pytest.raises(InputError, match=f"unknown {kind} '{name}'; .*{re.escape(words)}") as error:
+    with pytest.raises(InputError, match=f"unknown {kind} '{name}'; .*{re.escape(words)}"):
         component(kind, name)
-    assert "\n" not in str(error.value)
 
 
 def test_nearest_names_come_best_first_and_of_many_the_nearest_alone():
@@ -252,9 +251,8 @@ def test_processes_go_on_after_a_method_that_ends_its_own(tmp_path, capsys):
 def test_a_declaration_that_is_none_is_listed_with_what_is_wrong(faulty, change, words):
     faulty(f"METHOD = replace(METHOD, {change})")
     assert words in vm.methods()["faulty"]
-    with pytest.raises(InputError, match="faulty") as error:
+    with pytest.raises(InputError, match="faulty"):
         vm.simulate("double_wishbone", "faulty")
-    assert "\n" not in str(error.value)
 
 
 CAR = """
@@ -305,9 +303,8 @@ def car(plug_in, plug_in_package, tmp_path):
     ],
 )
 def test_a_model_that_breaks_is_named(car, change, words):
-    with pytest.raises(InputError, match=words) as error:
+    with pytest.raises(InputError, match=words):
         car(change)
-    assert "\n" not in str(error.value)
     assert "faulty" in vm.models()
 
 

@@ -81,11 +81,7 @@ def simulate(
     chosen = key_values("--set", settings)
     for key in inspect.signature(vm.simulate).parameters.keys() & chosen.keys():
         raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
-    picture = None
-    if plot is not None:
-        if len(plot) > 1:
-            raise InputError(f"--plot: one file, not {len(plot)}")
-        picture = picture_file("--plot", plot[0] if plot else Path(f"{model}-{method}.png"))
+    picture = _picture(plot, f"{model}-{method}.png")
     if animate is not None:
         new_file("--animate", animate, (".gif",))
     if out is not None:
@@ -111,6 +107,15 @@ def simulate(
     if out is None and picture is None and animate is None:
         print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
+
+
+def _picture(plot: list[Path] | None, usual: str) -> Path | None:
+    """File of `--plot`, which may stand without one."""
+    if plot is None:
+        return None
+    if len(plot) > 1:
+        raise InputError(f"--plot: one file, not {len(plot)}")
+    return picture_file("--plot", plot[0] if plot else Path(usual))
 
 
 def plot(

@@ -24,11 +24,10 @@ from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
+from vehiclemor.codegen.llvm_arithmetic import DOUBLE
 from vehiclemor.codegen.llvm_kernels import Rows, emit
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.operations import Kernel
-from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.codegen.weighted_sums import DOUBLE, FLAGS, spread
 
 # Straight-line kernels are one long block: with its own limits the compiler finds half of what left
 # and right have in common.
@@ -228,18 +227,7 @@ def call_kernel(
     """See `loop_types.call_kernel`; the arrays must be as long as the kernel wants them."""
     del typing_context
     _require_plain(x, u, constants, result)
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        address = _address(context, builder, sig, args)
-        pointers = [_data(context, builder, sig, args, k) for k in range(2, 6)]
-        # Steps execute others themselves; a kernel that takes no such argument doesn't see it.
-        pointers.append(builder.bitcast(_data(context, builder, sig, args, 0), DOUBLE.as_pointer()))
-        kind = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers))
-        function = builder.inttoptr(address, kind.as_pointer())
-        builder.call(function, pointers, attrs=("nounwind",))
-        return context.get_dummy_value()
-
-    return types.void(kernels, place, x, u, constants, result), generate
+    return types.void(kernels, place, x, u, constants, result), _call
 
 
 @intrinsic
@@ -256,54 +244,30 @@ def call_lanes(
     """See `loop_types.call_lanes`; the matrices must have as many rows and columns."""
     del typing_context
     _require_plain(path, inputs, constants, result)
-    arguments = kernels, place, path, inputs, constants, result, first
-    return types.void(*arguments), _call_of_rows
+    return types.void(kernels, place, path, inputs, constants, result, first), _call
 
 
-def _call_of_rows(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """Call a kernel: matrices from a row on, the last argument, with the length of their rows."""
-    last = len(args) - 1
-    first = context.cast(builder, args[last], sig.args[last], types.intp)
-    address, pointers, strides = _address(context, builder, sig, args), [], []
-    for k in range(2, last):
-        array = context.make_array(sig.args[k])(context, builder, args[k])
-        pointers.append(array.data)
-        if sig.args[k].ndim == 2:
-            strides.append(cgutils.unpack_tuple(builder, array.shape)[1])
-            pointers[-1] = builder.gep(array.data, [builder.mul(first, strides[-1])])
-    kinds = [DOUBLE.as_pointer()] * len(pointers) + [WORD] * len(strides)
-    function = builder.inttoptr(address, ir.FunctionType(ir.VoidType(), kinds).as_pointer())
-    builder.call(function, pointers + strides, attrs=("nounwind",))
+def _call(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """Call a kernel; of matrices from a row on, the last argument, with the lengths of rows."""
+    place = context.cast(builder, args[1], sig.args[1], types.intp)
+    kernels, *arrays = [
+        context.make_array(sig.args[k])(context, builder, args[k]) for k in (0, 2, 3, 4, 5)
+    ]
+    arguments = [array.data for array in arrays]
+    if len(args) > 6:
+        first = context.cast(builder, args[6], sig.args[6], types.intp)
+        for k, array in enumerate(arrays):
+            if sig.args[2 + k].ndim == 2:
+                arguments.append(cgutils.unpack_tuple(builder, array.shape)[1])
+                arguments[k] = builder.gep(array.data, [builder.mul(first, arguments[-1])])
+    else:
+        # Steps execute others themselves; a kernel that takes no such argument doesn't see it.
+        arguments.append(builder.bitcast(kernels.data, DOUBLE.as_pointer()))
+    function = ir.FunctionType(ir.VoidType(), [argument.type for argument in arguments])
+    address = builder.load(builder.gep(kernels.data, [place]))
+    address = builder.inttoptr(address, function.as_pointer())
+    builder.call(address, arguments, attrs=("nounwind",))
     return context.get_dummy_value()
-
-
-@intrinsic
-def mixed_rows(typing_context: Any, rows: Any, weights: Any, result: Any) -> Any:
-    """See `loop_types.mixed_rows`; in vectors as long as a cache line."""
-    del typing_context
-    _require_plain(rows, result)
-
-    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        kind = ir.VectorType(DOUBLE, LANES)
-        result = context.make_array(sig.args[2])(context, builder, args[2])
-        (width,) = cgutils.unpack_tuple(builder, result.shape)
-        weights = [spread(builder, w, LANES) for w in cgutils.unpack_tuple(builder, args[1])]
-        steps = WORD(0), width, WORD(LANES)
-        with cgutils.for_range_slice(builder, *steps) as (column, _):
-            place, terms = column, []
-            for weight in weights:
-                pointer = builder.gep(_data(context, builder, sig, args, 0), [place])
-                row = builder.load(builder.bitcast(pointer, kind.as_pointer()), align=8)
-                terms.append(builder.fmul(weight, row, flags=FLAGS))
-                place = builder.add(place, width)
-            while len(terms) > 1:
-                first, second, *terms = terms
-                terms.append(builder.fadd(first, second, flags=FLAGS))
-            pointer = builder.bitcast(builder.gep(result.data, [column]), kind.as_pointer())
-            builder.store(terms[0], pointer, align=8)
-        return context.get_dummy_value()
-
-    return types.void(rows, weights, result), generate
 
 
 def inlined_kernel(kernel: Kernel) -> Any:
@@ -339,21 +303,10 @@ def _require_plain(*arrays: Any) -> None:
             raise TypingError(f"a kernel needs C-contiguous arrays of floats, not {kind}")
 
 
-def _address(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """The address of a kernel: that at a place, the second argument, of the list before it."""
-    place = context.cast(builder, args[1], sig.args[1], types.intp)
-    return builder.load(builder.gep(_data(context, builder, sig, args, 0), [place]))
-
-
-def _data(context: Any, builder: Any, sig: Any, args: Any, place: int) -> Any:
-    return context.make_array(sig.args[place])(context, builder, args[place]).data
-
-
 # What only compiled loops can do: views of a buffer, calls of kernels; stand-ins in `loop_types`.
 INTRINSICS = {
     "vector": vector,
     "matrix": matrix,
     "call_kernel": call_kernel,
     "call_lanes": call_lanes,
-    "mixed_rows": mixed_rows,
 }

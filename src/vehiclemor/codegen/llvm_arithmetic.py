@@ -9,8 +9,11 @@ from llvmlite import ir
 
 from vehiclemor.codegen.elementary import elementary_operations
 from vehiclemor.codegen.operations import COMPARISONS
-from vehiclemor.codegen.weighted_sums import DOUBLE, FLAGS
+from vehiclemor.codegen.vector_lanes import WIDTH
 
+FLAGS = ("contract",)
+DOUBLE = ir.DoubleType()
+VECTOR = ir.VectorType(DOUBLE, WIDTH)
 # A float plus this has no digits after the point.
 SHIFT = 1.5 * 2.0**52
 LANE = ir.IntType(32)

@@ -11,12 +11,18 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 
-from vehiclemor.codegen import vector_statements, weighted_sums
+from vehiclemor.codegen import llvm_vectors
 from vehiclemor.codegen.elementary import ELEMENTARY
-from vehiclemor.codegen.llvm_arithmetic import LANE, arithmetic, constant, elementary
+from vehiclemor.codegen.llvm_arithmetic import (
+    DOUBLE,
+    LANE,
+    VECTOR,
+    arithmetic,
+    constant,
+    elementary,
+)
 from vehiclemor.codegen.operations import SEED, VECTOR_STATEMENTS, Kernel, Operation, is_entry
 from vehiclemor.codegen.vector_lanes import LANES, WIDTH
-from vehiclemor.codegen.weighted_sums import DOUBLE, VECTOR
 
 POINTER = DOUBLE.as_pointer()
 
@@ -95,7 +101,7 @@ class _Writer:
 
     def _spread(self, value: Any, width: int) -> Any:
         # The choice between vectors may be one for all lanes.
-        return weighted_sums.spread(self._builder, value, width) if value.type == DOUBLE else value
+        return llvm_vectors.spread(self._builder, value, width) if value.type == DOUBLE else value
 
     def _written(self, operation: Operation) -> Any:
         kind, arguments, detail = operation
@@ -116,7 +122,7 @@ class _Writer:
                 return values[0][detail]
             case _ if kind in VECTOR_STATEMENTS:
                 places = [self._address(*d) if is_entry(d) else d for d in detail]
-                return vector_statements.write(kind, self._builder, places, values)
+                return llvm_vectors.write(kind, self._builder, places, values)
             case _ if kind in ELEMENTARY:
                 results = elementary(self._builder, kind, *values)
                 return results if kind == "sincos" else results[0]
@@ -129,8 +135,8 @@ class _Writer:
         if self._lanes > 1:
             factors = self._alike(list(factors))
             if factors[0].type != DOUBLE:
-                return weighted_sums.sums_of_lanes(self._builder, address, factors, targets)
-        return weighted_sums.weighted_sums(self._builder, address, factors, targets)
+                return llvm_vectors.sums_of_lanes(self._builder, address, factors, targets)
+        return llvm_vectors.weighted_sums(self._builder, address, factors, targets)
 
     def _load(self, name: str, place: int) -> Any:
         builder = self._builder

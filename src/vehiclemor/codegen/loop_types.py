@@ -50,11 +50,6 @@ def call_lanes(
     raise NotImplementedError(COMPILED_ONLY)
 
 
-def mixed_rows(rows: Matrix, weights: tuple[float, ...], result: Vector) -> None:
-    """The first rows, each times its weight, added up; they are whole multiples of `LANES` long."""
-    raise NotImplementedError(COMPILED_ONLY)
-
-
 def declared_arguments(entry: Any) -> dict[str, Any]:
     """Declared types of the arguments of a loop's entry by name."""
     return {name: kind for name, kind in entry.__annotations__.items() if name != "return"}

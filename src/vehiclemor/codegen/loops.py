@@ -25,8 +25,6 @@ _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 Kind = tuple[str, str, int]
 DTYPES = {"d": np.dtype(np.float64), "l": np.dtype(np.int64)}
-# Floats in a cache line.
-LINE = 8
 # Words of numbers, and of arrays by their dimensions.
 LONG, FLOAT = struct.Struct("q"), struct.Struct("d")
 ARRAYS = [struct.Struct(f"{dimensions + 1}q") for dimensions in range(4)]
@@ -110,13 +108,6 @@ def address_of_array(array: np.ndarray) -> int:
     """Where a C-contiguous array that can be written and holds something begins."""
     # In a third of the time of `array.ctypes.data`.
     return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
-
-
-def cache_lines(rows: int, columns: int) -> np.ndarray:
-    """A matrix to be written that begins with a cache line."""
-    space = np.empty(rows * columns + LINE)
-    first = -(address_of_array(space) // 8) % LINE
-    return space[first : first + rows * columns].reshape(rows, columns)
 
 
 def _words(loop: str, kinds: Sequence[Kind], value: Any) -> bytes:

@@ -8,10 +8,10 @@ other; each has a kind, numbers of earlier operations whose values it takes, and
     add ... >=        arithmetic, comparisons and functions, see `KINDS`
     sincos            sine and cosine of a value
     batch             `sincos` or `atan` of `LANES` values at once: its name
-    sums              (array, first, targets): see `weighted_sums`
+    sums              (array, first, targets): see `llvm_vectors`
     part              number of one of several results of these three
     store             place of the result, row by row
-    combine ...       statements on whole vectors, see `vector_statements`
+    combine ...       statements on whole vectors, see `llvm_vectors`
 
 Those that have a name are executed in order, others when one of them needs their value.
 """
@@ -22,9 +22,10 @@ import json
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from vehiclemor.codegen.vector_lanes import padded
 
@@ -44,7 +45,9 @@ KINDS = {
     **dict.fromkeys(("negate", *FUNCTIONS), 1),
     "select": 3,
 }
-VECTOR_STATEMENTS = ("combine", "magnitudes", "product", "execute")
+# What NumPy calls otherwise.
+OPERATORS = {"negative": "negate", "absolute": "abs"}
+VECTOR_STATEMENTS = ("combine", "product", "execute")
 # Nothing else depends on these, and these have a name whatever they are.
 EFFECTS = ("store", *VECTOR_STATEMENTS)
 NAMED = ("sincos", "batch", "sums", "part", *EFFECTS)
@@ -59,44 +62,17 @@ class Operation(NamedTuple):
     detail: Any = None
 
 
-@dataclass(frozen=True, slots=True)
-class Value:
+@dataclass(frozen=True)
+class Value(NDArrayOperatorsMixin):
     """What an operation gives; arithmetic with it writes further operations."""
 
     listing: Listing
     number: int
-    # Numbers of NumPy leave arithmetic to this class.
-    __array_ufunc__: ClassVar[None] = None
 
-    def __add__(self, other: Value | float) -> Value:
-        return self.listing.new("add", self, other)
-
-    def __radd__(self, other: float) -> Value:
-        return self.listing.new("add", other, self)
-
-    def __sub__(self, other: Value | float) -> Value:
-        return self.listing.new("subtract", self, other)
-
-    def __rsub__(self, other: float) -> Value:
-        return self.listing.new("subtract", other, self)
-
-    def __mul__(self, other: Value | float) -> Value:
-        return self.listing.new("multiply", self, other)
-
-    def __rmul__(self, other: float) -> Value:
-        return self.listing.new("multiply", other, self)
-
-    def __truediv__(self, other: Value | float) -> Value:
-        return self.listing.new("divide", self, other)
-
-    def __rtruediv__(self, other: float) -> Value:
-        return self.listing.new("divide", other, self)
-
-    def __neg__(self) -> Value:
-        return self.listing.new("negate", self)
-
-    def __abs__(self) -> Value:
-        return self.listing.new("abs", self)
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *arguments: Value | float) -> Value:
+        """Arithmetic with operators, also of numbers of NumPy."""
+        del method
+        return self.listing.new(OPERATORS.get(ufunc.__name__, ufunc.__name__), *arguments)
 
 
 class Listing:
@@ -133,7 +109,7 @@ class Listing:
         return [self.new("part", whole, detail=place) for place in range(count)]
 
     def sums(self, array: str, first: int, targets: int, factors: Sequence[Value]) -> list[Value]:
-        """Sums of factors times the weights that stand in an array, see `weighted_sums`."""
+        """Sums of factors times the weights that stand in an array, see `llvm_vectors`."""
         whole = self.new("sums", *factors, detail=(array, first, targets))
         return self.parts(whole, targets)
 

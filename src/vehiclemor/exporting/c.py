@@ -10,7 +10,7 @@ import numpy as np
 
 from vehiclemor.codegen.operations import COMPARISONS, uses
 from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
-from vehiclemor.exporting.system import SIGNATURES, TANGENTS, TOOL, ExportedSystem
+from vehiclemor.exporting.systems import SIGNATURES, TANGENTS, TOOL, ExportedSystem
 
 SOURCES = Path(__file__).parent / "c_sources"
 SELECT = """\

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from vehiclemor.arguments import file_path, number, quoted, within
 from vehiclemor.exceptions import InputError
-from vehiclemor.files import make_folder, not_written, temporary_path, write_whole
+from vehiclemor.files import make_folder, write_whole
 from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
-    from vehiclemor.exporting.system import ExportedSystem
+    from vehiclemor.exporting.systems import ExportedSystem
     from vehiclemor.reduction.reduced_model import ReducedOrderModel
     from vehiclemor.simulation.model import Model
 
@@ -144,21 +142,11 @@ def system_of(model: Model | ReducedOrderModel) -> ExportedSystem:
 
 
 def _write_folder(path: Path, files: dict[str, str]) -> Path:
-    """Write a folder whole: under a temporary name first, then moved into place."""
-    temporary = temporary_path(path.absolute())
-    try:
+    """Write a folder whole; what is there goes once the new one is complete."""
+
+    def write(temporary: Path) -> None:
         make_folder(temporary)
         for name, text in files.items():
             (temporary / name).write_text(text, encoding="utf-8")
-        if path.exists():
-            old = temporary_path(path.absolute()).with_suffix(".old")
-            os.replace(path, old)
-            os.replace(temporary, path)
-            shutil.rmtree(old)
-        else:
-            os.replace(temporary, path)
-    except OSError as error:
-        raise not_written(path, error) from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-    return path
+
+    return write_whole(path, write)

@@ -1,4 +1,8 @@
-"""Functional mock-up units: model description, sources, and a binary for this platform."""
+"""Functional mock-up units: model description, sources, and a binary for this platform.
+
+`modelDescription.xml` is by the schema of FMI 2.0.  Value references count time, states, their
+derivatives, inputs, outputs and parameters, as `vehiclemor_fmi2.c` does.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +14,14 @@ import shutil
 import subprocess
 import tempfile
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.exporting.c import DRIVER, SOURCES, c_files
-from vehiclemor.exporting.model_description import COMPILED, UNIT, model_description
-from vehiclemor.exporting.system import ExportedSystem
+from vehiclemor.exporting.c import DRIVER, MODEL, SOURCES, STEPPER, TANGENT, c_files
+from vehiclemor.exporting.systems import TOOL, ExportedSystem
 
 _LOG = logging.getLogger("vehiclemor")
 # Platform -> folder of its binaries, and ending of its shared libraries.
@@ -25,6 +31,12 @@ BINARIES = {
     "Windows": ("win64", ".dll"),
 }
 OPTIMISED = ("-std=c99", "-O2", "-ffp-contract=off")
+CAPABILITIES = ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative")
+# Files that a binary is compiled of, the interface first.
+UNIT = "vehiclemor_fmi2.c"
+COMPILED = UNIT, MODEL, TANGENT, STEPPER
+# What an importer proposes, in s.
+STOP, COMMUNICATION = 10.0, 0.01
 # Files in an archive are equal if their content is.
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
 
@@ -71,3 +83,109 @@ def shared_library(texts: dict[str, str]) -> bytes | None:
             first = next(iter(lines), f"status {done.returncode}")
             raise InputError(f"{command} can't compile the model: {first}")
         return (Path(folder) / "library").read_bytes()
+
+
+class Variable(NamedTuple):
+    """A variable of an FMU; `derivative_of` is the value reference of a derivative's state."""
+
+    name: str
+    unit: str
+    description: str
+    causality: str
+    variability: str
+    initial: str = ""
+    start: float | None = None
+    derivative_of: int | None = None
+
+
+def variables(system: ExportedSystem) -> dict[int, Variable]:
+    """Variables by value reference, in order; without parameters that nothing depends on."""
+    start = next(iter(system.starts.values()))
+    of_states = "local", "continuous"
+    found = [Variable("time", "s", "time", "independent", "continuous")]
+    for q, value in zip(system.states, start.tolist(), strict=True):
+        found.append(Variable(f"state.{q.name}", q.unit, q.long_name, *of_states, "exact", value))
+    for reference, q in enumerate(system.states, 1):
+        named = f"der(state.{q.name})", f"{q.unit}/s", f"rate of: {q.long_name}"
+        found.append(Variable(*named, *of_states, "calculated", None, reference))
+    found += [
+        Variable(q.name, q.unit, q.long_name, "input", "continuous", "", 0.0) for q in system.inputs
+    ]
+    found += [
+        Variable(q.name, q.unit, q.long_name, "output", "continuous", "calculated")
+        for q in system.outputs
+    ]
+    every, first = dict(enumerate(found)), len(found)
+    for place in sorted(system.acting):
+        q, value = system.parameters[place], float(system.values[place])
+        name = f"parameter.{q.name}"
+        every[first + place] = Variable(
+            name, q.unit, q.long_name, "parameter", "tunable", "exact", value
+        )
+    return every
+
+
+def model_description(system: ExportedSystem, token: str) -> bytes:
+    """The file; by the token an importer's file and binary know one another."""
+    every = variables(system)
+    root = ElementTree.Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=system.name,
+        guid=token,
+        description=system.summary,
+        generationTool=TOOL,
+        variableNamingConvention="structured",
+        numberOfEventIndicators="0",
+    )
+    common = {"modelIdentifier": system.name, **dict.fromkeys(CAPABILITIES, "true")}
+    exchange = ElementTree.SubElement(root, "ModelExchange", common)
+    simulation = ElementTree.SubElement(
+        root, "CoSimulation", common | {"canHandleVariableCommunicationStepSize": "true"}
+    )
+    for kind in (exchange, simulation):
+        files = ElementTree.SubElement(kind, "SourceFiles")
+        for name in COMPILED:
+            ElementTree.SubElement(files, "File", name=name)
+    units = ElementTree.SubElement(root, "UnitDefinitions")
+    for name in dict.fromkeys(v.unit for v in every.values() if v.unit != "1"):
+        ElementTree.SubElement(units, "Unit", name=name)
+    times = {"startTime": "0.0", "stopTime": repr(STOP), "stepSize": repr(COMMUNICATION)}
+    ElementTree.SubElement(root, "DefaultExperiment", times)
+    listed = ElementTree.SubElement(root, "ModelVariables")
+    for reference, variable in every.items():
+        _variable(listed, variable, reference)
+    _structure(ElementTree.SubElement(root, "ModelStructure"), every)
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+
+
+def _variable(listed: ElementTree.Element, variable: Variable, reference: int) -> None:
+    own = {
+        "name": variable.name,
+        "valueReference": str(reference),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+    }
+    if variable.initial:
+        own["initial"] = variable.initial
+    typed = {} if variable.unit == "1" else {"unit": variable.unit}
+    if variable.start is not None:
+        typed["start"] = repr(variable.start)
+    if variable.derivative_of is not None:
+        # Variables are counted from one, and time is the first.
+        typed["derivative"] = str(variable.derivative_of + 1)
+    scalar = ElementTree.SubElement(listed, "ScalarVariable", own)
+    ElementTree.SubElement(scalar, "Real", typed)
+
+
+def _structure(structure: ElementTree.Element, every: Mapping[int, Variable]) -> None:
+    outputs = [i for i, v in every.items() if v.causality == "output"]
+    rates = [i for i, v in every.items() if v.derivative_of is not None]
+    kinds = {"Outputs": outputs, "Derivatives": rates, "InitialUnknowns": sorted(outputs + rates)}
+    for name, places in kinds.items():
+        if places:
+            listed = ElementTree.SubElement(structure, name)
+            for place in places:
+                ElementTree.SubElement(listed, "Unknown", index=str(place + 1))

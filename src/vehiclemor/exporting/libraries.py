@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.straight_line import FUNCTIONS, evaluated
-from vehiclemor.exporting.system import ExportedSystem
+from vehiclemor.exporting.systems import ExportedSystem
 from vehiclemor.short_repr import ShortRepr
 
 if TYPE_CHECKING:

@@ -37,6 +37,15 @@ def _unset(values: Values) -> Any:
     raise NotImplementedError(f"not declared for this kind of model: {sorted(values)}")
 
 
+def _nothing_to_check(values: Values) -> None:
+    del values
+
+
+def _nothing_solved(values: Values, derivative: Derivative) -> dict[str, float]:
+    del values, derivative
+    return {}
+
+
 @dataclass(frozen=True, eq=False)
 class Structure:
     """Matrices of a structure with n coordinates, p ports and some outputs.
@@ -176,13 +185,13 @@ class ModelDefinition(ShortRepr):
     structure: Callable[[Values], Structure] = _unset
     online: tuple[str, ...] = ()
     parameter_file: Path | None = None
-    check: Callable[[Values], None] = lambda _: None
+    check: Callable[[Values], None] = _nothing_to_check
     design_coordinates: Callable[[Values], np.ndarray] = _unset
     travel_limit: float = 0.5
     stops: Mapping[str, float] = field(default_factory=dict)
     starts: Callable[[Values], dict[str, np.ndarray]] = _unset
     solved: tuple[str, ...] = ()
-    solve_equilibrium: Callable[[Values, Derivative], dict[str, float]] = lambda *_: {}
+    solve_equilibrium: Callable[[Values, Derivative], dict[str, float]] = _nothing_solved
     cyclic: tuple[str, ...] = ()
     planar: tuple[str, ...] = ()
     heading_pairs: tuple[tuple[str, str], ...] = ()

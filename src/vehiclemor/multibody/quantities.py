@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -52,7 +53,11 @@ def declared(model: str) -> dict[str, Any]:
 
 def equations_of(package: str) -> Callable[[], Any]:
     """What derives by the module `equations` of a package; SymPy is imported when it is called."""
-    return lambda: import_module(f"vehiclemor.multibody.{package}.equations").derive()
+    return partial(_derived, f"vehiclemor.multibody.{package}.equations")
+
+
+def _derived(module: str) -> Any:
+    return import_module(module).derive()
 
 
 def check_moments(name: str, moments: np.ndarray) -> None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
-from vehiclemor.simulation.newton.newton_loops import CONVERGED
+from vehiclemor.simulation.newton_loops import CONVERGED
 from vehiclemor.sizes import require, shaped
 
 # Sizes that the compiler knows.

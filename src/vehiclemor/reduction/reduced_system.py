@@ -15,7 +15,7 @@ from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
-from vehiclemor.simulation.kernel_derivatives import (
+from vehiclemor.simulation.evaluation import (
     CONSTANTS,
     INPUTS,
     PLACES,

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, field_validator
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.simulation.integrators.catalogue import ALIASES, INTEGRATORS
+from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 
 Value = int | float | str
 LARGEST_NUMBER = 1e300
@@ -40,8 +40,7 @@ class Settings(BaseModel):
 
 
 def _integrator(name: str) -> str:
-    """An integrator by its name or alias."""
-    name = ALIASES.get(name, name)
+    """An integrator by its name."""
     if name not in INTEGRATORS:
         raise ValueError(f"is {name!r}; allowed: {', '.join(INTEGRATORS)}")
     return name

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
 from vehiclemor.inputs.checks import checked_maneuver
@@ -17,14 +17,13 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import kept, recorded_inputs
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import choice
+from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import check_positive, checked_array, checked_inputs, output_times
-from vehiclemor.simulation.kernel_derivatives import By, chosen
+from vehiclemor.simulation.evaluation import By, address_of, chosen
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.newton import newton_loops
-from vehiclemor.simulation.newton.lane_runs import LaneRuns
-from vehiclemor.simulation.paths import address_of
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Names, Start, Trajectory
+from vehiclemor.simulation.workspaces import Pool
 
 # Input increment (m) above which a step of the input is cut into substeps.
 LARGEST_INCREMENT = 5e-3
@@ -38,7 +37,7 @@ CLOSED = 1e-6
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution, and the kernels that stand in loops.
-KINEMATIC_LOOPS = ("simulation.integrators.dense_solves", "simulation.newton.newton_loops")
+KINEMATIC_LOOPS = ("simulation.integrators.dense_solves", "simulation.newton_loops")
 INLINED_KERNELS = ("residual_jacobian", "newton_step", "tangent_parts", "tangent")
 REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
@@ -50,6 +49,8 @@ REASONS = {
 
 # Times, inputs, and these as loops take them.
 Sampled = tuple[np.ndarray, np.ndarray, Ready]
+# A loop with its arguments, its counts, and the word of the address of its table.
+LaneRun = tuple[Prepared, np.ndarray, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,10 +111,6 @@ class AlgebraicModel(Model):
             return moved
         follows = self.jacobian_of(function, state, u, "state") @ moved
         return self.jacobian_of(function, state, u, by) + follows
-
-    def newton_step(self, q: Any, u: Any) -> np.ndarray:
-        """Newton step Phi_q^-1 Phi by straight-line elimination, shape (n,)."""
-        return self.evaluated("newton_step", q, u)
 
     def residual_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Residuals (samples, n) along a path of coordinates and inputs."""
@@ -213,11 +210,9 @@ class AlgebraicModel(Model):
         times, inputs, given = sampled
         n = len(self.coordinates)
         if solver == "newton_lanes" and len(times) >= LANES:
-            found = self._lanes.solved(given, _iteration(tolerance, SHORTEST_STEP))
+            found = self._solved_in_lanes(sampled, _iteration(tolerance, SHORTEST_STEP))
             if found is not None:
-                table, counts, seconds = found
-                lanes = table[:, :n], counts, seconds, None, table[:, n:]
-                return self.trajectory(times, inputs, *lanes)
+                return found
         path = np.full((len(inputs), n), np.nan)
         solution = newton_loops.Solution(path, new_counts())
         iteration, buffer = _iteration(tolerance, SHORTEST_STEP), self._buffer()
@@ -233,14 +228,37 @@ class AlgebraicModel(Model):
         failed = self.trajectory(times, inputs, path, solution.counts.tolist(), seconds, failure)
         raise ConvergenceError(f"{self.name}: {failed.message} (newton)", failed)
 
+    def _solved_in_lanes(self, sampled: Sampled, iteration: Ready) -> Trajectory | None:
+        """Solution with the samples in vector lanes, as many at least; none if it fails."""
+        (times, inputs, given), n = sampled, len(self.coordinates)
+        kind = given, iteration
+        run = call, counted, place = self._lanes.taken(kind, lambda: self._packed(*kind))
+        # One table is written faster than two.
+        table = np.empty((len(inputs), n + len(self.outputs)))
+        call.words[place] = address_of_array(table)
+        status, seconds = timed(call)
+        counts = counted.tolist()
+        self._lanes.give_back(kind, run)
+        if status:
+            return None
+        return self.trajectory(times, inputs, table[:, :n], counts, seconds, None, table[:, n:])
+
     @cached_property
-    def _lanes(self) -> LaneRuns:
+    def _lanes(self) -> Pool[LaneRun]:
+        return Pool()
+
+    def _packed(self, samples: Ready, iteration: Ready) -> LaneRun:
+        n, inputs, m = len(self.coordinates), len(self.inputs), len(self.outputs)
         names = "newton_step", "outputs"
-        addresses = [address_of(self.kernels, name, LANES) for name in names]
-        kernels = np.array(addresses, dtype=np.int64)
-        sizes = len(self.coordinates), len(self.inputs), len(self.outputs)
-        loop = self.loop("lane_path", "simulation.newton.lane_loops")
-        return LaneRuns(loop, self._ready_mechanism, kernels, sizes)
+        kernels = np.array([address_of(self.kernels, name, LANES) for name in names])
+        solution = newton_loops.Solution(np.empty((0, n + m)), new_counts())
+        buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 2))
+        loop = self.loop("lane_path")
+        shared = self._ready_mechanism, samples, kernels, iteration
+        call = loop.prepared(*shared, solution, buffer)
+        table = call.address("solution.path")
+        call.words[table + 1] = len(samples.bundle.inputs)
+        return call, solution.counts, table
 
     @cached_property
     def _ready_mechanism(self) -> Ready:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import real_array
-from vehiclemor.codegen.derivation import Derivation, derivation, is_derived
+from vehiclemor.codegen.kernels import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.exceptions import GeometryError, InputError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition

@@ -11,7 +11,7 @@ from vehiclemor.codegen.derivatives import sensitivity
 from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
-    from vehiclemor.codegen.derivation import Derivation
+    from vehiclemor.codegen.kernels import Derivation
     from vehiclemor.multibody.definition import ModelDefinition
 
 # Step of a parameter in differences, as a part of it or of the second number (SI units).

@@ -17,9 +17,9 @@ from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.simulation.checks import left_validity, lifted_wheels
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
+from vehiclemor.simulation.evaluation import By, chosen
 from vehiclemor.simulation.integrators.catalogue import integrator
-from vehiclemor.simulation.integrators.mirror_image import partners
-from vehiclemor.simulation.kernel_derivatives import By, chosen
+from vehiclemor.simulation.integrators.step_kernels import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.recording import Recorder, Recording
 from vehiclemor.simulation.system import System

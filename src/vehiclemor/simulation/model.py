@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.derivation import Derivation
-from vehiclemor.codegen.kernels import BareKernel, Kernels
+from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.multibody.definition import ModelDefinition
@@ -20,15 +19,15 @@ from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.constants import components, constant_derivatives, solved_parameters
-from vehiclemor.simulation.kernel_derivatives import (
+from vehiclemor.simulation.evaluation import (
     CONSTANTS,
     PLACES,
     By,
+    at_samples,
     directional,
     parameter_names,
     partial,
 )
-from vehiclemor.simulation.paths import at_samples
 from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Names, Start, Trajectory
 
 NEEDED_FOR = {

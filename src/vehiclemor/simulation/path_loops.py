@@ -1,4 +1,4 @@
-"""Kernels along a path of states, and Jacobians by differences, compiled."""
+"""Kernels along a path of states, compiled."""
 
 import math
 
@@ -9,29 +9,25 @@ from vehiclemor.codegen.loop_types import (
     Vector,
     call_kernel,
     call_lanes,
-    mixed_rows,
 )
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.integrators.structures import (
-    DERIVATIVE,
     NODE_1,
     NODE_2,
     NODES,
-    Equations,
     Outputs,
 )
 
 # Of Lagrange's polynomials at the outer and inner points: 1 over their products of differences.
 OUTER = 1.0 / ((NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0))
 INNER = 1.0 / ((NODE_2 - NODE_1) * (2.0 * NODE_2 - 1.0) * (NODE_1 + NODE_2 - 1.0))
-
 # Of the distances of inner and outer points from the middle of a step: square, and difference.
 INNER_SQUARE = (0.5 - NODE_2) ** 2
 SQUARES = (0.5 - NODE_1) ** 2 - INNER_SQUARE
 
 INLINED = (
-    *("read_point", "weights_of", "entry", "value_at", "cubic_of", "cubics_within"),
-    *("point_of", "note_outside"),
+    *("entry", "value_at", "cubic_of", "cubic_at"),
+    *("cubics_within", "point_of", "note_outside"),
 )
 
 
@@ -106,14 +102,11 @@ def chosen(
                 result[k, sample] = value_at(table, row, z, own)
                 sample += 1
                 continue
-            even, even_slope, odd, odd_slope = cubic_of(table, row, own)
-            end = sample + 1
+            cubic, end = cubic_of(table, row, own), sample + 1
             while end < samples and places[end, 0] == places[sample, 0]:
                 end += 1
             for i in range(sample, end):
-                y = places[i, 1] - 0.5
-                w = y * y - INNER_SQUARE
-                result[k, i] = (even + w * even_slope) + y * (odd + w * odd_slope)
+                result[k, i] = cubic_at(cubic, places[i, 1])
             sample = end
     return 0
 
@@ -129,10 +122,24 @@ def evaluate(states, inputs, outputs, results):
 
 
 def sampled(points: Matrix, places: Matrix, histories: Matrix) -> Int:
-    """A table of whole vectors at the samples."""
+    """All columns of a table at the samples, which are not its points."""
     for sample in range(len(histories)):
         row, z = point_of(places, sample)
-        read_point(points, row, z, histories[sample])
+        if row < 0 or z < 0.0:
+            for i in range(histories.shape[1]):
+                histories[sample, i] = points[row, i] if row >= 0 else math.nan
+            continue
+        a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
+        p, q, r, s = b * c * d * OUTER, a * c * d * INNER, -a * b * d * INNER, -a * b * c * OUTER
+        first, second, third, fourth = (
+            points[row],
+            points[row + 1],
+            points[row + 2],
+            points[row + 3],
+        )
+        into = histories[sample]
+        for i in range(len(into)):
+            into[i] = (p * first[i] + q * second[i]) + (r * third[i] + s * fourth[i])
     return 0
 
 
@@ -154,12 +161,6 @@ def note_outside(states, results, point, outputs, sample, samples, first):
             first[k] = sample
 
 
-def weights_of(z):
-    """Weights of the points of a step where its part z has passed: Lagrange's polynomials."""
-    a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
-    return b * c * d * OUTER, a * c * d * INNER, -a * b * d * INNER, -a * b * c * OUTER
-
-
 def entry(states, results, row, z, column):
     """An output at a point of a run, or where the part z of a step has passed, see `Outputs`."""
     if column >= 0:
@@ -173,10 +174,7 @@ def value_at(table, row, z, column):
         return math.nan
     if z < 0.0:
         return table[row, column]
-    p, q, r, s = weights_of(z)
-    return (p * table[row, column] + q * table[row + 1, column]) + (
-        r * table[row + 2, column] + s * table[row + 3, column]
-    )
+    return cubic_at(cubic_of(table, row, column), z)
 
 
 def cubic_of(table, row, column):
@@ -189,16 +187,12 @@ def cubic_of(table, row, column):
     return even, even_slope, odd, odd_slope
 
 
-def read_point(points, row, z, into):
-    """All columns of a table, as `entry`."""
-    if row < 0:
-        for i in range(len(into)):
-            into[i] = math.nan
-    elif z < 0.0:
-        for i in range(len(into)):
-            into[i] = points[row, i]
-    else:
-        mixed_rows(points[row:], weights_of(z), into)
+def cubic_at(cubic, z):
+    """Such a cubic where the part z of the step has passed."""
+    even, even_slope, odd, odd_slope = cubic
+    y = z - 0.5
+    w = y * y - INNER_SQUARE
+    return (even + w * even_slope) + y * (odd + w * odd_slope)
 
 
 def cubics_within(states, results, row, outputs):
@@ -218,25 +212,3 @@ def cubics_within(states, results, row, outputs):
         if low - margin < ranges[k, 0] or high + margin > ranges[k, 1]:
             return False
     return True
-
-
-def jacobian_at(
-    x: Vector, u: Vector, equations: Equations, active: IntVector, work: Matrix, result: Matrix
-) -> Int:
-    """Columns of df/dx (n, n) by central differences; inactive ones are zero."""
-    size, kernels, constants = len(x), equations.kernels, equations.constants
-    shifted, above, below = work[0], work[1], work[2]
-    for i in range(size):
-        for j in range(size):
-            result[i, j] = 0.0
-    for column in active:
-        change = 6e-6 * max(abs(x[column]), 1.0)
-        for i in range(size):
-            shifted[i] = x[i]
-        shifted[column] = x[column] + change
-        call_kernel(kernels, DERIVATIVE, shifted, u, constants, above)
-        shifted[column] = x[column] - change
-        call_kernel(kernels, DERIVATIVE, shifted, u, constants, below)
-        for i in range(size):
-            result[i, column] = (above[i] - below[i]) / (2.0 * change)
-    return 0

@@ -6,13 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Ready, address_of_array, cache_lines, ready
+from vehiclemor.codegen.loops import Ready, address_of_array, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import limits_of
+from vehiclemor.simulation.evaluation import address_of, evaluate, path_loops
 from vehiclemor.simulation.integrators.structures import Outputs
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.paths import address_of, evaluate, path_loops
 from vehiclemor.simulation.workspaces import Run
 
 NO_RANGES = np.empty((0, 2))
@@ -109,19 +109,15 @@ class Recording:
     @cached_property
     def state_history(self) -> np.ndarray:
         """States (samples, n)."""
-        columns = self.states.shape[1]
-        table = np.pad(self.states, ((0, 0), (0, -columns % LANES)))
-        return self._cut(self._sampled(table)[:, :columns])
+        return self._cut(self._sampled(self.states))
 
     @cached_property
     def output_history(self) -> np.ndarray:
         """Outputs (samples, number of outputs)."""
         model = self._recorder.model
-        columns = len(model.outputs)
-        # What happens to stand behind the outputs may take a hundred times as long to add.
-        table = np.zeros((len(self.states), columns + -columns % LANES))
+        table = np.empty((len(self.states), len(model.outputs)))
         evaluate(model.kernels, "outputs", model.constants, (self.states, self.inputs), table)
-        return self._cut(self._sampled(table)[:, :columns])
+        return self._cut(self._sampled(table))
 
     def columns(self, names: tuple[str, ...]) -> np.ndarray:
         """Some outputs, coordinates or speeds (samples, names), without the others."""
@@ -146,9 +142,9 @@ class Recording:
         return history
 
     def _sampled(self, table: np.ndarray) -> np.ndarray:
-        """A table at the points, its rows whole vectors, at the samples."""
+        """A table at the points, at the samples."""
         if not len(self.places):
-            return table
-        histories = cache_lines(len(self.places), table.shape[1])
+            return table.copy()
+        histories = np.empty((len(self.places), table.shape[1]))
         path_loops()["sampled"](table, self.places, histories)
         return histories

@@ -18,11 +18,11 @@ import numpy as np
 from vehiclemor.codegen.loops import ready
 from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.polynomial_loops import Pieces
+from vehiclemor.simulation.evaluation import CONSTANTS, STATE, directional, partial
 from vehiclemor.simulation.integrators.structures import Output, Spans
-from vehiclemor.simulation.kernel_derivatives import CONSTANTS, STATE, directional, partial
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Solver, Workspace
+from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Pool, Solver, Workspace
 
 # Shortest step in s: the time loop takes times that differ by less for one.
 SHORTEST = 1e-9
@@ -93,10 +93,7 @@ class SteppedSystem:
         ConvergenceError
             If the integration fails.
         """
-        try:
-            held = self._pool.pop()
-        except IndexError:
-            held = self._packed()
+        held = self._pool.taken(None, self._packed)
         space, coefficients = held.space, held.coefficients
         start, output = space.start, space.output
         start[:] = state
@@ -120,12 +117,12 @@ class SteppedSystem:
                 raise ConvergenceError(f"{REASONS[status]} at t = {reached:.6g} s")
             start[:] = output.path[0]
         found = start.copy()
-        self._pool.append(held)
+        self._pool.give_back(None, held)
         return found
 
     @cached_property
-    def _pool(self) -> list[StepSpace]:
-        return []
+    def _pool(self) -> Pool[StepSpace]:
+        return Pool()
 
     def _parts(self, time: float, dt: float) -> Iterator[tuple[float, float, int]]:
         """Parts of a step in one window each: beginning after `time`, length, window."""

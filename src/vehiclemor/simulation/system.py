@@ -17,10 +17,10 @@ from vehiclemor.inputs.polynomials import recorded_inputs, signal_of
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, output_times
 from vehiclemor.simulation.control_periods import ControlPeriods
+from vehiclemor.simulation.evaluation import address_of, at_samples
 from vehiclemor.simulation.formulations import FORMULATIONS
 from vehiclemor.simulation.integrators import catalogue
-from vehiclemor.simulation.integrators.mirror_image import mirror_blocks, signs
-from vehiclemor.simulation.integrators.step_kernels import Frame
+from vehiclemor.simulation.integrators.step_kernels import Frame, mirror_blocks, signs
 from vehiclemor.simulation.integrators.structures import (
     NOT_FINITE,
     SINGULAR,
@@ -30,7 +30,6 @@ from vehiclemor.simulation.integrators.structures import (
     Method,
     Output,
 )
-from vehiclemor.simulation.paths import address_of, at_samples, path_loops
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
 from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Pool, Run, Solver, Workspace
@@ -81,10 +80,14 @@ class System(ShortRepr):
 
     def jacobian(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """df/dx (dim, dim) by central differences; columns of inactive states are zero."""
-        result = np.empty((len(x), len(x)))
-        loop = path_loops()["jacobian_at"]
-        equations, work = self.called("full"), np.empty((3, len(x)))
-        loop(loop_array(x), loop_array(u), equations, self.active, work, result)
+        result, sides, u = np.zeros((len(x), len(x))), np.empty((2, len(x))), loop_array(u)
+        for column in self.active:
+            change = 6e-6 * max(abs(x[column]), 1.0)
+            for side, moved in zip(sides, (change, -change), strict=True):
+                shifted = np.array(x, dtype=float)
+                shifted[column] += moved
+                self.kernels.call("derivative", shifted, u, self.constants, side)
+            result[:, column] = (sides[0] - sides[1]) / (2.0 * change)
         return result
 
     def values_at(self, kernel: str, path: np.ndarray, inputs: np.ndarray, size: int) -> np.ndarray:
@@ -223,7 +226,7 @@ class System(ShortRepr):
         given, points = NO_POINTS[0], NO_POINTS[1:]
         if solver.times is None and not solver.begin:
             given = drive.inputs.copy()
-            cubic = "cubic" in catalogue.integrator(solver.name).modules
+            cubic = catalogue.integrator(solver.name).cubic
             if cubic and len(times) >= LANES and direct_until < times[-1]:
                 points = np.empty(given.shape), np.empty(len(times)), np.empty((len(times), 2))
         output = Output(times, path, counts, given, *points, direct_until)
@@ -242,8 +245,7 @@ class System(ShortRepr):
         self, windows: ControlPeriods, solver: Solver, drive: DrivenBy, output: Output
     ) -> Workspace:
         """The time loop with all its arguments, see `integrators/loop.integrate`."""
-        name = catalogue.ALIASES.get(solver.name, solver.name)
-        chosen = catalogue.integrator(name)
+        name, chosen = solver.name, catalogue.integrator(solver.name)
         full = windows.formulation == "full"
         if catalogue.frozen(name) and not full:
             raise InputError(f"{name} freezes the full model's Jacobian: not for a reduced model")
@@ -252,14 +254,14 @@ class System(ShortRepr):
         longest = float(solver.longest_step or np.inf)
         start = np.empty(n)
         buffer = np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs))
-        call = catalogue.time_loop(chosen, formulation).prepared(
+        call = catalogue.time_loop(name, formulation).prepared(
             start,
             self.called(formulation, name if full else ""),
             drive.signal,
             drive.spans,
             windows.subspaces,
             self.method(name, self.active if full else np.arange(dim)),
-            catalogue.control_of(solver.name, float(solver.tolerance), longest),
+            catalogue.control_of(name, float(solver.tolerance), longest),
             output,
             buffer,
             np.empty(dim + 8, dtype=np.int64),

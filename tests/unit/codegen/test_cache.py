@@ -1,4 +1,4 @@
-"""Files of the cache are checked by content, name and owner; nothing unchecked is executed."""
+"""Files are whole or not there; the cache is checked, made by one; what takes long is told."""
 
 import ast
 import logging
@@ -15,8 +15,12 @@ from pathlib import Path
 
 import pytest
 
+from vehiclemor import progress
 from vehiclemor.codegen import cache
 from vehiclemor.codegen.cache import cache_folder, fetched, once
+from vehiclemor.exceptions import MachineError
+from vehiclemor.files import remove_leftovers, temporary_path, write_text, write_whole
+from vehiclemor.progress import first_use, making
 
 PACKAGE = Path(cache.__file__).parents[1]
 NAME = "kernels/some-0123.o"
@@ -234,3 +238,129 @@ def test_what_threads_ask_for_together_is_made_once_and_tried_again_if_it_fails(
         found = set(pool.map(ask, range(8)))
     assert tries == ["a", "a"]
     assert len(found) == 1
+
+
+LOOP = """
+import logging
+from vehiclemor import progress
+progress.QUIET = 0.0
+from vehiclemor.codegen.loops import loops
+{before}
+loops(("simulation.path_loops",), ("kernel_path",))
+"""
+
+
+def test_what_takes_long_is_told_of_and_its_end_if_it_has_one(monkeypatch, caplog):
+    caplog.set_level(logging.INFO, "vehiclemor")
+    with first_use("a model"), making("kernel"):
+        pass
+    assert not caplog.messages
+    monkeypatch.setattr(progress, "QUIET", 0.3)
+    with suppress(ZeroDivisionError), first_use("what fails"), making("kernel"):
+        time.sleep(0.4)
+        raise ZeroDivisionError
+    # No part of it takes so long, but both do.
+    with first_use("a model"):
+        for part in ("derivation", "kernel"):
+            with making(part):
+                time.sleep(0.2)
+    failed, began, ended = caplog.messages
+    assert "first use of what fails" in failed
+    assert "first use of a model" in began
+    assert "a model: compiled in" in ended
+    assert float(ended.split()[-2]) >= 0.4
+
+
+def test_a_process_tells_of_what_it_compiles_and_nothing_when_it_is_there(tmp_path: Path):
+    def told(before: str, cache: Path) -> list[str]:
+        command = [sys.executable, "-c", LOOP.format(before=before)]
+        own = {**os.environ, "VEHICLEMOR_CACHE": str(cache)}
+        done = subprocess.run(command, env=own, capture_output=True, text=True, check=True)
+        return done.stderr.splitlines()
+
+    began, ended = told("", tmp_path / "1")
+    assert began.startswith("first use of path_loops")
+    assert ended.startswith("path_loops: compiled in ")
+    assert told("", tmp_path / "1") == []
+    # An application's own handlers print them, and nothing else does.
+    began, ended = told("logging.basicConfig(format='mine: %(message)s')", tmp_path / "2")
+    assert began.startswith("mine: first use of path_loops")
+    assert ended.startswith("mine: path_loops: compiled in ")
+
+
+def test_of_several_that_want_a_file_one_makes_it_and_others_wait(folder):
+    begun, finish, made = threading.Event(), threading.Event(), []
+
+    def make() -> bytes:
+        begun.set()
+        assert finish.wait(60.0)
+        made.append(1)
+        return b"content"
+
+    found: list[bytes] = []
+
+    def want() -> None:
+        found.append(fetched("kernels/some-0123.o", make))
+
+    threads = [threading.Thread(target=want) for _ in range(3)]
+    threads[0].start()
+    assert begun.wait(60.0)
+    for thread in threads[1:]:
+        thread.start()
+    finish.set()
+    for thread in threads:
+        thread.join()
+    assert (found, made) == ([b"content"] * 3, [1])
+    # Nothing is left of the locks.
+    assert [path.name for path in (folder / "kernels").iterdir()] == ["some-0123.o"]
+
+
+def test_an_error_of_the_maker_is_its_own_and_frees_the_lock(folder):
+    def fail() -> bytes:
+        raise OSError("no compiler")
+
+    with pytest.raises(OSError, match="no compiler"):
+        fetched("kernels/some-0123.o", fail)
+    assert fetched("kernels/some-0123.o", lambda: b"content") == b"content"
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_write_leaves_the_old_file_until_the_new_one_is_complete(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "file.txt", "old")
+
+    def write(temporary: Path) -> None:
+        assert temporary.suffix == ".txt"
+        temporary.write_text("new")
+        assert path.read_text() == "old"
+
+    def broken(temporary: Path) -> None:
+        write(temporary)
+        raise KeyboardInterrupt
+
+    for writer, content in ((broken, "old"), (write, "new")):
+        with suppress(KeyboardInterrupt):
+            write_whole(path, writer)
+        assert path.read_text() == content
+        assert names_in(tmp_path) == ["file.txt"]
+
+
+def test_a_disk_error_is_one_line(tmp_path: Path) -> None:
+    def full(_: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    line = r"file\.txt: can't be written \(No space left on device\)"
+    with pytest.raises(MachineError, match=line):
+        write_whole(tmp_path / "file.txt", full)
+
+
+def test_old_leftovers_alone_are_removed(tmp_path: Path) -> None:
+    old, new = (temporary_path(tmp_path / "a.nc") for _ in range(2))
+    for path in (old, new, tmp_path / "a.nc"):
+        path.touch()
+    for path in (old, tmp_path / "a.nc"):
+        os.utime(path, (0, 0))
+    remove_leftovers(tmp_path)
+    assert names_in(tmp_path) == sorted([new.name, "a.nc"])

@@ -11,7 +11,7 @@ from tests.unit.programs import precise, run
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.lowering import kernels_of
 from vehiclemor.codegen.operations import Kernel, Listing
-from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 

@@ -1,6 +1,5 @@
 """Loops: ordinary functions with declared arguments, compiled together and called by address."""
 
-from importlib.metadata import requires, version
 from types import ModuleType
 from typing import NamedTuple
 
@@ -12,9 +11,9 @@ from tests.unit.kernels import kernel
 from vehiclemor.codegen import loop_types
 from vehiclemor.codegen import loops as module
 from vehiclemor.codegen.compiler import compiled_loops, inlined_kernel
-from vehiclemor.codegen.kernels import Kernels, MachineCode
+from vehiclemor.codegen.kernels import MachineCode
 from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, declared_arguments
-from vehiclemor.codegen.loops import Loop, address_of_array, cache_lines, ready
+from vehiclemor.codegen.loops import Loop, address_of_array, ready
 
 
 class Pair(NamedTuple):
@@ -94,14 +93,6 @@ def test_prepared_arguments_serve_many_runs_and_their_words_can_be_replaced(loop
     assert run.words[run.address("bundle.rows") + 1] == len(bundle.rows)
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (7, 3), (1251, 64)])
-def test_matrices_begin_with_a_cache_line(shape):
-    for _ in range(5):
-        matrix = cache_lines(*shape)
-        assert (matrix.shape, matrix.ctypes.data % 64) == (shape, 0)
-        assert matrix.flags.carray
-
-
 def test_a_later_module_takes_the_place_of_an_earlier_one(bundle):
     other = compiled(ENTRY, "def changed(value, factor):\n    return factor + 0.0 * value\n")
     result = np.empty(3)
@@ -146,28 +137,6 @@ def test_a_loop_that_makes_arrays_is_refused(made):
     np.testing.assert_array_equal(result, 7.0)
 
 
-VIEWS = """
-def entry(buffer: Vector, result: Vector) -> Int:
-    part, block = vector(buffer, 2, 3), matrix(buffer, 5, 2, 3)
-    for i in range(len(part)):
-        result[i] = part[i] + 10.0 * block[0, i] + 100.0 * block[1, i]
-    block[1, 2] = -1.0
-    return block.shape[0]
-"""
-
-
-def test_parts_of_a_buffer_are_the_buffer_itself():
-    buffer, result = np.arange(12.0), np.empty(3)
-    assert compiled(VIEWS)(buffer, result) == 2
-    np.testing.assert_array_equal(result, [852.0, 963.0, 1074.0])
-    assert buffer[10] == -1.0
-    # In plain Python the same.
-    again, other = np.arange(12.0), np.empty(3)
-    assert module_of(VIEWS).entry(again, other) == 2
-    np.testing.assert_array_equal(again, buffer)
-    np.testing.assert_array_equal(other, result)
-
-
 def double(x, u, constants, result):
     result[0] = 2.0 * x[0] + u[0]
 
@@ -177,17 +146,6 @@ def triple(x, u, constants, result):
 
 
 KERNEL = kernel(double)
-
-
-def test_kernels_are_called_by_their_addresses():
-    loop = compiled("""
-def entry(kernels: IntVector, x: Vector, result: Vector) -> Int:
-    call_kernel(kernels, 1, x, x, x, result)
-    return 0
-""")
-    kernels, result = Kernels([KERNEL]), np.empty(1)
-    loop(np.array([0, kernels.address("double")]), np.array([1.5]), result)
-    assert result == [4.5]
 
 
 def test_kernels_are_written_where_they_are_called():
@@ -229,13 +187,3 @@ def test_another_source_kernel_size_or_compiler_is_another_file(monkeypatch):
         ask()
     assert names[0] == names[1]
     assert len(set(names)) == len(names) - 1
-
-
-def test_numba_is_of_a_version_that_was_seen_to_work():
-    """Runs of vehicle and suspension were made with 0.61, 0.63, 0.65 and 0.68."""
-    oldest, newest = (0, 61), (0, 68)
-    installed = tuple(map(int, version("numba").split(".")[:2]))
-    assert oldest <= installed <= newest
-    allowed = next(text for text in requires("vehiclemor") or () if text.startswith("numba"))
-    bounds = {">=0.61", "<0.69"}
-    assert set(allowed.removeprefix("numba").split(",")) == bounds

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from tests.unit import standard_problems
-from vehiclemor.codegen import derivation as kept
+from vehiclemor.codegen import kernels as kept
 from vehiclemor.codegen import sources
-from vehiclemor.codegen.derivation import derivation
+from vehiclemor.codegen.kernels import derivation
 from vehiclemor.codegen.sources import plug_in_digest
 from vehiclemor.exceptions import PlugInError
 from vehiclemor.multibody import definition

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.oracles import kinematics
+from tests.oracles import double_wishbone
 from vehiclemor.exceptions import GeometryError
 from vehiclemor.simulation.build import build
 
@@ -21,7 +21,7 @@ def test_design_position_is_zero_but_for_the_tie_rod(model):
 def test_closures_hold_wherever_the_wheel_goes(model, points, height, rack):
     u = np.array([height, rack])
     q = model.solve(u)
-    assert np.abs(kinematics.residual(points, q, u)).max() < 1e-12
+    assert np.abs(double_wishbone.residual(points, q, u)).max() < 1e-12
     # No turn of an arm or of the carrier by more than 40 degrees: still the design's branch.
     assert np.abs(q - model.design).max() < 0.7
     jacobian = model.jacobian(q, u)[:7, :7]
@@ -31,11 +31,11 @@ def test_closures_hold_wherever_the_wheel_goes(model, points, height, rack):
 def test_outputs_and_joints_are_those_of_the_specification(model, points, rng):
     paths = rng.uniform(-0.5, 0.5, (20, 8))
     for q, found in zip(paths, model.outputs_at(paths, np.zeros((20, 2))), strict=True):
-        expected = kinematics.outputs(points, q)
+        expected = double_wishbone.outputs(points, q)
         assert list(found) == pytest.approx([expected[n] for n in model.outputs], abs=1e-14)
         joints = model.joints_at(q)
         for name in ("upper_ball_joint", "lower_ball_joint", "tie_rod_outer", "wheel_centre"):
-            place = kinematics.carrier_point(points, q, name)
+            place = double_wishbone.carrier_point(points, q, name)
             assert joints[name] == pytest.approx(place, abs=1e-14)
         rack_end = points["tie_rod_inner"] + [0.0, q[7], 0.0]
         assert joints["tie_rod_inner"] == pytest.approx(rack_end, abs=1e-15)

@@ -8,10 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.unit.programs import pivot_shares
 from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.high_fidelity.definition import check
-from vehiclemor.multibody.high_fidelity.equations import CORNER, LOWER_ARMS, PIVOTS
 from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -184,42 +182,3 @@ def test_limits_are_where_statics_puts_them(given_values):
 
 
 # Pivots of the front corners' fixed elimination
-
-# Place of the lower arm among a corner's seven coordinates, and the others.
-LOWER_ARM = CORNER[0].index(LOWER_ARMS[0])
-DEPENDENT = np.delete(np.arange(7), LOWER_ARM)
-
-
-def dependent_blocks(model, x: np.ndarray, u: np.ndarray) -> list[np.ndarray]:
-    """Jacobians (6, 6) of both corners' closures but by the lower arm."""
-    by_q = model.descriptor(x, u)[2]
-    return [by_q[6 * k : 6 * k + 6, own.start + DEPENDENT] for k, own in enumerate(CORNER)]
-
-
-def closed(model, angle: float, rack: float) -> tuple[np.ndarray, np.ndarray]:
-    """State and inputs with closed corners and the same travel on both sides."""
-    x, u = model.start(), np.zeros(3)
-    for share in np.linspace(0.0, 1.0, 8)[1:]:
-        u[0] = share * rack
-        x[list(LOWER_ARMS)] = share * angle, -share * angle
-        for _ in range(6):
-            gaps, _ = model.violations(x, u)
-            for k, block in enumerate(dependent_blocks(model, x, u)):
-                x[CORNER[k].start + DEPENDENT] -= np.linalg.solve(block, gaps[6 * k : 6 * k + 6])
-    assert np.abs(model.violations(x, u)[0]).max() < 1e-14
-    return x, u
-
-
-@pytest.mark.parametrize("rack", [-0.03, 0.0, 0.03])
-def test_pivots_of_the_vehicle_stay_away_from_zero(rack, rng):
-    model, shares, smallest = built(), [], []
-    for angle in np.linspace(-0.35, 0.35, 15):
-        x, u = closed(model, angle, rack)
-        # A stabilised corner is closed up to a millirad.
-        for state in (x, x + np.concatenate([rng.uniform(-1e-3, 1e-3, 26), np.zeros(26)])):
-            for block in dependent_blocks(model, state, u):
-                shares.append(min(pivot_shares(block, PIVOTS)))
-                smallest.append(np.linalg.svd(block, compute_uv=False)[-1])
-    # Every pivot is all but the largest of its column: no digit is lost.
-    assert min(shares) > 0.9
-    assert min(smallest) > 0.07

@@ -12,16 +12,14 @@ from tests.oracles.high_fidelity_data import PARAMETERS as SPECIFIED
 from tests.oracles.high_fidelity_data import fiala
 from tests.oracles.vehicle_lagrange import (
     PARAMETERS,
-    cornering_stiffness,
     magic_formula,
-    trail_at_rest,
 )
 from tests.unit.programs import function_of
 from vehiclemor.multibody.components import tires
 from vehiclemor.multibody.quantities import FIALA
 from vehiclemor.symbolic.tape import Tape
 
-ALONG, ACROSS, MOST, LEAST, WIDTH = COEFFICIENTS = [
+ALONG, ACROSS, MOST, LEAST, _ = COEFFICIENTS = [
     SPECIFIED[f"tyre.{name}"] for name in ("c_long", "c_alpha", "mu_max", "mu_min", "width")
 ]
 REFERENCE_LOAD = PARAMETERS["FNOMIN"] * PARAMETERS["LFZO"]
@@ -90,36 +88,6 @@ def test_an_unloaded_tire_has_no_force(tire, kappa, slip):
     # No load, and no slip in one or both directions: nothing is divided by zero.
     for slipping in ((kappa, slip), (0.0, 0.0), (kappa, 0.0), (0.0, slip)):
         assert not tire(0.0, *slipping).any()
-
-
-@each
-@given(load=loads, kappa=slips, slip=slips)
-def test_forces_mirror_their_slips_and_act_against_the_sliding(tire, load, kappa, slip):
-    fx, fy, mz = tire(load, kappa, slip)
-    assert tire(load, kappa, -slip) == pytest.approx([fx, -fy, -mz], rel=1e-14, abs=1e-12)
-    fx, fy, mz = tire(load, kappa, 0.0)
-    assert fx * kappa >= 0.0
-    assert (fy, mz) == (0.0, 0.0)
-    assert tire(load, -kappa, 0.0)[0] == pytest.approx(-fx, rel=1e-14, abs=1e-12)
-    assert tire(load, 0.0, slip)[1] * slip <= 0.0
-
-
-@each
-@given(load=loads)
-def test_stiffnesses_are_the_slopes_without_slip(tire, load):
-    h = 1e-7 * load / ACROSS
-    fx = (tire(load, h, 0.0) - tire(load, -h, 0.0))[0] / (2 * h)
-    _, fy, mz = (tire(load, 0.0, h) - tire(load, 0.0, -h)) / (2 * h)
-    d = load / REFERENCE_LOAD - 1.0
-    by_load = load * (PARAMETERS["PKX1"] + PARAMETERS["PKX2"] * d) * np.exp(PARAMETERS["PKX3"] * d)
-    expected = {
-        "magic formula": (by_load, cornering_stiffness(load, PARAMETERS)),
-        "fiala": (ALONG, -ACROSS),
-    }["fiala" if tire is TIRES["fiala"] else "magic formula"]
-    # A third of the contact, for a pressure that is a parabola.
-    trail = WIDTH / 3 if tire is TIRES["fiala"] else trail_at_rest(load, PARAMETERS)
-    assert [fx, fy] == pytest.approx(expected, rel=1e-5)
-    assert mz == pytest.approx(-trail * fy, rel=1e-5)
 
 
 @pytest.mark.parametrize(

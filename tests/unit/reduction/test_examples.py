@@ -1,19 +1,20 @@
 """The examples: models in loops with what answers them."""
 
 import runpy
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import vehiclemor as vm
-from tests.texts.markdown import ROOT
 
+EXAMPLES = Path(__file__).parents[3] / "examples"
 CARS = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 
 
 def example(name):
-    return SimpleNamespace(**runpy.run_path(str(ROOT / "examples" / f"{name}.py")))
+    return SimpleNamespace(**runpy.run_path(str(EXAMPLES / f"{name}.py")))
 
 
 @pytest.fixture(scope="module", params=CARS)

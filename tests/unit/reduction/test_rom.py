@@ -184,9 +184,8 @@ WRONG: list[tuple[str, dict[str, Any]]] = [
 
 @pytest.mark.parametrize(("method", "given"), WRONG)
 def test_what_cannot_be_reduced_is_refused(method, given):
-    with pytest.raises(InputError) as error:
+    with pytest.raises(InputError):
         vm.reduce(WISHBONE, method, **given)
-    assert "\n" not in str(error.value)
 
 
 BAD_STEPS = [
@@ -201,9 +200,8 @@ BAD_STEPS = [
 @pytest.mark.parametrize(("name", "value"), BAD_STEPS)
 def test_wrong_steps_are_refused(linear, name, value):
     given = {"state": linear.state(), "inputs": [0.0], "dt": 0.01} | {name: value}
-    with pytest.raises(InputError, match=rf"^(.*: )?{name}\b") as error:
+    with pytest.raises(InputError, match=rf"^(.*: )?{name}\b"):
         linear.step(**given)
-    assert "\n" not in str(error.value)
 
 
 def test_a_wrong_sample_is_refused(linear):

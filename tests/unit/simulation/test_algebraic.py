@@ -1,10 +1,11 @@
-"""Full-order solvers: accuracy, counts, branch safety, and errors that name what is reachable."""
+"""Full-order solvers of mechanisms: accuracy, counts, branches; wrong paths of any model."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from tests.reducing import fitted
 from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
 from vehiclemor.reduction.methods.full_order import FullOrderMechanism
 from vehiclemor.registry import component
@@ -109,7 +110,7 @@ TIMES = np.array([0.0, 0.5])
         ),
         *(
             (call, arguments, named)
-            for call in ("residual", "jacobian", "newton_step")
+            for call in ("residual", "jacobian")
             for *arguments, named in (
                 (np.zeros(7), np.zeros(2), r"\bq\b.*\(8,\)"),
                 (np.zeros(8), np.zeros(3), r"\bu\b.*\(2,\)"),
@@ -137,3 +138,65 @@ def test_wrong_arguments_are_named(model, call, arguments, named):
 def test_what_is_of_no_mechanism_is_refused(model, nominal, wrong, named):
     with pytest.raises(InputError, match=named):
         model.simulate(**({"maneuver": nominal} | wrong))
+
+
+MODELS = ("double_wishbone", "independent_suspension_vehicle", "high_fidelity_vehicle")
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def each_model(request):
+    return build(request.param)
+
+
+@pytest.mark.parametrize("function", ["outputs_at", "residual_at", "rhs_at"])
+def test_paths_of_another_shape_or_not_finite_are_refused(each_model, function):
+    call = getattr(each_model, function, None)
+    if call is None:
+        assert (function == "residual_at") == (each_model.kind != "ae")
+        return
+    n, m = len(each_model.definition.states), len(each_model.inputs)
+    states, inputs = np.zeros((5, n)), np.zeros((5, m))
+    bad = np.zeros((5, n))
+    bad[3, 1] = np.nan
+    wrong = [
+        (np.zeros((1000, n)), inputs),
+        (states, np.zeros((1, m))),
+        (states[:, :3], inputs),
+        (states, np.zeros((5, m + 1))),
+        (states[0], inputs),
+        (states[None], inputs),
+        (states, None),
+        ("abc", inputs),
+        (bad, inputs),
+        (states, np.full((5, m), np.inf)),
+    ]
+    for path in wrong:
+        with pytest.raises(InputError, match=r"states|inputs"):
+            call(*path)
+    with pytest.raises(InputError, match=r"states\[3, 1\] is not finite"):
+        call(bad, inputs)
+
+
+NO_TIMES = [], [0.0, 2.0, 1.0], [0.0, 1e3], [-1.0, 0.0], [0.0, np.nan], [[0, 1]], 1, "a"
+NO_STARTS = np.zeros(3), np.zeros((2, 8)), [np.nan] * 28, "abc", 1.0
+
+
+@pytest.mark.parametrize(
+    ("argument", "values", "named"),
+    [("times", NO_TIMES, "output times"), ("start", NO_STARTS, "start")],
+)
+def test_times_and_starts_that_are_none_are_refused(each_model, argument, values, named):
+    maneuver = component("maneuver", each_model.definition.maneuver)
+    for wrong in values:
+        with pytest.raises(InputError, match=named):
+            each_model.simulate(maneuver, **{argument: wrong})
+
+
+def test_a_reduced_mechanism_that_diverges_tells_its_counts(model, nominal):
+    reduced = fitted(model, nominal, "pod", rank=3)
+    run = reduced.simulate(nominal.perturbed(amplitude=4.0), "equilibrium")
+    assert run.status == "diverged"
+    solved = int(np.isfinite(run.coordinates[:, 0]).sum())
+    assert solved > 100
+    assert run.counts["iterations"] >= solved + 50
+    assert run.counts["jacobian_evaluations"] == run.counts["iterations"]

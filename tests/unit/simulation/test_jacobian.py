@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.oracles import complex_step
 from vehiclemor.codegen.derivatives import Sensitivity
@@ -13,7 +11,6 @@ from vehiclemor.simulation.build import build
 
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 MODELS = ("double_wishbone", *VEHICLES)
-FUNCTIONS = {"rhs": "derivative", "outputs": "outputs", "residual": "residual"}
 
 
 @pytest.fixture(scope="module")
@@ -21,36 +18,6 @@ def runs():
     """Model -> it and its nominal run, whose states can be reached."""
     models = [build(name) for name in MODELS]
     return {m.name: (m, m.simulate(component("maneuver", m.definition.maneuver))) for m in models}
-
-
-@pytest.mark.parametrize("by", ["state", "inputs"])
-@pytest.mark.parametrize(
-    ("name", "of"),
-    [(name, of) for name in VEHICLES for of in ("rhs", "outputs")]
-    + [("double_wishbone", "residual")],
-)
-@settings(max_examples=8, deadline=None)
-@given(part=st.floats(0.3, 1.0), seed=st.integers(0, 2**32 - 1))
-def test_jacobians_are_those_of_the_complex_step(runs, name, of, by, part, seed):
-    model, run = runs[name]
-    sample = round(part * (len(run.times) - 1))
-    x, u = run.states[sample], run.inputs[sample]
-    source = model.equations.sources[FUNCTIONS[of]]
-    place = ("state", "inputs").index(by)
-    size = np.maximum(np.abs((x, u)[place]), 1e-3)
-    directions = [np.zeros_like(array) for array in (x, u, model.constants)]
-    directions[place] = size * np.random.default_rng(seed).normal(size=len(size))
-    expected = complex_step.derivative_along(source, (x, u, model.constants), directions)
-    jacobian = model.jacobian(x, u, by, of)
-    found = jacobian @ directions[place]
-    # Rounding is a part of the largest number that is added up; forces are differences of others.
-    terms = np.abs(jacobian) @ np.abs(directions[place])
-    allowed = 1e-12 * np.maximum(terms, terms.max() if of == "rhs" else 1.0)
-    right = np.abs(found - expected) <= allowed
-    if of == "outputs":
-        # Norms of what is zero but for rounding.
-        right |= [output.endswith("_drift") for output in model.outputs]
-    assert right.all()
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.kernel_derivatives import By
+from vehiclemor.simulation.evaluation import By
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.structures.model import SOLVER, USUAL, StructuralModel
 from vehiclemor.simulation.system import System

@@ -21,8 +21,8 @@ from vehiclemor.reduction.projection.structural import (
     reduced,
 )
 from vehiclemor.reduction.training import Training
-from vehiclemor.simulation.structures.factors import factored
 from vehiclemor.simulation.structures.model import StructuralModel
+from vehiclemor.simulation.structures.system import factored
 
 # A vector of which no more than this part is new is left out.
 NEW = 1e-8

@@ -21,7 +21,7 @@ from pydantic import Field
 from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
 from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value
-from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.exceptions import InputError, UnreachableError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
@@ -31,9 +31,9 @@ from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import loop_array
-from vehiclemor.simulation.kernel_derivatives import By
+from vehiclemor.simulation.evaluation import By
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.newton.newton_loops import Samples
+from vehiclemor.simulation.newton_loops import Samples
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Pool
@@ -80,7 +80,7 @@ def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -
 def map_loop(inputs: int, moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> Loop:
     """Compiled loop of polynomials of that total degree in those of the inputs that move."""
     sizes = {"INPUTS": inputs, "QUANTITIES": len(columns)}
-    modules = "simulation.newton.newton_loops", "reduction.map_loops"
+    modules = "simulation.newton_loops", "reduction.map_loops"
     kernels = {"polynomials": map_kernel(moving, degree, columns)}
     return loops(modules, ("map_path",), kernels, sizes)["map_path"]
 

@@ -28,7 +28,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.registry import choice
 from vehiclemor.simulation.algebraic import AlgebraicModel, new_counts
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.newton.newton_loops import SAMPLE, Iteration, Solution
+from vehiclemor.simulation.newton_loops import SAMPLE, Iteration, Solution
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory
 from vehiclemor.sizes import require, shaped

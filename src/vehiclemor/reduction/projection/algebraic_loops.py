@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
 from vehiclemor.simulation.integrators.dense_solves import small_solve
-from vehiclemor.simulation.newton.newton_loops import (
+from vehiclemor.simulation.newton_loops import (
     CONVERGED,
     INPUTS,
     SAMPLE,

@@ -17,7 +17,6 @@ from pydantic import Field
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomial_loops import Pieces
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.bases import (
     Basis,
@@ -33,9 +32,6 @@ from vehiclemor.reduction.settings import ProjectedSolver, Settings, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.integrators import catalogue
-from vehiclemor.simulation.integrators.loop import scratch_end
-from vehiclemor.simulation.integrators.structures import Place
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 from vehiclemor.simulation.workspaces import Solver
@@ -199,18 +195,25 @@ class DynamicProjection(ReducedSystem):
 
     def reduced_jacobian(self, window: int, y: np.ndarray) -> np.ndarray:
         """Jacobian of one window's reduced system at y (dim,) by differences, all inputs zero."""
-        n, inputs, spaces = 2 * len(self.model.coordinates), len(self.model.inputs), self.spaces
-        nothing = np.zeros((1, inputs, 6))
-        signal = Pieces(np.array([0.0, 1.0]), np.array([0, 1]), np.empty(0), nothing)
-        loop = catalogue.rhs_loop(spaces.formulation)
-        equations, place = self.system.called(spaces.formulation), Place(0.0, 0, window)
-        buffer, columns = np.empty(scratch_end(n, inputs)), []
+        columns = []
         for step in 1e-6 * np.maximum(1.0, np.abs(y)) * np.eye(len(y)):
-            sides = np.empty((2, len(y)))
-            for side, shifted in zip(sides, (y + step, y - step), strict=True):
-                loop(shifted, equations, signal, spaces.subspaces, place, buffer, side)
-            columns.append((sides[0] - sides[1]) / (2.0 * step.sum()))
+            above, below = (self._reduced_rates(window, side) for side in (y + step, y - step))
+            columns.append((above - below) / (2.0 * step.sum()))
         return np.column_stack(columns)
+
+    def _reduced_rates(self, window: int, y: np.ndarray) -> np.ndarray:
+        """Rates of the reduced states y (dim,) of one window, all inputs zero."""
+        model, spaces, n, dim = self.model, self.spaces, len(self.model.coordinates), len(y)
+        mean, no_input = spaces.means[window], np.zeros(len(model.inputs))
+        trial, test = spaces.trial_basis[window, :dim], spaces.test_basis[window, :dim]
+        if spaces.formulation == "state":
+            return test @ model.rhs(mean + y @ trial, no_input)
+        basis, rates = trial[: dim // 2, :n], y[dim // 2 :]
+        x = np.concatenate([mean[:n] + y[: dim // 2] @ basis, rates @ basis])
+        x[n:] = model.speeds_of_rates(x)
+        table = model.evaluated("second_order", x, no_input)
+        mass, force = basis @ table[:, :-1] @ basis.T, basis @ table[:, -1]
+        return np.concatenate([rates, np.linalg.solve(mass, force)])
 
     @property
     def spectral_abscissa(self) -> float:

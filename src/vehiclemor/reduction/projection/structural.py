@@ -25,8 +25,7 @@ from vehiclemor.reduction.settings import LARGEST_TOLERANCE, SHORTEST, Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
-from vehiclemor.simulation.kernel_derivatives import PLACES, By, chosen, parameter_names, partial
-from vehiclemor.simulation.structures.factors import factored
+from vehiclemor.simulation.evaluation import PLACES, By, chosen, parameter_names, partial
 from vehiclemor.simulation.structures.model import (
     FIRST_STEP,
     REASONS,
@@ -34,7 +33,7 @@ from vehiclemor.simulation.structures.model import (
     Periods,
     StructuralModel,
 )
-from vehiclemor.simulation.structures.system import StructuralSystem
+from vehiclemor.simulation.structures.system import StructuralSystem, factored
 from vehiclemor.simulation.trajectory import Start, Trajectory
 from vehiclemor.sizes import require
 

@@ -17,8 +17,7 @@ import numpy as np
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.operations import Kernel
-from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.codegen.weighted_sums import padded
+from vehiclemor.codegen.vector_lanes import LANES, padded
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import extent_of
 from vehiclemor.reduction.trust import inputs_beyond
@@ -32,8 +31,7 @@ from vehiclemor.reduction.vehicle.decoding_loops import (
 )
 from vehiclemor.reduction.vehicle.features import PLANAR, Features, Layout, decoding_kernel
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.kernel_derivatives import INPUTS, STATE, partial
-from vehiclemor.simulation.paths import PATH_LOOPS, address_of
+from vehiclemor.simulation.evaluation import INPUTS, PATH_LOOPS, STATE, address_of, partial
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.simulation.workspaces import Run
 from vehiclemor.sizes import require, shaped

@@ -31,7 +31,7 @@ from vehiclemor.codegen.operations import (
     pruned,
 )
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.simulation.paths import at_samples
+from vehiclemor.simulation.evaluation import at_samples
 from vehiclemor.simulation.system import System
 from vehiclemor.sizes import apart, require
 

@@ -6,6 +6,7 @@ of eigenvalue zero.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -59,9 +60,7 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
     The inputs are the steering and its derivatives, as many as the model has.
     """
     linear = shape.linearised
-    values, vectors = np.linalg.eig(linear.a.T)
-    left = vectors.T
-    right = np.linalg.inv(left)
+    values, left, right = eigenmodes(linear.a)
     # The many equal eigenvalues of stabilised constraints are defective, but not used.
     controlled = np.abs(left @ linear.b[:, 0]) * np.linalg.norm(right, axis=0)
     steers = controlled > CONTROLLED * controlled.max()
@@ -98,6 +97,13 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         right[:, still].real / scale,
         Transient(values[quiet], left[quiet], double[:, None] * right[:, quiet].T),
     )
+
+
+def eigenmodes(a: np.ndarray) -> tuple[Any, Any, Any]:
+    """Eigenvalues (n,), left eigenvectors by rows (n, n), and the inverse of these."""
+    values, vectors = np.linalg.eig(a.T)
+    left = vectors.T
+    return values, left, np.linalg.inv(left)
 
 
 def real_modes(
@@ -141,9 +147,7 @@ def lateral_modes(shape: VehicleShape) -> tuple[SlowModes, np.ndarray]:
     """All modes that steering moves, and what of the shape (n, inputs) follows inputs at once."""
     linear = shape.linearised
     follow, drive = without_derivatives(linear.a, linear.b)
-    values, vectors = np.linalg.eig(linear.a.T)
-    w = vectors.T
-    v = np.linalg.inv(w)
+    values, w, v = eigenmodes(linear.a)
     motion = apart(values) & (np.abs(values) > APART)
     moved = np.abs(w @ drive) * np.linalg.norm(v, axis=0) / np.maximum(np.abs(values), APART)
     moved[~motion] = 0.0

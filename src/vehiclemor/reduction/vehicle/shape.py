@@ -19,7 +19,7 @@ import numpy as np
 from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.vehicle.features import Layout
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.integrators.mirror_image import partners
+from vehiclemor.simulation.integrators.step_kernels import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 

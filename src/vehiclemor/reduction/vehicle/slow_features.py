@@ -12,7 +12,9 @@ Springer 2014).  Of any other tires they are powers of the mean slip of each axl
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
 from itertools import combinations_with_replacement
+from operator import add
 
 import numpy as np
 
@@ -128,7 +130,7 @@ class SlowFeatures(FeatureListing):
         """The weighted sum of the values with a weight."""
         pairs = zip(values, weights, strict=True)
         first, *others = [self.parameter(w) * value for value, w in pairs if w]
-        return sum(others, first)
+        return reduce(add, others, first)
 
     def of_terms(self, terms: Sequence[Names], odd: int = 0) -> Features:
         """Features of these terms; the first ones are the odd ones."""
@@ -197,7 +199,7 @@ def _add_arguments(
         made.line(name, made.parameter(1.0 / most) * coordinate)
     # More heave and pitch than corners make is known only where the car runs straight.
     first, *rest = map(abs, made.term(ARGUMENTS))
-    steered = held(1.0 / MOVING * sum(rest, first))
+    steered = held(1.0 / MOVING * reduce(add, rest, first))
     alive = AFTER_LANDING + (1.0 / STEERED - AFTER_LANDING) * steered
     symmetric = [made.by_name[name] for (name,) in made.coordinates[k:]]
     made.besides += [(alive * own, "heave and pitch") for own in symmetric]

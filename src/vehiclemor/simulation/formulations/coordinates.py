@@ -4,13 +4,12 @@ V^T M V db/dt = V^T F with the model's own mass matrix; the first half of the ro
 basis are V^T, those of the test basis its left inverse.
 """
 
-import math
-
 from vehiclemor.codegen.loop_types import call_kernel
 from vehiclemor.inputs.polynomial_loops import input_at
+from vehiclemor.simulation.integrators.dense_solves import small_solve
 from vehiclemor.simulation.integrators.structures import DERIVATIVE, RHS_CALLS, SECOND_ORDER, SPEEDS
 
-INLINED = ("rhs", "reconstruct", "positions_and_rates", "galerkin", "product")
+INLINED = ("rhs", "reconstruct", "origin", "add_motion", "galerkin", "product")
 
 
 def rhs(problem, t, y, dy):
@@ -29,29 +28,17 @@ def rhs(problem, t, y, dy):
     galerkin(r, problem.trial, problem.second_order, problem.dx, problem.small)
     for j in range(r):
         dy[j] = y[r + j]
-        dy[r + j] = problem.small[j, r]
+        dy[r + j] = problem.small[j, problem.small.shape[1] - 1]
 
 
 def reconstruct(problem, y, x):
     """State x (n,) of reduced coordinates y (dim,)."""
     equations, n = problem.equations, len(x) // 2
-    positions_and_rates(problem, y, x)
+    origin(problem, x)
+    add_motion(problem, y, x)
     call_kernel(equations.kernels, SPEEDS, x, problem.u, equations.constants, problem.dx)
     for i in range(n):
         x[n + i] = problem.dx[i]
-
-
-def positions_and_rates(problem, y, x):
-    """Coordinates and their rates, in place of the speeds, into x (n,)."""
-    mean, trial = problem.mean, problem.trial
-    n, r = len(x) // 2, len(y) // 2
-    for i in range(n):
-        x[i] = mean[i]
-        x[n + i] = 0.0
-    for j in range(r):
-        for i in range(n):
-            x[i] += trial[j, i] * y[j]
-            x[n + i] += trial[j, i] * y[r + j]
 
 
 def project(problem, t, x, y, counts):
@@ -91,60 +78,34 @@ def product(n, matrix, row, trial, image):
 
 
 def galerkin(r, trial, matrix, image, small):
-    """Solve (V^T M V) a = V^T F; V^T are the rows of trial; a replaces column r of small."""
-    n = len(matrix)
+    """Solve (V^T M V) a = V^T F; V^T are the rows of trial; a replaces the last column of small."""
+    n, last = len(matrix), small.shape[1] - 1
     for k in range(r):
         # M is symmetric: its rows are its columns.
         product(n, matrix, k, trial, image)
         total = 0.0
         for i in range(n):
             total += trial[k, i] * matrix[i, n]
-        small[k, r] = total
+        small[k, last] = total
         for j in range(k + 1):
             total = 0.0
             for i in range(n):
                 total += trial[j, i] * image[i]
-            small[k, j] = total
-    # Cholesky: V^T M V is positive definite.
-    for k in range(r):
-        pivot = small[k, k]
-        for j in range(k):
-            pivot -= small[k, j] * small[k, j]
-        pivot = math.sqrt(pivot)
-        small[k, k] = pivot
-        for i in range(k + 1, r):
-            total = small[i, k]
-            for j in range(k):
-                total -= small[i, j] * small[k, j]
-            small[i, k] = total / pivot
-    for k in range(r):
-        total = small[k, r]
-        for j in range(k):
-            total -= small[k, j] * small[j, r]
-        small[k, r] = total / small[k, k]
-    for k in range(r - 1, -1, -1):
-        total = small[k, r]
-        for j in range(k + 1, r):
-            total -= small[j, k] * small[j, r]
-        small[k, r] = total / small[k, k]
+            small[k, j], small[j, k] = total, total
+    small_solve(small, r)
 
 
-def error_norm(problem, error, y, tolerance):
-    """Largest error of a coordinate or rate as a multiple of its tolerance; NaN if y is."""
-    mean, trial, scale = problem.mean, problem.trial, problem.equations.error_scale
-    n, r = len(scale) // 2, len(y) // 2
-    largest = 0.0
+def add_motion(problem, y, x):
+    """Add coordinates and their rates, in place of the speeds, to x (n,)."""
+    trial, n, r = problem.trial, len(x) // 2, len(y) // 2
+    for j in range(r):
+        for i in range(n):
+            x[i] += trial[j, i] * y[j]
+            x[n + i] += trial[j, i] * y[r + j]
+
+
+def origin(problem, x):
+    """The origin of the subspace, at rest, into x (n,)."""
+    n = len(x) // 2
     for i in range(n):
-        value, change, rate, drift = mean[i], 0.0, 0.0, 0.0
-        for j in range(r):
-            value += trial[j, i] * y[j]
-            change += trial[j, i] * error[j]
-            rate += trial[j, i] * y[r + j]
-            drift += trial[j, i] * error[r + j]
-        ratio = abs(change) / (scale[i] + abs(value))
-        if not ratio <= largest:
-            largest = ratio
-        ratio = abs(drift) / (scale[n + i] + abs(rate))
-        if not ratio <= largest:
-            largest = ratio
-    return largest / tolerance
+        x[i], x[n + i] = problem.mean[i], 0.0

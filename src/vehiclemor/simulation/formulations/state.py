@@ -7,7 +7,7 @@ from vehiclemor.codegen.loop_types import call_kernel
 from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.integrators.structures import DERIVATIVE
 
-INLINED = ("rhs", "reconstruct")
+INLINED = ("rhs", "reconstruct", "origin", "add_motion")
 
 
 def rhs(problem, t, y, dy):
@@ -25,9 +25,19 @@ def rhs(problem, t, y, dy):
 
 def reconstruct(problem, y, x):
     """State x (n,) of reduced coordinates y (dim,)."""
-    mean, trial = problem.mean, problem.trial
+    origin(problem, x)
+    add_motion(problem, y, x)
+
+
+def origin(problem, x):
+    """The origin of the subspace into x (n,)."""
     for i in range(len(x)):
-        x[i] = mean[i]
+        x[i] = problem.mean[i]
+
+
+def add_motion(problem, y, x):
+    """Add the state that reduced coordinates y (dim,) move it by to x (n,)."""
+    trial = problem.trial
     for j in range(len(y)):
         for i in range(len(x)):
             x[i] += trial[j, i] * y[j]
@@ -48,14 +58,15 @@ def error_norm(problem, error, y, tolerance):
 
     The error is reconstructed first, so that a tolerance means the same in every formulation.
     """
-    mean, trial, scale = problem.mean, problem.trial, problem.equations.error_scale
+    x, change, scale = problem.x, problem.dx, problem.equations.error_scale
+    for i in range(len(x)):
+        change[i] = 0.0
+    origin(problem, x)
+    add_motion(problem, y, x)
+    add_motion(problem, error, change)
     largest = 0.0
-    for i in range(len(scale)):
-        value, change = mean[i], 0.0
-        for j in range(len(y)):
-            value += trial[j, i] * y[j]
-            change += trial[j, i] * error[j]
-        ratio = abs(change) / (scale[i] + abs(value))
+    for i in range(len(x)):
+        ratio = abs(change[i]) / (scale[i] + abs(x[i]))
         if not ratio <= largest:
             largest = ratio
     return largest / tolerance

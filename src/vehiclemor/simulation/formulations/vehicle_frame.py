@@ -6,7 +6,7 @@ turned by a right angle).  A model in which nothing turns stays as it is.
 
 from vehiclemor.codegen.loop_types import call_kernel
 from vehiclemor.inputs.polynomial_loops import input_at
-from vehiclemor.simulation.integrators.step_grid import heading_of, rotate
+from vehiclemor.simulation.integrators.shared import heading_of, rotate
 from vehiclemor.simulation.integrators.structures import DERIVATIVE
 
 INLINED = ("rhs", "reconstruct")

@@ -14,12 +14,7 @@ from vehiclemor.codegen.operations import Kernel
 from vehiclemor.progress import first_use
 from vehiclemor.registry import choice
 from vehiclemor.simulation.formulations import FORMULATIONS
-from vehiclemor.simulation.integrators import (
-    exponential_functions,
-    exponential_modes,
-    rodas4,
-    ros34pw2,
-)
+from vehiclemor.simulation.integrators import etdrk4, exponential_modes, rodas4, ros34pw2
 from vehiclemor.simulation.integrators.loop import scratch_end
 from vehiclemor.simulation.integrators.step_kernels import Frame, exponential_step, w_step
 from vehiclemor.simulation.integrators.structures import Control
@@ -40,12 +35,12 @@ class Stored(NamedTuple):
 
 @dataclass(frozen=True)
 class Integrator:
-    """One integrator, and what the time loop must know of it."""
+    """One integrator, the module of its name, and what the time loop must know of it."""
 
     summary: str  # One line.
     order: int  # Power of the step size with which the error at the end of a run falls.
     control: Control  # Its step-size control.
-    modules: tuple[str, ...]  # Modules of its functions, those that it shares first.
+    cubic: bool = True  # Whether its dense output is the cubic of `shared`.
     tableau: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))  # Its coefficients.
     # Makes the kernel of a whole step from the frame and the number of inputs, where it has one.
     step_kernel: Callable[[Frame, int], Kernel] | None = None
@@ -82,24 +77,22 @@ INTEGRATORS = {
         "Dormand-Prince 5(4), explicit",
         5,
         Control(0.17, 0.17, 0.04, 1e-4, shrink_least=0.2, grow=10.0, halve_last=0.0),
-        ("dopri5",),
+        cubic=False,
     ),
     "rodas4": Integrator(
         "Rosenbrock method of order 4, fresh Jacobians",
         4,
         Control(1.0 / 4.0, 1.0 / 4.0),
-        ("cubic", "dense_solves", "rodas4"),
-        rodas4.tableau(),
+        tableau=rodas4.tableau(),
         squares=2,
     ),
     "ros34pw2": Integrator(
         "W-method of order 3, one Jacobian for all runs",
         3,
         Control(1.0 / 3.0, 1.0 / 3.0),
-        ("step_grid", "cubic", "ros34pw2"),
-        ros34pw2.tableau(),
-        w_step,
-        inverses,
+        tableau=ros34pw2.tableau(),
+        step_kernel=w_step,
+        tables=inverses,
     ),
     "etdrk4": Integrator(
         "exponential method of order 4, with the same",
@@ -113,9 +106,8 @@ INTEGRATORS = {
             grow=4.0,
             shortest_first=float(STEP_GRID[0]),
         ),
-        ("step_grid", "cubic", "etdrk4"),
         step_kernel=exponential_step,
-        tables=partial(exponential_functions.exponential_tables, grid=STEP_GRID),
+        tables=partial(etdrk4.exponential_tables, grid=STEP_GRID),
         rows=32,
     ),
     "exponential_adams": Integrator(
@@ -131,21 +123,18 @@ INTEGRATORS = {
             keep_least=0.97,
             keep_most=1.18,
         ),
-        ("step_grid", "adams_weights", "exponential_adams"),
+        cubic=False,
         tables=modal_functions,
         formulation="vehicle_frame",
         rows=65,
         numbers=64,
     ),
 }
-# Older name of an integrator.
-ALIASES = {"explicit": "dopri5"}
 
 
 def integrator(name: str) -> Integrator:
     """An integrator by its name; `InputError` if there is none."""
-    known = ALIASES.get(name, name) if isinstance(name, str) else name
-    return INTEGRATORS[choice("solver", known, INTEGRATORS)]
+    return INTEGRATORS[choice("solver", name, INTEGRATORS)]
 
 
 def frozen(name: str) -> bool:
@@ -160,30 +149,18 @@ def control_of(name: str, tolerance: float, longest: float) -> Ready:
     return ready(own._replace(tolerance=tolerance, longest=longest, most_calls=float(MOST_CALLS)))
 
 
-def _problem_modules(formulation: str) -> tuple[str, ...]:
-    # What a formulation doesn't say is as of the full system.
-    own = dict.fromkeys(("full", formulation))
-    return (
+def time_loop(name: str, formulation: str) -> Loop:
+    """The compiled time loop of an integrator and a formulation."""
+    # What a formulation doesn't say is as of the full system, or of the state.
+    known = ("full", "state") if formulation == "coordinates" else ("full",)
+    modules = (
         "simulation.integrators.structures",
         "inputs.polynomial_loops",
-        *(f"simulation.formulations.{name}" for name in own),
+        "simulation.integrators.dense_solves",
+        *(f"simulation.formulations.{form}" for form in dict.fromkeys((*known, formulation))),
+        *(f"simulation.integrators.{module}" for module in ("shared", name, "loop")),
     )
-
-
-def rhs_loop(formulation: str) -> Loop:
-    """Compiled right-hand side of a system at one time, see `loop.rhs_at`."""
-    modules = (*_problem_modules(formulation), "simulation.integrators.loop")
-    return loops(modules, ("rhs_at",))["rhs_at"]
-
-
-def time_loop(chosen: Integrator, formulation: str) -> Loop:
-    """The compiled time loop of an integrator and a formulation."""
-    modules = (
-        *_problem_modules(formulation),
-        *(f"simulation.integrators.{name}" for name in chosen.modules),
-        "simulation.integrators.loop",
-    )
-    with first_use(f"the time loop of {chosen.modules[-1]}"):
+    with first_use(f"the time loop of {name}"):
         return loops(modules, ("integrate",))["integrate"]
 
 
@@ -196,11 +173,10 @@ def scratch_size(chosen: Integrator, n: int, dim: int, inputs: int) -> int:
 
 
 # All source that a run may be compiled from.
+SOURCES = "dense_solves", "shared", *INTEGRATORS, "structures", "loop"
 LOOP_SOURCES = (
     "inputs.polynomial_loops",
     *(f"simulation.formulations.{name}" for name in FORMULATIONS),
-    *(f"simulation.integrators.{name}" for own in INTEGRATORS.values() for name in own.modules),
-    "simulation.integrators.structures",
-    "simulation.integrators.loop",
+    *(f"simulation.integrators.{name}" for name in SOURCES),
     "simulation.path_loops",
 )

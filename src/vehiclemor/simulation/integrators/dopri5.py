@@ -19,7 +19,7 @@ E1, E3, E4, E5, E6, E7 = (71 / 57600, -71 / 16695, 71 / 1920, -17253 / 339200, 2
 D1, D3, D4 = -12715105075 / 11282082432, 87487479700 / 32700410799, -10690763975 / 1880347072
 D5, D6, D7 = 701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("accept", "longest_step", "step")
+INLINED = ("accept", "step")
 
 
 def work_space(buffer, first, integers, dim, inputs):
@@ -34,11 +34,6 @@ def work_space(buffer, first, integers, dim, inputs):
 def begin(problem, t, method, work):
     """Right-hand side at the beginning of a span."""
     rhs(problem, t, work.y, work.f)
-
-
-def longest_step(h, method, control, work):
-    """Any step size will do."""
-    return h
 
 
 def step(problem, t, h, method, work, counts):

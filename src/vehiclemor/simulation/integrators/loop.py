@@ -9,16 +9,16 @@ import math
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
 from vehiclemor.inputs.polynomial_loops import Pieces, input_at
-from vehiclemor.simulation.formulations.full import error_norm, project, reconstruct, rhs
+from vehiclemor.simulation.formulations.full import error_norm, project, reconstruct
 from vehiclemor.simulation.integrators.dopri5 import (
     accept,
     begin,
     interpolate,
-    longest_step,
     prepare_curve,
     step,
     work_space,
 )
+from vehiclemor.simulation.integrators.shared import longest_step
 from vehiclemor.simulation.integrators.structures import (
     FINISHED,
     NODE_1,
@@ -35,7 +35,6 @@ from vehiclemor.simulation.integrators.structures import (
     Equations,
     Method,
     Output,
-    Place,
     Problem,
     Spans,
     Subspaces,
@@ -260,20 +259,3 @@ def leave_out(output, sample):
         else:
             for i in range(output.path.shape[1]):
                 output.path[left, i] = math.nan
-
-
-def rhs_at(
-    y: Vector,
-    equations: Equations,
-    signal: Pieces,
-    subspaces: Subspaces,
-    place: Place,
-    buffer: Vector,
-    result: Vector,
-) -> Int:
-    """Right-hand side at reduced coordinates y (dim,); the state is as long as the scale."""
-    sizes = len(equations.error_scale), signal.coefficients.shape[1]
-    segment, window = place.segment, place.window
-    problem = on_span(equations, signal, subspaces, segment, window, sizes, buffer)
-    rhs(problem, place.time, y, result)
-    return 0

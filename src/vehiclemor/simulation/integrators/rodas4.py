@@ -26,7 +26,7 @@ GAMMA = 0.25
 S = 6
 ALPHA, D, M, E = 12, 13, 14, 15
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("accept", "longest_step", "step")
+INLINED = ("accept", "step")
 
 
 def tableau() -> np.ndarray:
@@ -74,11 +74,6 @@ def begin(problem, t, method, work):
     """Right-hand side at the beginning of a span; no Jacobian is known yet."""
     rhs(problem, t, work.y, work.f)
     work.places[0] = 0
-
-
-def longest_step(h, method, control, work):
-    """Any step size will do."""
-    return h
 
 
 def difference_jacobian(problem, t, method, work, counts):

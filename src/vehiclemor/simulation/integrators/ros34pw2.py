@@ -11,13 +11,13 @@ import numpy as np
 from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
 from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.formulations.full import rhs
-from vehiclemor.simulation.integrators.step_grid import index_above
+from vehiclemor.simulation.integrators.shared import index_above
 from vehiclemor.simulation.integrators.structures import LINEAR_SOLVES, RHS_CALLS, STEP_KERNEL, Work
 
 GAMMA = 4.3586652150845900e-01
 ALPHA, M, E = 8, 9, 10
 # Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("accept", "longest_step", "step")
+INLINED = ("accept", "step")
 
 
 def tableau() -> np.ndarray:
@@ -60,11 +60,6 @@ def begin(problem, t, method, work):
     """Right-hand side at the beginning of a span."""
     rhs(problem, t, work.y, work.f)
     work.places[0] = len(method.grid) // 2
-
-
-def longest_step(h, method, control, work):
-    """Any step size will do: the operator of a step a little longer serves."""
-    return h
 
 
 def step(problem, t, h, method, work, counts):

@@ -3,8 +3,9 @@
 With two or four dozen states the loops around the stages would take as long as the right-hand side.
 These kernels do a step of `ros34pw2` or `etdrk4` in vectors of known length, and execute the
 right-hand side by its address.  Vectors that stored operators are applied to stand in a frame: the
-heading is turned to zero, and left and right are replaced by sum and difference, in which the
-Jacobian of a vehicle, its own mirror image, has two diagonal blocks.
+heading is turned to zero, and left and right are replaced by sum and difference.  A vehicle is its
+own mirror image: in these its Jacobian at straight running has two diagonal blocks, one of motions
+that are their own mirror image, one of those that reverse.
 """
 
 from __future__ import annotations
@@ -17,22 +18,61 @@ import numpy as np
 
 from vehiclemor.codegen.operations import Kernel, Listing, Value
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.simulation.integrators import ros34pw2
-from vehiclemor.simulation.integrators.etdrk4 import ERROR_SHARE
-from vehiclemor.simulation.integrators.exponential_functions import (
-    AT_ZERO,
-    FIRST,
-    HALF_FIRST,
-    HALF_SECOND,
-    JACOBIAN,
-    LAST,
-    MIDDLE,
-    SECOND,
-)
-from vehiclemor.simulation.integrators.mirror_image import Block
+from vehiclemor.simulation.integrators import etdrk4, ros34pw2
 
 # Vectors that a step hands back.
 RESULTS = ("new", "rates", "error")
+# Wheels that the mirror exchanges, as parts of names.
+SWAPPED = {"FL": "FR", "FR": "FL", "RL": "RR", "RR": "RL"}
+# Entries of a Jacobian, in its own units, below which they are rounding of its differences.
+ROUNDING = 1e-5
+# Coordinates of a diagonal block: each a sum of states times signs.
+Block = tuple[tuple[tuple[int, float], ...], ...]
+
+
+def partners(names: Sequence[str]) -> np.ndarray:
+    """Number of the state that each becomes in the mirror, its own if it has no partner."""
+    images = ["_".join(SWAPPED.get(part, part) for part in name.split("_")) for name in names]
+    places = {name: i for i, name in enumerate(names)}
+    return np.array([places.get(image, i) for i, image in enumerate(images)], dtype=np.int64)
+
+
+def signs(jacobian: np.ndarray, partner: np.ndarray) -> np.ndarray | None:
+    """Signs (n,) with which J (n, n) is its own mirror image; none if there are no such signs.
+
+    S J S = J for (S x)_i = signs[i] x[partner[i]] fixes the signs of states that are coupled
+    against one another; each group of coupled states may be reversed as a whole.
+    """
+    image = jacobian[np.ix_(partner, partner)]
+    coupled = (np.abs(jacobian) > ROUNDING) & (np.abs(image) > ROUNDING)
+    relation = np.where(coupled, np.sign(jacobian * image), 0.0)
+    # Either of a pair has the same sign, so that S S is the identity.
+    relation[np.arange(len(partner)), partner] = 1.0
+    found = np.zeros(len(partner))
+    for first in range(len(partner)):
+        waiting = [] if found[first] else [(first, 1.0)]
+        while waiting:
+            i, sign = waiting.pop()
+            if not found[i]:
+                found[i] = sign
+                related = relation[i] + relation[:, i] * (relation[i] == 0.0)
+                waiting += [(j, sign * related[j]) for j in np.flatnonzero(related)]
+    reflected = found[:, None] * image * found
+    return found if np.abs(reflected - jacobian).max(initial=0.0) <= ROUNDING else None
+
+
+def mirror_blocks(partner: np.ndarray, sign: np.ndarray) -> tuple[Block, ...]:
+    """Coordinates that are their own mirror image, and those that reverse, as sums of states."""
+    blocks: list[Block] = []
+    for parity in (1.0, -1.0):
+        rows: list[tuple[tuple[int, float], ...]] = []
+        for i, j in enumerate(partner.tolist()):
+            if i < j:
+                rows.append(((i, 1.0), (j, parity * float(sign[i]))))
+            elif i == j and sign[i] == parity:
+                rows.append(((i, 1.0),))
+        blocks.append(tuple(rows))
+    return tuple(block for block in blocks if block)
 
 
 class Frame(NamedTuple):
@@ -240,26 +280,26 @@ def exponential_step(frame: Frame, inputs: int) -> Kernel:
         step.at(name)
 
     def product(to: str, table: int, vector: str) -> None:
-        step.product(to, table, vector, AT_ZERO[table])
+        step.product(to, table, vector, etdrk4.AT_ZERO[table])
 
     against, half_h = step.let(-stretch), step.let(0.5 * h)
     step.enter("f1", "f")
-    product("half", HALF_FIRST, "f1")
-    product("whole", FIRST, "f1")
+    product("half", etdrk4.HALF_FIRST, "f1")
+    product("whole", etdrk4.FIRST, "f1")
     step.sum("v", (h, "half"))
     for k in range(4):
         if k == 1:
-            product("p", HALF_SECOND, "d0")
+            product("p", etdrk4.HALF_SECOND, "d0")
             step.sum("v", (h, "half"), (h, "p"))
         elif k == 2:
-            product("p", SECOND, "d1")
+            product("p", etdrk4.SECOND, "d1")
             step.sum("v", (h, "whole"), (h, "p"))
         elif k == 3:
             step.sum("both", (1.0, "d0"), (1.0, "d1"))
-            product("p", MIDDLE, "both")
-            product("q", LAST, "d2")
+            product("p", etdrk4.MIDDLE, "both")
+            product("q", etdrk4.LAST, "d2")
             step.sum("v", (h, "whole"), (h, "p"), (h, "q"))
-        product("p", JACOBIAN, "v")
+        product("p", etdrk4.JACOBIAN, "v")
         state = "new" if k == 3 else "middle"
         step.leave(state, "v", "y")
         step.rates(state, 0 if k < 2 else inputs, "rates")
@@ -267,20 +307,21 @@ def exponential_step(frame: Frame, inputs: int) -> Kernel:
         step.sum(f"d{k}", (1.0, "entered"), (-1.0, "f1"), (against, "p"))
     step.sum("middle", (1.0, "y"), (-1.0, "y_past"), n=n)
     step.enter("moved", "middle")
-    product("p", JACOBIAN, "moved")
+    product("p", etdrk4.JACOBIAN, "moved")
     step.sum("middle", (1.0, "f"), (-1.0, "f_past"), n=n)
     step.enter("changed", "middle")
-    pair, weight_half = step.let(h * ERROR_SHARE), step.let(half_h * at_half)
+    pair, weight_half = step.let(h * etdrk4.ERROR_SHARE), step.let(half_h * at_half)
     weight_end, weight_past = step.let(h * at_end), step.let(h * at_past)
     weight_linear, share_half = step.let(weight_past * against), step.let(-0.5 * share)
     share_linear = step.let(0.125 * share * stretch * h)
     change = ((pair, "d3"), (-pair, "d2"), (weight_half, "both"), (weight_end, "d3"))
     step.sum("v", *change, (weight_past, "changed"), (weight_linear, "p"))
-    product("q", LAST, "v")
-    product("p", JACOBIAN, "whole")
+    product("q", etdrk4.LAST, "v")
+    product("p", etdrk4.JACOBIAN, "whole")
     step.sum("v", (share, "half"), (share_half, "whole"), (share_linear, "p"))
     step.leave("middle", "q")
     step.leave("error", "v")
-    error = step.at("error")
-    step.new("magnitudes", detail=(error, n, error, step.at("middle")))
+    for i in range(n):
+        one, other = (step.entry(*step.at(name, i)) for name in ("error", "middle"))
+        step.store(step.at("error", i)[1], abs(one) + abs(other))
     return step.made("etdrk4_step")

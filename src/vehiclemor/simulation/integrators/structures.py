@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, Vector
+from vehiclemor.codegen.loop_types import Cube, Float, IntVector, Matrix, Vector
 from vehiclemor.inputs.polynomial_loops import Pieces
 
 # Places of a system's kernels in its list of addresses; see `System`.
@@ -37,14 +37,6 @@ class Spans(NamedTuple):
     edges: Vector
     segments: IntVector
     windows: IntVector
-
-
-class Place(NamedTuple):
-    """A point of a run: time in s, segment of the signal, control period."""
-
-    time: Float
-    segment: Int
-    window: Int
 
 
 class Subspaces(NamedTuple):

@@ -25,8 +25,7 @@ from vehiclemor.simulation.checks import (
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.structures import time_loops as compiled
-from vehiclemor.simulation.structures.factors import factored
-from vehiclemor.simulation.structures.system import PortLaw, StructuralSystem
+from vehiclemor.simulation.structures.system import PortLaw, StructuralSystem, factored
 from vehiclemor.simulation.trajectory import (
     STRUCTURAL_COUNTS,
     Names,

@@ -1,17 +1,20 @@
-"""Projected equations of motion: exact in the whole space; only the subspace counts."""
+"""Projected equations of motion: exact in the whole space; only the subspace counts; restarts."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import vehiclemor as vm
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change, step_steer
+from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods import pod
-from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, _weight
+from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, DynamicProjection, _weight
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
+from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.workspaces import Solver
@@ -107,30 +110,6 @@ def test_range_weight_makes_every_moving_state_as_wide_as_the_others(model):
     np.testing.assert_allclose(np.ptp(scaled, axis=0), 1.0)
 
 
-def test_weighted_basis_spans_what_pymor_finds(model):
-    from pymor.algorithms.pod import pod as pymor_pod
-    from pymor.operators.numpy import NumpyMatrixOperator
-
-    window, rank = 3, 3
-    reduced = fitted(model, inner_product="energy", snapshots=8, rank=rank)
-    times = np.linspace(*reduced.spaces.edges[window : window + 2], 8)
-    snapshots = model.simulate(lane_change, None, times).coordinates
-    weight = model.mass_matrix(model.start())
-    operator = NumpyMatrixOperator(weight)
-    centred = operator.source.from_numpy((snapshots - snapshots.mean(axis=0)).T)
-    modes, values = pymor_pod(centred, product=operator, modes=rank)
-    found = modes.to_numpy()
-    projector = found @ found.T @ weight
-    basis = reduced.bases[window]
-    np.testing.assert_allclose(basis.singular_values[:rank], values, rtol=1e-4)
-    mine = basis.vectors @ basis.vectors.T @ weight
-    # What the third mode holds is small beside rounding of the first: compare on the snapshots.
-    centred_rows = snapshots - snapshots.mean(axis=0)
-    scale = np.abs(centred_rows).max(axis=0)
-    difference = centred_rows @ (mine - projector).T / scale
-    assert np.abs(difference).max() < 1e-6
-
-
 def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
     reduced = fitted(model)
     whole = in_windows(STATE, [0.0, 25.0])
@@ -184,3 +163,83 @@ def test_windows_refuse_runs_of_different_durations(model):
     runs = [TrainingRun(model, maneuver, "dropped") for maneuver in (lane_change, step_steer)]
     with pytest.raises(InputError, match="5, 25 s"):
         pod.fit(model, runs, settings)
+
+
+CAR = "independent_suspension_vehicle"
+
+
+@pytest.fixture(scope="module")
+def car():
+    return vm.model(CAR)
+
+
+@pytest.fixture(scope="module")
+def maneuver():
+    # Of a few seconds, with more steering than the training has.
+    return replace(component("maneuver", "lane_change"), duration=4.0, samples=201).perturbed(
+        1.0, 1.2
+    )
+
+
+def errors(car, maneuver, restart, **settings):
+    """Distances (samples,) of the place and heading from the full model's, in their scales."""
+    rom = vm.reduce(car, "pod", restart=restart, **settings)
+    run, full = rom.reduced.simulate(maneuver, "equilibrium"), car.simulate(maneuver)
+    apart = (run.states - full.states)[:, car.planar] / car.error_scale[car.planar]
+    return np.abs(apart).max(axis=1)
+
+
+def test_with_all_directions_it_is_the_full_model(car, maneuver):
+    windows, states = 4, len(car.definition.states)
+    eye = np.tile(np.eye(states), (windows, 1, 1))
+    means = np.random.default_rng(1).normal(size=(windows, states))
+    ranks, edges = np.full(windows, states), np.linspace(0.0, 4.0, windows + 1)
+    spaces = ControlPeriods("state", edges, means, eye, eye, ranks)
+    full = car.simulate(maneuver)
+    for restart in ("full_model", "projected"):
+        reduced = DynamicProjection(car, spaces, OfflineCost(), "dopri5", 1e-9, restart=restart)
+        run = reduced.simulate(maneuver, "equilibrium")
+        np.testing.assert_allclose(run.states, full.states, rtol=1e-6, atol=1e-6)
+        assert run.counts["rhs_calls"] > full.counts["rhs_calls"]
+
+
+@pytest.mark.parametrize("formulation", ["coordinates", "state"])
+def test_errors_grow_within_a_period_alone(car, maneuver, formulation):
+    own, projected, restarted = (
+        errors(car, maneuver, restart, formulation=formulation)
+        for restart in ("own", "projected", "full_model")
+    )
+    assert own[-1] > 0.1
+    # Projected onto the training's subspace, a state is one of the training run again.
+    assert projected.max() > 0.3 * own.max()
+    # Nothing is carried on from one period to the next.
+    assert restarted[-1] < 0.01 * own[-1]
+    # A period is 25 samples: what follows an edge is better than what comes before it.
+    assert np.all(restarted[76::25] < 0.2 * restarted[75::25].max())
+
+
+def test_steps_begin_at_the_state_that_they_are_given(car, maneuver):
+    rom = vm.reduce(car, "pod", restart="full_model", formulation="state")
+    run, full = rom.reduced.simulate(maneuver, "equilibrium"), car.simulate(maneuver)
+    state = full.states[75]
+    for sample in range(75, 100):
+        u, ends = maneuver.at(run.times[[sample, sample + 1]])
+        state = rom.step(state, u, 0.02, run.times[sample], ends)
+        # Straight lines between the samples stand for the steering.
+        np.testing.assert_allclose(state, run.states[sample + 1], rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("formulation", ["coordinates", "state"])
+def test_its_rates_are_those_of_its_steps_and_its_jacobian_theirs(car, maneuver, formulation):
+    rom = vm.reduce(car, "pod", restart="full_model", formulation=formulation)
+    x, u, t = car.simulate(maneuver).states[90], maneuver.at(np.array([1.8]))[0], 1.8
+    # What comes after a step lies in the subspace.
+    y, dt = rom.step(x, u, 1e-3, t), 1e-5
+    slopes = (rom.step(y, u, dt, t) - y) / dt
+    np.testing.assert_allclose(rom.rhs(y, u, t), slopes, rtol=1e-3, atol=1e-2)
+    found, columns = rom.jacobian(x, u, time=t), []
+    for step in 1e-6 * np.maximum(np.abs(x), 1.0) * np.eye(len(x)):
+        sides = rom.rhs(x + step, u, t) - rom.rhs(x - step, u, t)
+        columns.append(sides / (2.0 * step.sum()))
+    scale = np.abs(found).max()
+    np.testing.assert_allclose(np.transpose(columns) / scale, found / scale, atol=1e-7)

@@ -12,11 +12,12 @@ from scipy.linalg import block_diag, expm
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import maneuver
 from vehiclemor.simulation.control_periods import whole_space
-from vehiclemor.simulation.integrators.exponential_functions import (
+from vehiclemor.simulation.integrators.etdrk4 import (
     exponential_tables,
     phi_functions,
 )
 from vehiclemor.simulation.integrators.exponential_modes import modal_tables, modes
+from vehiclemor.simulation.integrators.step_kernels import partners, signs
 from vehiclemor.simulation.system import Solver
 
 SOLVER = "exponential_adams"
@@ -119,6 +120,12 @@ def test_tables_are_the_phi_functions(name, h):
     for k in range(1, highest + 1):
         parts = table[k - 1, :r], table[k - 1, r : r + pairs], table[k - 1, r + pairs :]
         np.testing.assert_allclose(assembled(found, *parts), exact[k], rtol=0, atol=1e-6)
+
+
+def test_partners_are_told_by_names_and_an_asymmetric_system_has_no_signs():
+    names = ["y", "z_FL", "z_FR", "z_RR_dot", "z_RL_dot", "lone_FL"]
+    assert partners(names).tolist() == [0, 2, 1, 4, 3, 5]
+    assert signs(np.array([[-1.0, 2.0], [3.0, -4.0]]), np.array([1, 0])) is None
 
 
 def run(system, start, tolerance, times, longest=None):

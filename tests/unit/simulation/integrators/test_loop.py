@@ -75,7 +75,7 @@ def test_error_falls_with_the_order_of_the_method(model, solver, times):
         assert order == pytest.approx(own.order, abs=0.35), errors
     else:
         # The cubic between the ends of a step is of order 4 on one step.
-        assert order > (min(own.order, 4) if "cubic" in own.modules else own.order) - 0.35, errors
+        assert order > (min(own.order, 4) if own.cubic else own.order) - 0.35, errors
 
 
 @pytest.mark.parametrize("solver", INTEGRATORS)

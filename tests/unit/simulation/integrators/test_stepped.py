@@ -7,7 +7,7 @@ from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.reduction.vehicle.features import FeatureListing, feature_system
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.integrators import catalogue, etdrk4, ros34pw2
-from vehiclemor.simulation.integrators.exponential_functions import phi_functions
+from vehiclemor.simulation.integrators.etdrk4 import phi_functions
 from vehiclemor.simulation.system import System
 
 # With pairs that turn with the heading and without; in the mirror image's two blocks.

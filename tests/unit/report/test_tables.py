@@ -1,11 +1,15 @@
-"""Tables: what is handed in stands there in every format; and what tables show of a model."""
+"""Tables: what is handed in stands there in every format; rates, times, printed numbers."""
 
+import math
 from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom
 
 import vehiclemor as vm
 from tests.unit import standard_problems
@@ -23,6 +27,7 @@ from vehiclemor.report.labels import (
 )
 from vehiclemor.report.printing import Table, simulation_text, width
 from vehiclemor.report.published import load_published
+from vehiclemor.report.unseen import at_error, upper_bound
 from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings
 
@@ -130,3 +135,87 @@ def test_defaults_follow_the_kind():
         assert default_rank(coordinates) == rank
     assert tabled_outputs(PLAIN) == tuple(output.name for output in PLAIN.outputs)
     assert main_outputs(PLAIN) == ("angle", "tracked", "angular_speed")
+
+
+@given(st.integers(0, 40), st.integers(1, 400))
+def test_the_bound_of_a_rate_is_exact(misses, runs):
+    misses = min(misses, runs)
+    bound = upper_bound(misses, runs)
+    if misses == runs:
+        assert bound == 1.0
+    else:
+        # At the bound so few misses have a probability of 5 %.
+        np.testing.assert_allclose(binom.cdf(misses, runs, bound), 0.05, rtol=1e-6)
+
+
+def test_299_runs_without_a_miss_prove_less_than_1_percent():
+    assert upper_bound(0, 298) > 0.01 > upper_bound(0, 299)
+
+
+def ladder(name, order, scores, factor=1.0):
+    return [
+        {"label": f"{name} {s}", "score": s, "seconds": factor * s ** (-1.0 / order)}
+        for s in scores
+    ]
+
+
+@given(st.floats(0.011, 0.99))
+def test_a_power_law_is_interpolated_exactly(error):
+    rows = ladder("a", 3.0, [1.0, 0.1, 0.01])
+    # A row that is slower and less accurate than another is no part of the curve.
+    rows.append({"label": "slip", "score": 0.5, "seconds": 50.0})
+    found = at_error([rows], error, "seconds")
+    np.testing.assert_allclose(found.seconds, error ** (-1.0 / 3.0), rtol=1e-12)
+    assert found.rows == (("a 1.0", "a 0.1") if error >= 0.1 else ("a 0.1", "a 0.01"))
+
+
+def test_the_fastest_ladder_counts_that_reaches_the_error():
+    slow, fast = ladder("slow", 3.0, [1.0, 0.001], 2.0), ladder("fast", 3.0, [1.0, 0.1])
+    assert at_error([slow, fast], 0.2, "seconds").rows == ("fast 1.0", "fast 0.1")
+    assert at_error([slow, fast], 0.04, "seconds").rows == ("slow 1.0", "slow 0.001")
+    # Just beyond its end the fast one is continued by its own law, not replaced by the slow one.
+    (first, last), continued = fast, at_error([slow, fast], 0.06, "seconds")
+    law = math.log(last["seconds"] / first["seconds"]) / math.log(last["score"] / first["score"])
+    expected = last["seconds"] * (0.06 / last["score"]) ** law
+    assert continued.rows == ("fast 1.0", "fast 0.1")
+    assert continued.seconds == pytest.approx(expected, rel=1e-12)
+    assert at_error([slow, fast], 5.0, "seconds") == (1.0, ("fast 1.0",))
+    assert math.isnan(at_error([slow, fast], 1e-6, "seconds").seconds)
+
+
+# Prefix of ids -> model.
+MODELS = {
+    "gv": "independent_suspension_vehicle",
+    "dw": "double_wishbone",
+    "hfv": "high_fidelity_vehicle",
+    "all": None,
+}
+ANGLE = "second_euler_angle"
+
+# Typed from the paper, not from the file. id -> value, unit, quantity, page, figure; then states,
+# control period and snapshots behind the number, as far as the paper prints them.
+NUMBERS = {
+    "gv_rms_pitch": (5.18e-4, "rad", "pitch", "031007-3", 4, 3, 0.5, None),
+    "gv_rms_yaw": (7.59e-5, "rad", "yaw", "031007-3", 4, 3, 0.5, None),
+    "gv_time_reduction": (0.20, "1", "", "031007-4", None, 3, 0.5, None),
+    "dw_rms_spindle_y": (7.57e-5, "m", "spindle_y", "031007-4", 7, 3, 5.0, 10),
+    "dw_rms_second_euler_angle": (2.4e-5, "rad", ANGLE, "031007-4", 7, 3, 5.0, 10),
+    "dw_time_reduction_3": (0.65, "1", "", "031007-4", None, 3, 5.0, 10),
+    "dw_time_reduction_6": (0.50, "1", "", "031007-7", 14, 6, None, None),
+    "hfv_rms_lateral_speed": (0.0198, "m/s", "lateral_speed", "031007-5", 10, 1, 0.1, 5),
+    "hfv_rms_vertical_speed": (0.0143, "m/s", "vertical_speed", "031007-5", 10, 1, 0.1, 5),
+    "hfv_time_reduction": (0.23, "1", "", "031007-5", None, 1, 0.1, 5),
+}
+
+
+def test_numbers_are_as_printed_and_all_of_them_are_tested() -> None:
+    published = load_published()
+    kinds = ("rms_error", "time_reduction")
+    assert {n.id for n in published.number if n.kind in kinds} == set(NUMBERS)
+    for name, expected in NUMBERS.items():
+        n = published.numbers[name]
+        behind = n.states, n.control_period, n.snapshots
+        assert (n.value, n.unit, n.quantity, n.page, n.figure, *behind) == expected, name
+        assert n.kind == ("rms_error" if "_rms_" in name else "time_reduction"), name
+    for entry in (*published.number, *published.claim):
+        assert entry.model == MODELS[entry.id.partition("_")[0]]

@@ -1,1 +1,0 @@
-"""Newton's method for mechanisms along an input: sample by sample, or eight at once."""
