@@ -1,1 +1,1 @@
-"""Reduction methods: those of one kind in a file; no file knows another."""
+"""Reduction methods, one in each file; none knows another."""

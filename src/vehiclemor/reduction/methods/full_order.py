@@ -1,7 +1,4 @@
-"""The full-order model itself: the baseline of every comparison; and a structure on a coarse mesh.
-
-The latter is the null model of structures: a cheaper model is had by larger elements, too.
-"""
+"""The full-order model itself: the baseline of every comparison."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.exceptions import ConvergenceError, InputError
+from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import Method, OfflineCost, Presets
 from vehiclemor.reduction.projection.structural import StructuralRuns, StructuralSettings
@@ -23,11 +20,9 @@ from vehiclemor.reduction.settings import (
     StepTolerance,
     Tolerance,
     Value,
-    inline_table,
 )
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
-from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import By
@@ -104,7 +99,7 @@ class FullOrder:
                 raise
             return error.trajectory
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+    def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """The states themselves: the full space holds them."""
         return states
 
@@ -142,63 +137,30 @@ class FullOrderMechanism(FullOrder, ReducedMechanism):
         return self.model.jacobian(state, inputs, by, of)
 
 
-class CoarseMeshSettings(StructuralSettings):
-    """Settings for a structure."""
-
-    mesh: str = Field(
-        "elements_per_bay = 1, shell_size = 0", description="parameters of the mesh, as in TOML"
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class FullOrderStructure(StructuralRuns, FullOrder):
-    """A structural model, on its own mesh or on another one; it gives whole runs alone."""
+    """A structural model; it gives whole runs alone."""
 
     model: StructuralModel
     step_size: float = 0.0
-    mesh: str = ""  # Parameters of another mesh.
 
     @property
     def order(self) -> int:
         """Number of coordinates."""
-        return self.meshed.size
+        return self.model.size
 
-    @cached_property
-    def meshed(self) -> Any:
-        """The model on the mesh."""
-        return reparametrised(self.model, mesh_parameters(self.mesh)) if self.mesh else self.model
-
-    @property
-    def solved(self) -> tuple[StructuralModel, None]:
-        """The model on the mesh, in its own coordinates."""
-        return self.meshed, None
-
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """The states themselves; of another mesh there are none."""
-        return None if self.mesh else states
-
-
-def mesh_parameters(mesh: str) -> dict[str, float]:
-    """Parameters of a mesh by name; `InputError` if the text is none."""
-    return inline_table(mesh, "coarse_mesh: mesh")
-
-
-def check_mesh(model: StructuralModel, settings: CoarseMeshSettings) -> None:
-    """Raise `InputError` if the mesh is none."""
-    given = mesh_parameters(settings.mesh)
-    for name in given:
-        if name in model.definition.online:
-            raise InputError(f"coarse_mesh: {name} is no parameter of a mesh")
-    reparametrised(model, given)
+    def best_approximation(self, states: np.ndarray) -> np.ndarray:
+        """The states themselves."""
+        return states
 
 
 def fit(model: Any, training: Training, settings: Any) -> FullOrder:
     """Nothing is fitted, and no training run is looked at."""
+    own = model, settings.solver, settings.tolerance
     if model.kind == "structural":
-        how = {"step_size": settings.step_size, "mesh": getattr(settings, "mesh", "")}
-        return FullOrderStructure(model, SOLVER, settings.tolerance, **how)
+        return FullOrderStructure(*own, step_size=settings.step_size)
     kind = FullOrderMechanism if model.kind == "ae" else FullOrderSystem
-    return kind(model, settings.solver, settings.tolerance)
+    return kind(*own)
 
 
 METHOD = Method(
@@ -214,15 +176,6 @@ METHOD = Method(
         "structural": _presets(SOLVER, 1e-2, paper={"tolerance": USUAL}),
     },
     fit=fit,
-    learns_from="inputs",
-    own_limits=True,
-)
-COARSE_MESH = Method(
-    name="coarse_mesh",
-    summary="no reduction: larger elements, the null model of structures",
-    settings={"structural": CoarseMeshSettings},
-    fit=fit,
-    check=check_mesh,
     learns_from="inputs",
     own_limits=True,
 )

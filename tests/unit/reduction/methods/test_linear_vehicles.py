@@ -14,7 +14,7 @@ from vehiclemor.inputs.steering import (
     rack_straight_ahead,
     straight_ahead,
 )
-from vehiclemor.reduction.methods.linear import truncated
+from vehiclemor.reduction.methods.modal_truncation import truncated
 from vehiclemor.reduction.vehicle.linear_modes import lateral_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 

@@ -1,0 +1,57 @@
+"""Operator inference, by the library opinf: polynomial rates of principal components.
+
+B. Peherstorfer, K. Willcox, Data-driven operator inference for nonintrusive projection-based model
+reduction, Comput. Methods Appl. Mech. Engrg. 306 (2016), 196-215.
+"""
+
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
+from vehiclemor.reduction.learned.learner import learner
+
+FORMS = {"linear": "AB", "bilinear": "ABN", "quadratic": "AHBN"}
+
+
+class OperatorInferenceSettings(LearnedSettings):
+    """Settings for every model with states."""
+
+    form: Literal["linear", "bilinear", "quadratic"] = Field(
+        "linear", description="of the rates; products of states with inputs, and with states too"
+    )
+    ridge: float = Field(1e-6, ge=0.0, description="weight of the operators' size in the fit")
+
+
+def operators(learning: Learning, settings: OperatorInferenceSettings) -> LearnedModel:
+    """Operators of the rates by opinf."""
+    import opinf
+
+    (arguments, results), r = learning.regression, len(learning.forward)
+    form = "c" * learning.samples.constant + FORMS[settings.form]
+    solver = opinf.lstsq.L2Solver(settings.ridge)
+    library: Any = opinf.models.ContinuousModel(form, solver=solver)
+    z, inputs = arguments[:, :r].T, arguments[:, r:].T
+    library.fit(states=z, ddts=results[:, :r].T, inputs=inputs)
+    terms: dict[str, list[tuple[int, ...]]] = {
+        "c": [()],
+        "A": [(i,) for i in range(1, r + 1)],
+        "H": [(i, j) for i in range(1, r + 1) for j in range(1, i + 1)],
+        "B": [(r + j,) for j in range(1, len(inputs) + 1)],
+        "N": [(r + j, i) for j in range(1, len(inputs) + 1) for i in range(1, r + 1)],
+    }
+    entries = [np.reshape(operator.entries, (r, -1)).T for operator in library.operators]
+    listed = [term for name in form for term in terms[name]]
+    return learning.model(learning.with_motion(listed, np.vstack(entries)))
+
+
+METHOD = learner(
+    "operator_inference",
+    "linear or quadratic rates of principal components, fitted by opinf",
+    "10.1016/j.cma.2016.03.025",
+    operators,
+    OperatorInferenceSettings,
+    "opinf",
+    mapped=False,
+)
