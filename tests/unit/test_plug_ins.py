@@ -10,6 +10,7 @@ import vehiclemor as vm
 from tests.plugin.installation import installed
 from vehiclemor import registry
 from vehiclemor.cli import main
+from vehiclemor.codegen.sources import plug_in_digest
 from vehiclemor.exceptions import InputError, VehiclemorError
 from vehiclemor.reduction.methods import pod, replay
 from vehiclemor.registry import component, names, unknown
@@ -313,3 +314,8 @@ def test_plain_numbers_among_the_results_of_a_model(car):
     np.testing.assert_array_equal(model.rhs([0, 0, 1, 2], 0.0), [1, 2, 0, -1.5])
     outputs = model.outputs_at(np.zeros((2, 4)), np.zeros((2, 1)))
     np.testing.assert_array_equal(outputs, [[0, 1, 2.5]] * 2)
+
+
+@pytest.mark.parametrize("name", ["double_wishbone", "high_fidelity_vehicle", "flexible_truck"])
+def test_models_of_the_package_are_no_plug_ins(name):
+    assert plug_in_digest([component("model", name)]) == plug_in_digest([])

@@ -9,7 +9,7 @@ import hashlib
 import inspect
 import sys
 from collections.abc import Sequence
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -132,6 +132,9 @@ def _module_of(thing: object) -> ModuleType | None:
         return thing
     for name in ("derive", "fit", "signal"):
         if callable(function := getattr(thing, name, None)):
+            # A partial function is one of `functools` by its class.
+            while isinstance(function, partial):
+                function = function.func
             return inspect.getmodule(function)
     return inspect.getmodule(thing) or inspect.getmodule(type(thing))
 
