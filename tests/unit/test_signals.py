@@ -16,6 +16,7 @@ from vehiclemor.exceptions import VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.dynamic import DynamicModel
 
+PRESETS = "recommended", "strongest", "paper"
 GAPS = st.lists(st.floats(1e-3, 0.5), min_size=1, max_size=30)
 
 
@@ -157,6 +158,22 @@ def test_what_is_noisy_is_run_as_accurately_as_what_is_smooth(car, hold):
     found = car.simulate(signal, "equilibrium", solver="ros34pw2", tolerance=2e-3)
     place = car.outputs.index("lateral_position")
     assert np.abs(found.outputs - exact.outputs)[:, place].max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "duration"),
+    [("independent_suspension_vehicle", 300.0), ("high_fidelity_vehicle", 60.0)],
+)
+def test_a_log_may_be_long_and_noisy(name, duration):
+    t = np.arange(0.0, duration + 0.005, 0.01)
+    u = 0.002 * np.sin(0.5 * t) + 1e-4 * np.random.default_rng(3).normal(size=len(t))
+    full, shipped = vm.model(name), vm.rom(name)
+    log = vm.Signal.from_samples(t, u, "cubic", inputs=full.inputs[:1])
+    exact = full.simulate(log, outputs=["yaw"])
+    for car in (shipped, *(vm.reduce(full, "full_order", preset=p) for p in PRESETS)):
+        run = car.simulate(log, outputs=["yaw"])
+        assert run.status in ("ok", "untrusted"), run.message
+        assert np.abs(run["yaw"] - exact["yaw"]).max() < 0.02
 
 
 @pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4", "exponential_adams", "rodas4"])
