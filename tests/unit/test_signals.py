@@ -1,6 +1,7 @@
 """Signals: piecewise polynomials through samples, wherever a maneuver is wanted."""
 
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, interp1d
 
 import vehiclemor as vm
-from vehiclemor.exceptions import VehiclemorError
+from vehiclemor.exceptions import InputError, VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.dynamic import DynamicModel
 
@@ -98,11 +99,26 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: of_csv(TABLE, inputs=["s"]), "no column 's' among time, delta"),
         (lambda: of_csv(TABLE, inputs=3), "inputs is 3, not a list of names"),
         (lambda: of_csv(TABLE, inputs={"d": ["delta"]}), "not a list of names"),
+        *[(partial(BEYOND.at, t), "not a list of finite times") for t in (3.0, "t", [np.nan], [1j])],
+        *[(partial(SQUARE.for_inputs, n), "not a list of names") for n in (3, [["s"]], np.ones(2))],
+        (partial(vm.many_signals, [0, 2], [[0, 1]], output_step=1e-308), "step: 1e-308 s is below"),
     ],
 )
 def test_bad_samples_are_refused_in_one_line(call, told):
     with pytest.raises(VehiclemorError, match=told):
         call()
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero", "cubic"])
+def test_a_signal_ends_with_its_last_sample(car, hold):
+    t = np.linspace(0.0, 10.0, 101)
+    signal = vm.Signal.from_samples(t, 0.01 * np.sin(t), hold).perturbed(frequency=2.0)
+    np.testing.assert_array_equal(signal.at([5.0 + 1e-12, -1e-12]), signal.at([5.0, 0.0]))
+    for time in (-0.1, 5.1, 30.0):
+        with pytest.raises(InputError, match=f"lasts from 0 to 5 s: no inputs at {time:g} s"):
+            signal.at([1.0, time])
+    with pytest.raises(InputError, match="within the run, 0 to 5 s"):
+        car.simulate(signal, times=np.array([1.0, 5.1]))
 
 
 def straight(t: np.ndarray) -> np.ndarray:
