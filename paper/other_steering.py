@@ -16,6 +16,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from reduced_models import in_bounds
 from vehiclemor.exceptions import VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
@@ -99,7 +100,7 @@ def main(name: str, count: int, seed: int) -> None:
     protocol, (amplitude, label, candidate) = load_protocol(protocol_names()[name]), VEHICLES[name]
     contestant = next(c for c in protocol.entries if c.label == label)
     experiment = contestant.experiment(protocol.model, candidate, protocol.sets["validation"])
-    model, bounds = cast("Any", model_of(experiment)), protocol.definition.bounds
+    model = cast("Any", model_of(experiment))
     reduced = cast("Any", kept_fit(model, experiment))
     nominal, rng = component("maneuver", model.definition.maneuver), np.random.default_rng(seed)
     for kind, durations in DURATIONS.items():
@@ -123,12 +124,7 @@ def main(name: str, count: int, seed: int) -> None:
                 continue
             if true.status != "ok":
                 continue
-            score = np.inf if not run.finished else 0.0
-            for output, bound in bounds.items():
-                column = model.outputs.index(output)
-                error = np.abs(run.outputs[:, column] - true.outputs[:, column])
-                off = error.max() if bound.measure == "max" else np.sqrt(np.mean(error**2))
-                score = max(score, off / bound.bound)
+            score = in_bounds(protocol, run, true) if run.finished else np.inf
             found["runs"] += 1
             found["missed"] += int(score > 1.0)
             found["silent"] += int(score > 1.0 and run.status == "ok")

@@ -87,5 +87,9 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     assert main(["simulate", "double_wishbone", "--method", "pod", "--out", str(kept)]) == 0
     assert main(["plot", str(kept), "--animate", str(film)]) == 0
     assert film.stat().st_size > 0
+    both = ["--out", str(tmp_path / "a.png"), "--animate", str(tmp_path / "b.gif")]
+    assert main(["plot", str(kept), "--kind", "errors", *both]) == 0
+    assert capsys.readouterr().out.splitlines()[-2:] == [f"written: {path}" for path in both[1::2]]
+    assert all((tmp_path / name).stat().st_size > 0 for name in ("a.png", "b.gif"))
     assert main(["plot", str(kept), "--animate", str(tmp_path / "film.png")]) == 2
     assert capsys.readouterr().err.count("\n") == 1

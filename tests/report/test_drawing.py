@@ -1,6 +1,7 @@
 """Any result is drawn: runs that end in every way, over any axes, of one to seven methods."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -129,7 +130,7 @@ def test_a_run_far_from_full_order_is_cut_where_it_leaves(folder):
 
 def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeypatch):
     names = ("numbers", "map-4", "alone-diverged")
-    only = ["--only", ",".join(str(folder / f"{name}.toml") for name in names)]
+    only = ["--only", *(str(folder / f"{name}.toml") for name in names)]
     arguments = ["figures", *only, "--results", str(folder), "--out", str(folder / "figures")]
     assert main([*arguments, "--dpi", "20"]) == 0
     written = {path.stem.removeprefix("figure-") for path in (folder / "figures").iterdir()}
@@ -143,13 +144,14 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeyp
         raise IndexError("index 51 is out of bounds")
 
     monkeypatch.setitem(result_plot.DRAWINGS, "histories", broken)
-    only = ["--only", f"{folder / 'late.toml'},{folder / 'numbers.toml'}"]
-    only += ["--results", str(folder)]
+    # A comma belongs to the name of a file.
+    late = shutil.copy(folder / "late.toml", folder / "late, or not.toml")
+    only = ["--only", str(late), "--only", str(folder / "numbers.toml"), "--results", str(folder)]
     assert main(["figures", *only, "--out", str(folder / "some"), "--dpi", "20"]) == 1
     printed = capsys.readouterr()
     *_, line = printed.err.splitlines()
-    assert line.startswith("figure late-histories can't be drawn: IndexError")
-    assert [row.rpartition("-")[2] for row in printed.out.split()] == ["errors.png"] * 2
+    assert line.startswith("figure late, or not-histories can't be drawn: IndexError")
+    assert [row.rpartition("-")[2] for row in printed.out.splitlines()] == ["errors.png"] * 2
     page = vm.write_report([str(folder / "late.toml")], folder / "page.html", folder)
     head, _, rest = page.read_text(encoding="utf-8").partition("<ol")
     assert "late (IndexError: index 51" in head

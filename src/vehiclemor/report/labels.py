@@ -88,7 +88,8 @@ def unit_of(dataset: xr.Dataset, output: str) -> str:
 
 def method_text(label: str) -> str:
     """A method's label in a study, as a legend has it."""
-    return label.replace("pod", "POD").replace("_", " ")
+    words = ["POD" if word == "pod" else word for word in label.split("_")]
+    return " ".join(words)
 
 
 def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
@@ -98,7 +99,8 @@ def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
 
 def readable_unit(largest: float, unit: str) -> tuple[float, str]:
     """Factor and prefixed unit in which values up to `largest` have few digits."""
-    if not unit.startswith(("m", "rad")) or not 0.0 < largest < 0.1:
+    # A prefix of m^2 would be squared too.
+    if unit.split("/")[0] not in ("m", "rad") or not 0.0 < largest < 0.1:
         return 1.0, unit
     factor, prefix = next((f, p) for f, p in PREFIXES if f * largest >= 0.1 or p == "n")
     return factor, prefix + unit

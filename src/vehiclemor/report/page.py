@@ -27,7 +27,7 @@ from vehiclemor.report.figures.theme import METADATA, styled
 from vehiclemor.report.frames import counted_ends, frame
 from vehiclemor.report.labels import TRAINED, Column, trained_runs, unit_of
 from vehiclemor.report.printing import Table
-from vehiclemor.report.result_selection import drawn
+from vehiclemor.report.result_selection import select_point
 from vehiclemor.report.screens import Part, claim_parts, paper_parts, study_parts
 from vehiclemor.study.run import run_studies
 
@@ -161,7 +161,7 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
         held["paths"] = held["histories"] and set(PATH) <= set(dataset["output"].values)
         for kind in filter(held.get, PICTURES):
             for start in dataset["start"].values if kind != "errors" else [None]:
-                part, point = drawn(dataset, kind, {"start": start} if start else {})
+                part, point = select_point(dataset, kind, {"start": start} if start else {})
                 caption = f"{PICTURES[kind]}{f' at {point}' if point else ''}"
                 pictures[caption] = partial(plot_result, part, None, kind)
     made = [

@@ -47,7 +47,9 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
     return read_dataset(path, "source", "vehiclemor")
 
 
-def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple[xr.Dataset, str]:
+def select_point(
+    dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]
+) -> tuple[xr.Dataset, str]:
     """What of a result is drawn: one point of a study's grid with all methods, and its name.
 
     A dimension that is not chosen is at its nominal or first value, but errors are drawn over it.
@@ -92,7 +94,7 @@ class ResultAccessor:
         """Draw the result; see `vehiclemor.plot`."""
         from vehiclemor.report.figures.result_plot import plot_result
 
-        dataset, _ = drawn(self._dataset, kind, at)
+        dataset, _ = select_point(self._dataset, kind, at)
         return plot_result(dataset, None if out is None else file_path("out", out), kind)
 
 

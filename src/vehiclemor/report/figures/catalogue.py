@@ -15,7 +15,7 @@ from vehiclemor.files import make_folder
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
 from vehiclemor.report.figures import costs, result_plot, runs, theme
-from vehiclemor.report.result_selection import drawn
+from vehiclemor.report.result_selection import select_point
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import studies_and_files
 from vehiclemor.study.plans.study_file import StudyFile
@@ -47,7 +47,7 @@ class Entry(NamedTuple):
         """Draw a study at its nominal or first point, its errors over the whole grid."""
         if self.kind in DRAWINGS:
             return DRAWINGS[self.kind](dataset)
-        shown, point = drawn(dataset, self.kind, {})
+        shown, point = select_point(dataset, self.kind, {})
         if point:
             shown = shown.assign_attrs(title=f"{shown.attrs['title']}\nat {point}")
         return result_plot.figure_of(shown, self.kind)
