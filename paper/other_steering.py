@@ -14,9 +14,9 @@ from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
+from reduced_models import in_bounds
 from scipy.interpolate import make_interp_spline
 
-from reduced_models import in_bounds
 from vehiclemor.exceptions import VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component

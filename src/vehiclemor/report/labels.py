@@ -100,7 +100,7 @@ def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
 def readable_unit(largest: float, unit: str) -> tuple[float, str]:
     """Factor and prefixed unit in which values up to `largest` have few digits."""
     # A prefix of m^2 would be squared too.
-    if unit.split("/")[0] not in ("m", "rad") or not 0.0 < largest < 0.1:
+    if unit.split("/", maxsplit=1)[0] not in ("m", "rad") or not 0.0 < largest < 0.1:
         return 1.0, unit
     factor, prefix = next((f, p) for f, p in PREFIXES if f * largest >= 0.1 or p == "n")
     return factor, prefix + unit
