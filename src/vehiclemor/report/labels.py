@@ -6,6 +6,7 @@ gets rows by its kind of equations.
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 TRAINED, MARK = "trained on this run", "*"
 # Letters of an axis' label that leave no room for more beside them; of one beside a low panel.
 LONG, LONGEST = 16, 26
+EXPONENT = re.compile(r"\^(-?\d+(?:\.\d+)?)")
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
 # Format of errors: an exact zero is a dash, since orders of magnitude are compared.
 ERROR = ".1e"
@@ -40,6 +42,15 @@ class Label(NamedTuple):
     short: str
 
 
+class MethodLook(NamedTuple):
+    """How a method is called and drawn; dashes are lengths of lines and gaps in line widths."""
+
+    words: str
+    color: str
+    mark: str
+    dashes: list[float]
+
+
 class Column(NamedTuple):
     """How a column is printed: heading, format, meaning below the table, factor on the SI unit."""
 
@@ -53,6 +64,7 @@ class LabelFile(FileSchema):
     """Schema of `data/figures/labels.toml`."""
 
     outputs: dict[str, Label]
+    methods: dict[str, MethodLook]
     columns: dict[str, Column]
 
 
@@ -88,8 +100,20 @@ def unit_of(dataset: xr.Dataset, output: str) -> str:
 
 def method_text(label: str) -> str:
     """A method's label in a study, as a legend has it."""
+    if look := method_looks().get(label):
+        return look.words
     words = ["POD" if word == "pod" else word for word in label.split("_")]
     return " ".join(words)
+
+
+def method_looks() -> dict[str, MethodLook]:
+    """Words, colour, mark and dashes of each method of the package."""
+    return _declared().methods
+
+
+def raised(unit: str) -> str:
+    """A unit or formula whose exponents are superscripts in a figure."""
+    return EXPONENT.sub(r"$^{\1}$", unit)
 
 
 def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
@@ -109,13 +133,16 @@ def readable_unit(largest: float, unit: str) -> tuple[float, str]:
 def axis_label(dataset: xr.Dataset, output: str, unit: str = "") -> str:
     """Name, symbol and unit (the output's own by default) of an output."""
     text = full_label(output, "\n" if len(label_of(output).name) > LONG else " ")
-    return f"{text} ({unit or unit_of(dataset, output)})"
+    return f"{text} ({raised(unit or unit_of(dataset, output))})"
 
 
 def error_label(dataset: xr.Dataset, kind: str, output: str, unit: str = "") -> str:
     """An error of an output, its symbol and unit, such as `RMS error`; long ones in two lines."""
-    label = f"{kind} of {label_of(output).symbol} ({unit or unit_of(dataset, output)})"
-    return label if len(label.replace("$", "")) <= LONGEST else label.replace(" of ", " of\n", 1)
+    unit = unit or unit_of(dataset, output)
+    symbol = label_of(output).symbol
+    letters = len(f"{kind} of {symbol} ({unit})".replace("$", ""))
+    between = " " if letters <= LONGEST else "\n"
+    return f"{kind} of{between}{symbol} ({raised(unit)})"
 
 
 # What is shown of a model.

@@ -53,6 +53,7 @@ def select_point(
     """What of a result is drawn: one point of a study's grid with all methods, and its name.
 
     A dimension that is not chosen is at its nominal or first value, but errors are drawn over it.
+    The point stands in the title.
     """
     if not isinstance(kind, str) or kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)
@@ -80,7 +81,11 @@ def select_point(
         dataset = dataset.isel({dimension: places[0]})
         if len(values) > 1:
             parts.append(f"{dimension} {value}")
-    return dataset, ", ".join(parts)
+    point = ", ".join(parts)
+    if point:
+        title = f"{dataset.attrs.get('title', '')}\nat {point}".strip()
+        dataset = dataset.assign_attrs(title=title)
+    return dataset, point
 
 
 @xr.register_dataset_accessor("vehiclemor")

@@ -249,9 +249,11 @@ def _grid_parts(rows: list[Row]) -> list[Part]:
     title = wrapped(f"{first['study']}: {first['title']}") + "\n"
     errors = ("label", "median", "largest", "floor", "failed", "largest_at")
     costs = ["label", "runs", "failures", "warned", "trained", "evaluations", "seconds_in_loop"]
+    saturated = {row["label"]: row["saturates_at"] for row in rows if row["saturates_at"]}
+    below = "; ".join(f"{label} saturates at rank {rank}" for label, rank in saturated.items())
     return [
         title + wrapped("; ".join(filter(None, about)), 2, 2),
-        Table(lines, errors, group="of"),
+        Table(lines, errors, group="of", below=below),
         Table(runs, [*costs, "offline_seconds"], group="of"),
     ]
 

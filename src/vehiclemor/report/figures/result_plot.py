@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from vehiclemor.exceptions import InputError
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
 from vehiclemor.report.figures.errors import figure_errors
 from vehiclemor.report.figures.runs import figure_histories, figure_paths
@@ -18,7 +19,9 @@ from vehiclemor.report.labels import main_outputs, tabled_outputs
 # At most so many outputs have panels.
 PANELS = 3
 DRAWINGS: dict[str, Callable[[xr.Dataset], Figure]] = {
-    "histories": lambda dataset: figure_histories(dataset, outputs=shown_outputs(dataset)),
+    "histories": lambda dataset: figure_histories(
+        dataset, outputs=shown_outputs(dataset), inputs=_input_meanings(dataset)
+    ),
     "paths": figure_paths,
     "errors": lambda dataset: figure_errors(dataset, outputs=shown_outputs(dataset)),
 }
@@ -65,7 +68,8 @@ def model_name(dataset: xr.Dataset) -> str:
 def by_method(dataset: xr.Dataset, unnamed: str = "run") -> xr.Dataset:
     """A result on the dimension `label`, which that of one run does not have."""
     if "label" not in dataset.coords:
-        dataset = dataset.assign_coords(label=configuration(dataset).get("method", unnamed))
+        method = dataset.attrs.get("method") or configuration(dataset).get("method", unnamed)
+        dataset = dataset.assign_coords(label=method)
     return dataset if "label" in dataset.dims else dataset.expand_dims("label")
 
 
@@ -82,11 +86,24 @@ def _title(dataset: xr.Dataset) -> str:
 def shown_outputs(dataset: xr.Dataset) -> list[str]:
     """Outputs that the model shows; of a model that is not installed here, the first."""
     known = [str(output) for output in dataset["output"].values]
-    try:
-        definition = component("model", model_name(dataset))
+    shown: list[str] = []
+    if definition := _definition(dataset):
         main = main_outputs(definition)
         shown = list(dict.fromkeys((*main, *tabled_outputs(definition))))[: max(2, len(main))]
-    except InputError:
-        shown = []
     # Of outputs that a user has chosen none may be among them.
     return ([output for output in shown if output in known] or known)[:PANELS]
+
+
+def _input_meanings(dataset: xr.Dataset) -> dict[str, str]:
+    """Meaning of each input, without its remarks."""
+    definition = _definition(dataset)
+    inputs = definition.inputs if definition else ()
+    return {quantity.name: quantity.long_name.partition(",")[0] for quantity in inputs}
+
+
+def _definition(dataset: xr.Dataset) -> ModelDefinition | None:
+    """The model of a result, if it is installed here."""
+    try:
+        return component("model", model_name(dataset))
+    except InputError:
+        return None
