@@ -2,7 +2,7 @@
 
 import inspect
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -22,6 +22,7 @@ from vehiclemor.cli.options import (
 )
 from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.export import STEP, FileTarget, destination, name_of
+from vehiclemor.report.labels import Kind
 from vehiclemor.report.printing import wrapped
 
 # Method that stands for the model that ships.
@@ -121,7 +122,7 @@ def _picture(plot: list[Path] | None, usual: str) -> Path | None:
 def plot(
     result: str,
     *,
-    kind: Literal["histories", "paths", "errors"] = "histories",
+    kind: Kind = "histories",
     select: list[str] | None = None,
     out: Path | None = None,
     animate: Path | None = None,

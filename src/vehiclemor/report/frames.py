@@ -106,12 +106,12 @@ def saturated_ranks(dataset: xr.Dataset) -> dict[str, int]:
     if not {"rank", *wanted} <= set(dataset.variables) or "rank" not in dataset["status"].dims:
         return {}
     # A method that has no rank is one run at all ranks.
-    runs: Any = frame(dataset, wanted).drop_duplicates("cell_key")
+    runs: Any = frame(dataset, wanted).drop_duplicates(["label", "cell_key"])
     runs = runs[runs["status"].isin(FINISHED)]
     found: dict[str, int] = {}
     for label, ended in runs.groupby("label", sort=False):
         asked, reached = int(ended["rank"].max()), int(ended["effective_rank"].max())
-        if ended["rank"].nunique() > 1 and reached < asked:
+        if ended["rank"].min() < asked and reached < asked:
             found[str(label)] = reached
     return found
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -20,6 +20,8 @@ from vehiclemor.toml_files import FileSchema, Line, read_toml
 if TYPE_CHECKING:
     import xarray as xr
 
+# What is drawn of a run, or of a point of a grid.
+Kind = Literal["histories", "paths", "errors"]
 # What is said of a run that was in its own training, and the mark of it in a legend.
 TRAINED, MARK = "trained on this run", "*"
 # Letters of an axis' label that leave no room for more beside them; of one beside a low panel.
@@ -66,16 +68,18 @@ class LabelFile(FileSchema):
     outputs: dict[str, Label]
     methods: dict[str, MethodLook]
     columns: dict[str, Column]
+    sizes: dict[str, dict[str, Column]]
 
 
 @cache
-def _declared() -> LabelFile:
+def declared() -> LabelFile:
+    """The package's own file."""
     return read_toml(data_folder() / "figures" / "labels.toml", LabelFile)
 
 
 def column(name: str) -> Column:
     """How a column is printed; one without an entry has its name as heading."""
-    known = _declared().columns
+    known = declared().columns
     if name.startswith("rms_") and name not in known:
         return Column(f"{label_of(name.removeprefix('rms_')).short} error", ERROR)
     return known.get(name, Column(name.replace("_", " ")))
@@ -84,7 +88,7 @@ def column(name: str) -> Column:
 def label_of(output: str) -> Label:
     """The label of an output; one that has no symbol has its name."""
     name = output.replace("_", " ")
-    return _declared().outputs.get(output, Label(name, name, name))
+    return declared().outputs.get(output, Label(name, name, name))
 
 
 def full_label(output: str, between: str = " ") -> str:
@@ -100,15 +104,10 @@ def unit_of(dataset: xr.Dataset, output: str) -> str:
 
 def method_text(label: str) -> str:
     """A method's label in a study, as a legend has it."""
-    if look := method_looks().get(label):
+    if look := declared().methods.get(label):
         return look.words
     words = ["POD" if word == "pod" else word for word in label.split("_")]
     return " ".join(words)
-
-
-def method_looks() -> dict[str, MethodLook]:
-    """Words, colour, mark and dashes of each method of the package."""
-    return _declared().methods
 
 
 def raised(unit: str) -> str:

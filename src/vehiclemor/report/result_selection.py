@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import xarray as xr
@@ -14,6 +14,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.metrics import errors
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import unknown
+from vehiclemor.report.labels import Kind
 from vehiclemor.resources import data_names
 from vehiclemor.study.plans.loading import content_hash, load_studies
 from vehiclemor.study.plans.study_runs import FACTORS
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     from vehiclemor.simulation.trajectory import Trajectory
 
-KINDS = ("histories", "paths", "errors")
+KINDS: tuple[str, ...] = get_args(Kind)
 # Values of a dimension that an error lists.
 MOST_NAMED = 12
 

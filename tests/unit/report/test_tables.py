@@ -18,6 +18,7 @@ from vehiclemor.report.default_studies import of_paper, smaller_rank
 from vehiclemor.report.labels import (
     Column,
     column,
+    declared,
     default_rank,
     main_outputs,
     method_text,
@@ -101,6 +102,12 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
 )
 def test_prefixes_keep_the_meaning_of_a_unit(largest, unit, expected):
     assert readable_unit(largest, unit) == expected
+
+
+def test_a_colour_and_a_mark_name_one_method_of_the_package():
+    looks = declared().methods
+    assert set(names("method")) - {"full_order"} <= set(looks)
+    assert len({(look.color, look.mark) for look in looks.values()}) == len(looks)
 
 
 def test_methods_of_other_names_keep_them():

@@ -228,8 +228,8 @@ def animate(
 def _styles(methods: Sequence[str]) -> list[Style]:
     """Style of each run: the colour of its method, the last one of several in grey."""
     numbered = {str(k): method for k, method in enumerate(methods)}
-    looks = [look | {"linestyle": "-"} for look in styles(numbered, numbered).values()]
-    looks = [look | {"linewidth": 1.2} for look in looks]
+    found = styles(numbered, numbered)
+    looks = [found[key] | {"linestyle": "-", "linewidth": 1.2} for key in numbered]
     return [*looks[:-1], FULL | {"zorder": 1.5, "linewidth": 3.5}] if len(looks) > 1 else looks
 
 

@@ -21,7 +21,7 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, 
 from vehiclemor.arguments import count, quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import write_whole
-from vehiclemor.report.labels import MARK, TRAINED, method_looks, raised
+from vehiclemor.report.labels import MARK, TRAINED, MethodLook, declared, raised
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
 Style = dict[str, Any]
@@ -53,26 +53,28 @@ UNITS = {"control_period": "s"}
 WIDE, LETTERS, FEW_DECADES, SMALL = 30.0, 60, 2.5, 1e-4
 
 
-def method_style(method: str) -> Style:
-    """Colour and dashes of a method, whose gaps show a line below; none of an unknown one."""
-    if method == "full_order":
-        return FULL
-    look = method_looks().get(method)
-    return {"color": look.color, "linestyle": (0, tuple(look.dashes))} if look else {}
+def look_of(label: str, methods: Mapping[str, str]) -> MethodLook | None:
+    """Look of a label, or of the method that it is of; none of what the package does not have."""
+    known = declared().methods
+    return known.get(label) or known.get(methods.get(label, ""))
 
 
-def styles(labels: Iterable[str], methods: Mapping[str, str] | None = None) -> dict[str, Style]:
-    """Style of each label: that of its method, of further ones what no other line has.
+def method_style(look: MethodLook) -> Style:
+    """Colour and dashes, whose gaps show a line below."""
+    return {"color": look.color, "linestyle": (0, tuple(look.dashes))}
 
-    `methods` says of which method a label is, where it is not its name.
-    """
+
+def styles(labels: Iterable[str], methods: Mapping[str, str]) -> dict[str, Style]:
+    """Style of each label: that of its method, of further ones what no other line has."""
     known: dict[str, Style] = {}
-    labels = list(labels)
+    rest: list[str] = []
     for label in labels:
-        style = method_style(label) or method_style((methods or {}).get(label, ""))
-        if style and style not in known.values():
+        look = look_of(label, methods)
+        style = method_style(look) if look else FULL
+        if (look or label == "full_order") and style not in known.values():
             known[label] = style
-    rest = [label for label in labels if label not in known]
+        else:
+            rest.append(label)
     taken = {style["color"] for style in known.values()}
     colors = [color for color in COLORS if color not in taken]
     if len(rest) > len(colors):
@@ -82,12 +84,12 @@ def styles(labels: Iterable[str], methods: Mapping[str, str] | None = None) -> d
     return known
 
 
-def marks(labels: Iterable[str], methods: Mapping[str, str] | None = None) -> dict[str, str]:
+def marks(labels: Iterable[str], methods: Mapping[str, str]) -> dict[str, str]:
     """Mark of each label: that of its method, for further ones the marks in turn."""
     known: dict[str, str] = {}
     free = cycle(MARKERS)
     for label in labels:
-        look = method_looks().get(label) or method_looks().get((methods or {}).get(label, ""))
+        look = look_of(label, methods)
         taken = known.values()
         known[label] = look.mark if look and look.mark not in taken else next(free)
     return known
