@@ -44,6 +44,7 @@ def test_a_film_shows_what_has_been_driven_and_left_at_the_left():
     names = "reduced", "full order"
     scene = animation.SCENES["a car"]
     film = animation._film(scene, [frames] * 2, names, looks, (car.parameters.values(), 1.0))
+    film._draw_was_started = True
     above, behind = film._fig.axes
     for frame in (0, 7):
         film._func(frame)

@@ -112,7 +112,8 @@ def test_exponents_are_superscripts(drawn):
         for text, _ in texts_of(figure):
             assert not re.search(r"\^[^{]", text.get_text()), (name, text)
     legend = [text.get_text() for text in drawn["size"].axes[0].get_legend().get_texts()]
-    assert "shells, full: n$^{1.0}$" in legend
+    # Of two small meshes of beams no growth is known.
+    assert {"shells, full: n$^{1.0}$", "beams, full"} <= set(legend)
 
 
 def test_lines_differ_in_grey_too(drawn):

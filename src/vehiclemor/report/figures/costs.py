@@ -100,8 +100,9 @@ def figure_size(dataset: xr.Dataset) -> Figure:
     meshes = [kind for kind in dict.fromkeys(kinds.tolist()) if kind != "vehicle"]
     for kind, look in zip(meshes, LOOKS, strict=False):
         own, word = kinds == kind, KINDS.get(kind, (kind, ""))[0]
-        slope = raised(f"{word}, full: n^{growth(dataset, kind, FULL):.1f}")
-        left.plot(n[own], full[own], label=slope, **look)
+        exponent = growth(dataset, kind, FULL)
+        slope = raised(f": n^{exponent:.1f}") if np.isfinite(exponent) else ""
+        left.plot(n[own], full[own], label=f"{word}, full{slope}", **look)
         hollow: Style = look | {"markerfacecolor": "none", "linestyle": "--"}
         left.plot(n[own], reduced[own], label=f"{word}, {name}", **hollow)
         right.plot(n[own], full[own] / reduced[own], label=f"{word}, the same mesh", **look)

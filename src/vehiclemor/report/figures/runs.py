@@ -28,7 +28,9 @@ RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
 # the largest value below which the full order stands still.
 REACH, STILL = 0.6, 1e-4
 # Height of a panel in inches; letters of a label beside it in one line.
-HISTORY, ERROR, LINE = 2.2, 1.7, 26
+HISTORY, ERROR, LINE = 2.5, 1.8, 26
+# Letters in a line of an input's meaning.
+MEANING = 20
 
 
 class Curve(NamedTuple):
@@ -139,7 +141,7 @@ def draw_inputs(axis: Axes, run: xr.Dataset, meanings: Mapping[str, str]) -> Non
         axis.plot(run["time"], inputs[k], label=label, **look)
     text = meanings.get(names[shown[0]], names[shown[0]]) if len(shown) == 1 else "inputs"
     unit = labels.raised(units[shown[0]])
-    axis.set_ylabel(textwrap.fill(f"{text} ({unit})", LINE))
+    axis.set_ylabel(textwrap.fill(f"{text} ({unit})", MEANING))
 
 
 def draw_history(axis: Axes, runs: Runs, output: str) -> None:
