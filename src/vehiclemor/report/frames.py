@@ -108,12 +108,10 @@ def saturated_ranks(dataset: xr.Dataset) -> dict[str, int]:
     # A method that has no rank is one run at all ranks.
     runs: Any = frame(dataset, wanted).drop_duplicates(["label", "cell_key"])
     runs = runs[runs["status"].isin(FINISHED)]
-    found: dict[str, int] = {}
-    for label, ended in runs.groupby("label", sort=False):
-        asked, reached = int(ended["rank"].max()), int(ended["effective_rank"].max())
-        if ended["rank"].min() < asked and reached < asked:
-            found[str(label)] = reached
-    return found
+    ranks = runs.groupby("label", sort=False)["rank"].agg(["min", "max"])
+    reached = runs.groupby("label", sort=False)["effective_rank"].max()
+    less = reached[(ranks["min"] < ranks["max"]) & (reached < ranks["max"])]
+    return {str(label): int(rank) for label, rank in less.items()}
 
 
 def _counts(runs: Any) -> dict[str, Any]:

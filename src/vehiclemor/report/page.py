@@ -20,12 +20,7 @@ from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
 from vehiclemor.report.comparison import paper_comparison, result_rows
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.figures.result_plot import (
-    PICTURES,
-    pictures_of,
-    plot_result,
-    shown_outputs,
-)
+from vehiclemor.report.figures.result_plot import PICTURES, pictures_of, plot_result, shown_outputs
 from vehiclemor.report.figures.theme import METADATA, styled
 from vehiclemor.report.frames import counted_ends, frame
 from vehiclemor.report.labels import TRAINED, Column, trained_runs, unit_of
@@ -182,8 +177,9 @@ def error_table(dataset: xr.Dataset) -> pd.DataFrame:
     status = runs["status"] + marks + said.map(lambda text: f": {text}" if text else "")
     axes = [str(d) for d in dataset["status"].dims if d != "label" and dataset.sizes[d] > 1]
     axes += [n for n, c in dataset.coords.items() if c.dims == ("sample",) and n not in axes]
-    fixed = runs.groupby("label")[axes].transform("nunique") == 1
-    runs[axes] = runs[axes].astype(object).mask(fixed, "")
+    for axis in axes:
+        fixed = runs.groupby("label")[axis].transform("nunique") == 1
+        runs[axis] = runs[axis].astype(object).mask(fixed, "")
     counts = [name for name in COUNTS if name in runs]
     shown = runs[["label", *axes, *heads.values(), *counts]]
     return shown.assign(status=status, cell=runs["cell_key"])
