@@ -155,7 +155,7 @@ def _lines(
             for name, value in zip(own, place, strict=True):
                 unit = str(errors[name].attrs.get("units", "")).removesuffix("1")
                 shown = value if isinstance(value, str) else f"{value:g}"
-                if name == "rank" and value > saturated.get(label, value):
+                if name == "rank" and float(value) > saturated.get(label, np.inf):
                     shown += f" (saturates at {saturated[label]})"
                 parts.append(f"{_listed([name])} {shown} {unit}".rstrip())
             chosen = line.sel(dict(zip(own, place, strict=True)))
