@@ -18,15 +18,15 @@ from typing import Any, cast
 
 import numpy as np
 from in_use import store
+from reduced_models import in_bounds
 from scipy.interpolate import make_interp_spline
 
 import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.metrics import rms
 from vehiclemor.registry import component
 from vehiclemor.study.evaluate import kept_fit, model_of
-from vehiclemor.study.plans.protocol import load_protocol, protocol_names
+from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names
 from vehiclemor.study.scenario import Scenario, start_of
 
 # Largest nominal steering of the lane change, and the contestant with its chosen candidate.
@@ -106,19 +106,12 @@ def maneuver(model: Any, name: str, duration: float, signal: Signal) -> Maneuver
     return Maneuver(name, "", inputs, model.inputs, duration, samples, lambda _: corners)
 
 
-def score_of(model: Any, reduced: Any, driven: Any, state: Any, bounds: Any) -> tuple[float, bool]:
+def score_of(protocol: Protocol, reduced: Any, driven: Any, state: Any) -> tuple[float, bool]:
     """Largest error in multiples of its bound, and whether the run has the status `ok`."""
-    exact, run = model.simulate(driven, state), reduced.simulate(driven, state)
+    exact, run = protocol.model.simulate(driven, state), reduced.simulate(driven, state)
     if exact.status != "ok":
         raise ConvergenceError(exact.message)
-    if not run.finished:
-        return np.inf, False
-    scores = []
-    for output, bound in bounds.items():
-        error = np.abs(run[output] - exact[output])
-        size = error.max() if bound.measure == "max" else rms(error)
-        scores.append(float(size) / bound.bound)
-    return max(scores), run.status == "ok"
+    return in_bounds(protocol, run, exact) if run.finished else np.inf, run.status == "ok"
 
 
 def counted(name: str, count: int, seed: int) -> Iterator[tuple[str, float]]:
@@ -126,7 +119,7 @@ def counted(name: str, count: int, seed: int) -> Iterator[tuple[str, float]]:
     protocol, (amplitude, label, candidate) = load_protocol(protocol_names()[name]), VEHICLES[name]
     contestant = next(c for c in protocol.entries if c.label == label)
     experiment = contestant.experiment(protocol.model, candidate, protocol.sets["validation"])
-    model, bounds = cast("Any", model_of(experiment)), protocol.definition.bounds
+    model = cast("Any", model_of(experiment))
     reduced = cast("Any", kept_fit(model, experiment))
     nominal, rng = component("maneuver", model.definition.maneuver), np.random.default_rng(seed)
     for kind, durations in DURATIONS.items():
@@ -144,7 +137,7 @@ def counted(name: str, count: int, seed: int) -> Iterator[tuple[str, float]]:
             try:
                 driven = maneuver(model, family, duration, signal)
                 driven = replace(driven, amplitude_factor=size)
-                score, trusted = score_of(model, reduced, driven, state, bounds)
+                score, trusted = score_of(protocol, reduced, driven, state)
             except VehiclemorError:
                 continue
             counts["runs"] += 1
@@ -157,7 +150,7 @@ def counted(name: str, count: int, seed: int) -> Iterator[tuple[str, float]]:
         yield f"{name} {kind} worst score without a warning, 1", worst
     if name == "independent_suspension_vehicle":
         searched = vm.Signal.from_samples(*SEARCHED, "cubic")
-        score, trusted = score_of(model, vm.rom(name), searched, "equilibrium", bounds)
+        score, trusted = score_of(protocol, vm.rom(name), searched, "equilibrium")
         yield "searched score, 1", score
         yield "searched trusted, 1", trusted
 

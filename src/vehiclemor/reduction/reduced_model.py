@@ -110,6 +110,8 @@ class ReducedOrderModel(ShortRepr):
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
             run = simulated(self.reduced, chosen, begun, names)
+        # A copy would take a twentieth of a short run.
+        run.__dict__["method"] = self.method
         if not run.trust and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
         return run if times is None else run.chosen(times=times)
