@@ -162,6 +162,8 @@ class Trajectory(ShortRepr):
 
     def _columns(self, names: tuple[str, ...]) -> np.ndarray:
         """Histories (samples, names) of outputs, coordinates or speeds."""
+        if names == self.names:
+            return self.outputs
         recording = self.__dict__.get("recording")
         groups = {"outputs": self.names}
         if recording is not None or self.coordinates.shape[1]:
