@@ -11,7 +11,6 @@ from functools import cached_property, partial
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.metrics import signal_range
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.settings import Settings
@@ -48,7 +47,7 @@ class ReplayModel(ShortRepr):
     def _ranges(self) -> tuple[np.ndarray, np.ndarray]:
         """Ranges over all training runs: of the inputs (inputs,), of the conditions (k,)."""
         inputs = np.vstack([run.inputs for run in self.recorded])
-        return signal_range(inputs), signal_range(self.conditions)
+        return np.ptp(inputs, axis=0), np.ptp(self.conditions, axis=0)
 
     def for_model(self, model: Model) -> "ReplayModel":
         """The same runs, asked for with the online parameters of another model."""
