@@ -24,7 +24,7 @@ TRAINED, MARK = "trained on this run", "*"
 # Letters of an axis' label that leave no room for more beside them; of one beside a low panel.
 LONG, LONGEST = 16, 26
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
-# Format of errors: an exact zero is a dash, since orders of magnitude are compared.
+# Format of errors: an exact zero is 0, since orders of magnitude are compared.
 ERROR = ".1e"
 MOST_PRINTED = 3
 LARGEST_DEFAULT_RANK = 3

@@ -115,7 +115,7 @@ COSTS = {
     "seconds": Column("reduced, s", ".3g"),
     "gain_mesh": Column("times faster", ".3g", "than the full model on the same mesh"),
     "offline_seconds": Column("offline, s", ".2g", "CPU time of training and fit"),
-    "break_even": Column("pays after", ".2g", "runs that earn the offline cost"),
+    "break_even": Column("break-even, runs", ".2g", "after which the offline cost is saved"),
 }
 RIVALS = {
     "mesh": Column("mesh"),
