@@ -10,7 +10,6 @@ import numpy as np
 from vehiclemor.exceptions import InputError
 from vehiclemor.short_repr import shortened
 
-
 # Numbers of a range that are listed.
 LONGEST_RANGE = 10_000_000
 

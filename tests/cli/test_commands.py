@@ -81,6 +81,23 @@ def test_simulate_writes_what_the_interface_returns(tmp_path, printed, monkeypat
         assert json.loads(written.attrs["configuration"])["parameters"]["wheel_centre"] == point
 
 
+def test_a_log_is_simulated_as_its_signal_and_drawn(tmp_path, printed, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    times = np.linspace(0.0, 1.0, 11)
+    rows = [f"{t:.1f};{10.0 * t:.1f}".replace(".", ",") for t in times]
+    (tmp_path / "log.csv").write_text("\n".join(["Time [s];Travel [mm]", *rows]))
+    words = ["time=Time [s]", "z=Travel [mm]", "unit=mm", "separator=;", "decimal=,", "hold=cubic"]
+    log = "--maneuver", "log.csv", "--csv", *words
+    printed("simulate", "double_wishbone", *log, "--out", "run.nc")
+    signal = vm.Signal.from_samples(times, 0.01 * times, "cubic", inputs="z")
+    expected = vm.simulate("double_wishbone", maneuver=signal)
+    with xr.open_dataset("run.nc") as written:
+        np.testing.assert_allclose(written["coordinates"], expected["coordinates"], atol=1e-12)
+    assert "written: run-histories.png" in printed("plot", "run.nc")
+    assert main(["simulate", "double_wishbone", "--csv", "unit=mm"]) == 2
+    assert "--maneuver FILE.csv" in capsys.readouterr().err
+
+
 def test_text_of_the_command_line_gets_its_kind():
     texts = ["3", "-2", "2.5", "1e-6", "fast", "3a", "1,2.5", "theta,alpha", ""]
     values = [3, -2, 2.5, 1e-6, "fast", "3a", [1.0, 2.5], "theta,alpha", ""]

@@ -35,6 +35,7 @@ def simulate(
     method: str = "full_order",
     settings: Settings = None,
     maneuver: str | None = None,
+    csv: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     frequency: float = 1.0,
     amplitude: float = 1.0,
     start: str | None = None,
@@ -58,7 +59,11 @@ def simulate(
     method
         Registered name.
     maneuver
-        Registered name; the model's own by default.
+        Registered name, or a CSV file of a log; the model's own by default.
+    csv
+        key=value, once or several: how to read a CSV file. INPUT=COLUMN says which column is an
+        input; time=COLUMN, unit=deg (or mm), ratio=16 (steering wheel to wheels), hold=cubic,
+        separator=; and decimal=, are the words of vm.Signal.from_csv.
     frequency
         Factor on the input's frequency.
     amplitude
@@ -88,7 +93,7 @@ def simulate(
     if out is not None:
         result_file("--out", out)
     ready = vm.model(model, key_values("--parameter", parameter), parameter_file)
-    how: dict[str, Any] = {"maneuver": maneuver, "start": start, "preset": preset}
+    how: dict[str, Any] = {"maneuver": _maneuver(maneuver, csv), "start": start, "preset": preset}
     how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
     dataset = vm.simulate(ready, method, **how, **chosen)
     from vehiclemor.netcdf_file import write_dataset
@@ -108,6 +113,18 @@ def simulate(
     if out is None and picture is None and animate is None:
         print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
+
+
+def _maneuver(name: str | None, csv: list[str] | None) -> str | vm.Signal | None:
+    """A registered name, or the signal of a CSV file."""
+    options = key_values("--csv", csv)
+    if Path(name or "").suffix.lower() == ".csv":
+        words = inspect.signature(vm.Signal.from_csv).parameters.keys() - {"path"}
+        columns = {key: str(options.pop(key)) for key in options.keys() - words}
+        return vm.Signal.from_csv(name, **{"inputs": columns} | options)
+    if options:
+        raise InputError("--csv is for a log: --maneuver FILE.csv")
+    return name
 
 
 def _picture(plot: list[Path] | None, usual: str) -> Path | None:

@@ -28,7 +28,7 @@ TRAINED, MARK = "trained on this run", "*"
 LONG, LONGEST = 16, 26
 EXPONENT = re.compile(r"\^(-?\d+(?:\.\d+)?)")
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
-# Format of errors: an exact zero is a dash, since orders of magnitude are compared.
+# Format of errors: an exact zero is 0, since orders of magnitude are compared.
 ERROR = ".1e"
 MOST_PRINTED = 3
 LARGEST_DEFAULT_RANK = 3

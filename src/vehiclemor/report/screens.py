@@ -290,10 +290,15 @@ def _protocol_parts(rows: Mapping[str, list[Row]], explain: bool) -> list[Part]:
     for row in named:
         ends = f"{100 * row['stable_share']:.0f} % of the runs end, {row['failure']}"
         row["ends"] = ends if row["failure"] else ""
-    errors = ("label", "misses", "silent", "flagged", "validation_score", "score")
+    errors = ("label", "misses", "misses_at_ten", "silent", "flagged", "validation_score", "score")
+    units = ("label", "median_m", "worst_m", "median_deg", "worst_deg")
     costs = ["label", "seconds", "loop_seconds", "ratio_equal", "ratio_equal_loop"]
     parts.append(Table(named, errors, note="ends", explain=explain))
-    return [*parts, Table(named, [*costs, "offline_seconds"], explain=explain)]
+    if any(row[unit] == row[unit] for row in named for unit in units[1:]):
+        parts.append(Table(named, units, explain=explain))
+    parts.append(Table(named, [*costs, "offline_seconds"], explain=explain))
+    chosen = [row for row in named if row["role"] != FULL_ORDER and row["chosen_settings"]]
+    return [*parts, *[Table(chosen, ("label", "chosen_settings"))] * bool(chosen)]
 
 
 def _winner_parts(
@@ -309,5 +314,5 @@ def _winner_parts(
     errors = {"output": Column(f"errors of {winner['label']}, SI units")}
     errors |= {name: column(name) for name in ("bound", "worst", "most")}
     errors["reason"] = Column("bound from")
-    below = "*: bound of our own" if explain else ""
+    below = "*: bound added here" if explain else ""
     return [Table(reached, columns, head, below=below), Table(bounds, errors)]

@@ -75,8 +75,8 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
     lines = text.splitlines()
     assert lines.index("first") < lines.index("second")
     found = [line.split()[-3:] for line in lines if line.startswith(("a|b", "plain"))]
-    # An exact zero is no order of magnitude.
-    assert found == [["1.2e-05", "-", "3"], ["-", "12.3", "0"]]
+    # A missing number is a dash, an exact zero is 0.
+    assert found == [["1.2e-05", "-", "3"], ["0", "12.3", "0"]]
     assert str(Table([{"score": 0.0}], explain=False)).split()[-1] == "0"
     plain = " ".join(text.split())
     for name in ("floor", "score", "misses"):
@@ -115,7 +115,7 @@ def test_methods_of_other_names_keep_them():
     assert [method_text(name) for name in names] == ["POD literal", "tripod", "my POD"]
 
 
-def test_a_simulation_prints_the_errors_of_each_output_and_a_dash_for_zero():
+def test_a_simulation_prints_the_errors_of_each_output_and_a_zero_as_such():
     run = vm.simulate("double_wishbone", "pod", rank=3)
     run["floor_rms_error"].loc["toe"] = 0.0
     lines = simulation_text(run, ["toe", "spindle_y"], []).splitlines()
@@ -123,7 +123,7 @@ def test_a_simulation_prints_the_errors_of_each_output_and_a_dash_for_zero():
     for output, unit in (("toe", "rad"), ("spindle_y", "m")):
         names = ("rms_error", "floor_rms_error", "max_error", "signal_range")
         numbers = [float(run[name].sel(output=output)) for name in names]
-        assert rows[output][1:] == [f"{n:.1e}" if n else "-" for n in numbers] + [unit]
+        assert rows[output][1:] == [f"{n:.1e}" if n else "0" for n in numbers] + [unit]
 
 
 PLAIN = standard_problems.DEFINITION
