@@ -230,7 +230,7 @@ def test_figures_are_those_of_every_model(folder, tmp_path, capsys, monkeypatch)
     # One picture of each figure is enough here.
     monkeypatch.setattr(theme, "FORMATS", ("png",))
     names = [f"{kind}-{CAR}" for kind in ("histories", "errors", "map", "pareto")]
-    arguments = ["--results", str(folder), "--out", str(tmp_path), "--only", ",".join(names)]
+    arguments = ["--results", str(folder), "--out", str(tmp_path), "--only", *names]
     assert main(["figures", *arguments]) == 0
     written = capsys.readouterr().out.split()
     assert written == [str(tmp_path / f"figure-{name}.png") for name in names]

@@ -63,6 +63,14 @@ def test_a_study_that_extends_another_has_its_sets_and_the_rows_it_names(
     for old, new, words in (
         ("replay", "rerun", "unknown row of the extended study 'rerun'"),
         ("small.toml", "none.toml", "none.toml: no such file"),
+        (
+            'rows = ["replay", "newton"]\n        targets = []',
+            "",
+            (
+                "'newton 1e-12', a row of small.toml: rows is needed and must name its method, of "
+                "newton, replay, fixed basis"
+            ),
+        ),
         ("small.toml", "other.toml", "other.toml extends a study itself, or is a collection"),
     ):
         (tmp_path / "other.toml").write_text(more.replace(old, new, 1))

@@ -64,6 +64,7 @@ def of_inputs(**given):
 
 
 TABLE = "time,delta\n0,1\n1,2\n"
+COMMAS = "time;delta\n0,5;90,0\n1,5;180,0\n"
 CAR = "independent_suspension_vehicle"
 BEYOND = vm.Signal.from_samples([0.0, 1.0], [0.0, 2.0])
 SQUARE = vm.Signal.from_samples([0.0, 1.0], np.eye(2))
@@ -83,20 +84,26 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: vm.many_signals([0.0, 0.1], [1.0, 2.0, 3.0]), r"t has shape \(2,\)"),
         (lambda: vm.many_signals([0, 1], [[0, 0], [0, np.inf]]), r"u\[1\] of run 1 is not finite"),
         (lambda: of_inputs(inputs=["s"]), "derivatives of s follow from a cubic hold alone"),
-        (lambda: of_inputs(inputs=["angle"]), "'angle', the model needs s, s_dot, s_ddot"),
+        (lambda: of_inputs(inputs=["angle"]), "needs s, s_dot, s_ddot: say which column"),
+        (lambda: vm.simulate(CAR, maneuver="log.csv"), "a CSV file is read by vm.Signal.from_csv"),
         (of_inputs, "1 columns without names"),
         (lambda: SQUARE.for_inputs(("s",)), "2 columns without names"),
         (lambda: vm.simulate(CAR, maneuver=BEYOND), r"input delta is 1\.08 rad at t = 0\.54 s"),
         (lambda: of_csv(None), "no such file"),
         (lambda: of_csv(""), "no CSV file"),
-        (lambda: of_csv("t,delta\n0,1\n1,2\n"), "no column 'time' among t, delta"),
-        (lambda: of_csv("time,delta\n0,1\n1,two\n"), "is not a number"),
+        (lambda: of_csv("t,delta\n0,1\n1,2\n"), "no column 'time': set time= to one of t, d"),
+        (lambda: of_csv("time,delta\n0,1\n1,two\n"), "'delta' holds 'two', not a number$"),
+        (lambda: of_csv(COMMAS, separator=";"), "'time' holds '0,5', not a number: is decimal=','"),
+        (lambda: of_csv(COMMAS), "is separator=';' with decimal=',' meant"),
+        (lambda: of_csv(TABLE, decimal=","), "separator and decimal are both ','"),
+        (lambda: of_csv(TABLE, ratio=0), "ratio is 0"),
+        (lambda: of_csv(TABLE, unit="degrees"), "unknown unit 'degrees'"),
         (lambda: of_csv("time,delta\n0,1,2\n1,2,3\n"), "no CSV file: .* in line 2"),
         (lambda: of_csv("time,delta\n0,1\n1,2,3\n"), "no CSV file"),
         (lambda: of_csv("time,a,a\n0,1,2\n1,2,3\n", inputs=["a"]), "columns have the same name"),
         (lambda: of_csv("time;delta\n0;1\n1;2\n"), "separator=';'"),
         (lambda: of_csv(TABLE, separator=3), "separator is 3"),
-        (lambda: of_csv(TABLE, inputs=["s"]), "no column 's' among time, delta"),
+        (lambda: of_csv(TABLE, inputs=["s"]), "no column 's': set inputs= to one of time, delta"),
         (lambda: of_csv(TABLE, inputs=3), "inputs is 3, not a list of names"),
         (lambda: of_csv(TABLE, inputs={"d": ["delta"]}), "not a list of names"),
         *[(partial(BEYOND.at, t), "list of finite times") for t in (3.0, "t", [np.nan], [1j])],
@@ -119,6 +126,18 @@ def test_a_signal_ends_with_its_last_sample(car, hold):
             signal.at([1.0, time])
     with pytest.raises(InputError, match="within the run, 0 to 5 s"):
         car.simulate(signal, times=np.array([1.0, 5.1]))
+
+
+def test_an_unknown_argument_is_one_of_the_function_that_was_called():
+    with pytest.raises(TypeError, match="from_csv"):
+        of_csv(TABLE, comma=",")
+
+
+def test_a_log_is_scaled_and_prints_its_file_and_size():
+    signal = of_csv(COMMAS, separator=";", decimal=",", unit="deg", ratio=2.0)
+    np.testing.assert_allclose(signal.at(np.array([0.0, 1.0]))[:, 0], [np.pi / 4, np.pi / 2])
+    assert str(signal) == "signal 'log.csv' (1 s, 2 samples, linear hold; inputs delta)"
+    assert str(BEYOND) == "signal (1 s, 2 samples, linear hold; inputs in the model's order)"
 
 
 def straight(t: np.ndarray) -> np.ndarray:

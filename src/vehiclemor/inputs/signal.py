@@ -30,6 +30,8 @@ HOLDS = {"linear": 1, "zero": 0, "cubic": 3}
 OUTPUT_STEP = 0.02
 # Time (s) between the samples that are taken of a function.
 FUNCTION_STEP = 0.01
+# Units of logged inputs -> SI.
+UNITS = {"SI": 1.0, "deg": np.pi / 180.0, "mm": 1e-3}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,11 @@ class Signal(Maneuver):
     def __getstate__(self) -> dict[str, Any]:
         """What a copy takes along: addresses are its own."""
         return super().__getstate__() | {"kept": {}}
+
+    def __str__(self) -> str:
+        name = "signal" if self.name == "signal" else f"signal {self.name!r}"
+        inputs = ", ".join(self.inputs) or "in the model's order"
+        return f"{name} ({self.duration:.6g} s, {self.summary}; inputs {inputs})"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Signal) and self._identity == other._identity
@@ -168,7 +175,10 @@ class Signal(Maneuver):
             )
         for name in self.inputs:
             if name not in names:
-                raise InputError(f"{self} gives input {name!r}, the model needs {needed}")
+                raise InputError(
+                    f"{self} gives input {name!r}, the model needs {needed}: "
+                    f"say which column is which input"
+                )
         coefficients = np.stack([self._column(name) for name in names], axis=1)
         pieces = self.pieces._replace(coefficients=coefficients)
         return replace(self, inputs=names, pieces=pieces, kept={})
@@ -222,24 +232,40 @@ class Signal(Maneuver):
         hold: str = "linear",
         *,
         separator: str = ",",
+        decimal: str = ".",
         time: str = "time",
         inputs: str | Sequence[str] | Mapping[str, str] = (),
-        **further: Any,
+        unit: str = "SI",
+        ratio: float = 1.0,
+        output_step: float = OUTPUT_STEP,
+        name: str = "",
     ) -> Signal:
         """A signal through the rows of a CSV file, whose first line names its columns.
 
         Parameters
         ----------
-        separator, time
-            Character between columns; column of the times in s.
+        separator, decimal
+            Character between columns, and before decimals.
+        time
+            Column of the times in s.
         inputs
             Columns to take, or input -> column where they have other names; all by default.
-        **further
-            As of `from_samples`.
+        unit
+            Of these columns: `SI`, `deg` or `mm`.
+        ratio
+            Divides them, as a steering ratio does the angle of a steering wheel.
+        hold, output_step, name
+            As of `from_samples`; the name is that of the file by default.
         """
         path = file_path("path", path)
-        times, values, names = csv_samples(path, separator, time, inputs)
-        return cls.from_samples(times, values, hold, inputs=names, **further)
+        if number("ratio", ratio) == 0.0:
+            raise InputError("ratio is 0; it divides the columns")
+        scale = UNITS[choice("unit", unit, UNITS)] / ratio
+        times, values, names = csv_samples(path, separator, decimal, time, inputs)
+        name = name or path.name
+        return cls.from_samples(
+            times, scale * values, hold, inputs=names, output_step=output_step, name=name
+        )
 
 
 def many_signals(

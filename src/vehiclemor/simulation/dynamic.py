@@ -119,10 +119,8 @@ class DynamicModel(Model):
 
     def linearise(self, state: Start | None = None, inputs: Any = None) -> LinearModel:
         """Linear model at a state or start, the first by default, and inputs, 0 by default."""
-        x, u = (
-            self.start(state),
-            self._inputs([0.0] * len(self.inputs) if inputs is None else inputs),
-        )
+        x = self.start(state)
+        u = self._inputs([0.0] * len(self.inputs) if inputs is None else inputs)
         point = x, u, self.rhs(x, u), self.outputs_at(x[None], u[None])[0]
         return LinearModel.of(self, self.definition.states, point)
 

@@ -103,6 +103,8 @@ class Trajectory(ShortRepr):
         Of the outputs.
     model
         Of which it is.
+    method
+        By which it was reduced; empty for a run of the full model.
     """
 
     times: np.ndarray
@@ -118,6 +120,7 @@ class Trajectory(ShortRepr):
     trust: Trust | None = None
     names: tuple[str, ...] = ()
     model: Any = None
+    method: str = ""
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None
@@ -205,7 +208,8 @@ class Trajectory(ShortRepr):
 
     def dataset(self) -> xr.Dataset:
         """Labelled dataset of histories, counts, seconds and status, with units."""
-        return trajectory_dataset(self.model, self).assign_attrs(model=self.model.name)
+        dataset = trajectory_dataset(self.model, self).assign_attrs(model=self.model.name)
+        return dataset.assign_attrs(method=self.method) if self.method else dataset
 
     @property
     def finished(self) -> bool:

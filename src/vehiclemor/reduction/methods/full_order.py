@@ -177,6 +177,6 @@ METHOD = Method(
         "structural": _presets(SOLVER, 1e-2, paper={"tolerance": USUAL}),
     },
     fit=fit,
-    learns_from="inputs",
+    learns_from="nothing",
     own_limits=True,
 )

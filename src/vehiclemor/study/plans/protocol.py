@@ -146,6 +146,12 @@ def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protoc
         choice("maneuver of a test, in straight", straight.maneuver, sorted(driven))
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
+        if definition.extends and target.against not in known:
+            base = ", ".join(read_study(study_path(definition.extends)).labelled)
+            raise InputError(
+                f"a target is against {target.against!r}, a row of {definition.extends}: "
+                f"rows is needed and must name its method, of {base}"
+            )
         choice("row that a target is against", target.against, known)
     return Protocol(name, path, definition, model, sets, entries, seed)
 
