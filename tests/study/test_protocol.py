@@ -64,8 +64,7 @@ def test_a_study_that_extends_another_has_its_sets_and_the_rows_it_names(
         (
             'rows = ["replay", "newton"]\n        targets = []',
             "",
-            "'newton 1e-12', a row of small.toml: rows is needed and must name its method, of "
-            "newton, replay, fixed basis",
+            "a row of small.toml: rows is needed and must name its method, of newton, replay, fix",
         ),
         ("small.toml", "other.toml", "other.toml extends a study itself, or is a collection"),
     ):
