@@ -126,6 +126,11 @@ def last_place(dataset: xr.Dataset) -> Frame:
     return runs(dataset.assign(lateral_position=place), "lateral_position")[["lateral_position"]]
 
 
+def furthest_aside(dataset: xr.Dataset) -> Frame:
+    """Largest errors of the lateral position."""
+    return runs(dataset, "max_error")[["max_error.lateral_position"]]
+
+
 def of_truck(dataset: xr.Dataset) -> Frame:
     """Worst errors over the outputs' ranges, and costs; on a smooth road what is felt."""
     smooth = dataset["amplitude_factor"] == 0.0
@@ -285,10 +290,10 @@ def operations() -> Iterator[Entry]:
                 yield slug("operations", model, kernel, kind), counts.get(kind, 0)
 
 
-def in_use(dataset: xr.Dataset) -> Iterator[Entry]:
-    """Models in use."""
+def named_values(prefix: str, dataset: xr.Dataset) -> Iterator[Entry]:
+    """Values that have names."""
     for name, at in dataset.groupby("name"):
-        yield slug("in_use", name), at["value"].item(), at["output_unit"].item()
+        yield slug(prefix, *str(name).split()), at["value"].item(), at["output_unit"].item()
 
 
 def benchmark(rows: dict[str, Any]) -> Iterator[Entry]:
@@ -336,8 +341,8 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
         yield f"{short}-perturbations", partial(lines, f"perturbed.{model}", model, PERTURBED)
         yield f"{short}-settings", partial(settings, model)
         yield f"{short}-zero-steer", partial(grid, f"zero_steer.{model}", last_place)
-    for name in ("unseen-inputs", "unseen-inputs-trained"):
-        yield name, partial(grid, "unseen", partial(whole, VEHICLE))
+    for name in ("unseen-inputs", "unseen-inputs-ranks"):
+        yield name, partial(grid, "unseen", furthest_aside)
     yield "equation-order", orders
     yield "figure-14-spread", partial(spread, "figure-14-spread", SUSPENSION)
     yield "truck-contenders", partial(grid, "truck.bases", of_truck)

@@ -10,6 +10,9 @@ import numpy as np
 from vehiclemor.exceptions import InputError
 from vehiclemor.short_repr import shortened
 
+# Numbers of a range that are listed.
+LONGEST_RANGE = 10_000_000
+
 
 def quoted(value: object) -> str:
     """A value as an error shows it: one line, cut short."""
@@ -25,7 +28,8 @@ def line_of_text(name: str, value: object) -> str:
 
 def real_array(value: Any) -> np.ndarray:
     """Floats of a number or nested lists of numbers; `TypeError` of text, dates and the like."""
-    array = None if np.ma.is_masked(value) else np.asarray(value)
+    endless = isinstance(value, range) and value[LONGEST_RANGE:]
+    array = None if endless or np.ma.is_masked(value) else np.asarray(value)
     if array is None or array.dtype.kind not in "iuf":
         raise TypeError(f"{quoted(value)} is not a number or a list of numbers")
     return array.astype(float, copy=False)

@@ -7,13 +7,15 @@ import os
 import signal
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor.cli import main
+from vehiclemor import progress
+from vehiclemor.cli import main, studies
 from vehiclemor.cli.app import COMMANDS, ended
 from vehiclemor.cli.options import key_values
 from vehiclemor.exceptions import MachineError
@@ -218,6 +220,16 @@ def test_what_the_machine_does_is_one_line_and_status_1(capsys, error):
     assert ended(lambda: raising(error)) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert str(error.args[-1]) in line
+
+
+def test_a_long_study_tells_how_far_it_is_every_five_seconds(monkeypatch, capsys):
+    clock = iter([0.0, 1.0, 4.9, 5.0, 9.9, 10.0, 20.0])
+    monkeypatch.setattr(studies, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    with studies.shown_progress():
+        for done in (0, 1, 2, 3, 4, 9):
+            progress.tell("grid", done, 9)
+    lines = ["grid: 9 of 9 to compute", "grid: 2 of 9, 5 s", "grid: 4 of 9, 10 s"]
+    assert capsys.readouterr().err.splitlines() == lines
 
 
 def test_runs_are_counted_and_those_with_errors_tried_again(run, monkeypatch, capsys):

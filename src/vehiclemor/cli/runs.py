@@ -2,7 +2,7 @@
 
 import inspect
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -22,6 +22,7 @@ from vehiclemor.cli.options import (
 )
 from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.export import STEP, FileTarget, destination, name_of
+from vehiclemor.report.labels import Kind
 from vehiclemor.report.printing import wrapped
 
 # Method that stands for the model that ships.
@@ -138,7 +139,7 @@ def _picture(plot: list[Path] | None, usual: str) -> Path | None:
 def plot(
     result: str,
     *,
-    kind: Literal["histories", "paths", "errors"] = "histories",
+    kind: Kind = "histories",
     select: list[str] | None = None,
     out: Path | None = None,
     animate: Path | None = None,
@@ -158,22 +159,32 @@ def plot(
     out
         Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
     animate
-        GIF file for a film of the moving vehicle, in place of a picture.
+        GIF file for a film of the moving vehicle; with --out a picture too.
     """
     if animate is not None:
         new_file("--animate", animate, (".gif",))
-    picture = animate or picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
+    picture = None
+    if out is not None or animate is None:
+        picture = picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
     from vehiclemor.report.figures.result_plot import plot_result
-    from vehiclemor.report.result_selection import drawn, stored_result
+    from vehiclemor.report.result_selection import select_point, stored_result
 
-    dataset, point = drawn(stored_result(result, results), kind, key_values("--select", select))
-    if animate:
-        vm.animate(dataset, out=animate)
-    else:
+    stored, chosen = stored_result(result, results), key_values("--select", select)
+    if picture is not None:
+        dataset, point = select_point(stored, kind, chosen)
         plot_result(dataset, picture, kind)
+        _print_point(point)
+        print(f"written: {picture}")
+    if animate is not None:
+        dataset, point = select_point(stored, "histories", chosen)
+        film = vm.animate(dataset, out=animate)
+        _print_point(point)
+        print(f"written: {film}")
+
+
+def _print_point(point: str) -> None:
     if point:
         print(wrapped(f"at {point}; --select dimension=value draws another point", 0, 2))
-    print(f"written: {picture}")
 
 
 def export(

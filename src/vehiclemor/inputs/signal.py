@@ -14,7 +14,13 @@ from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_a
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.exceptions import InputError, blamed, one_line
 from vehiclemor.inputs.columns import csv_samples, listed
-from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
+from vehiclemor.inputs.maneuver import (
+    LONGEST_DURATION,
+    MOST_SAMPLES,
+    Maneuver,
+    checked_factor,
+    checked_times,
+)
 from vehiclemor.inputs.polynomial_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
 from vehiclemor.registry import choice
 
@@ -30,8 +36,9 @@ UNITS = {"SI": 1.0, "deg": np.pi / 180.0, "mm": 1e-3}
 
 @dataclass(frozen=True, eq=False)
 class Signal(Maneuver):
-    """Inputs through samples, from the first to the last; made by `from_samples` and its kin.
+    """Inputs through samples, made by `from_samples` and its kin.
 
+    It ends with the last sample, whatever the hold: later inputs are refused, not extrapolated.
     `perturbed` scales its time, so its duration, and its values.  Inputs are the names of those
     that are given, empty if they are all of a model's, in its order; `hold` is what lies between
     samples, `pieces` the polynomials for factors of 1, `kept` what is made of it when it is run.
@@ -125,8 +132,14 @@ class Signal(Maneuver):
         return tuple(self.polynomials.edges[1:-1].tolist())
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Inputs (n, number of inputs) at the given times (n,) in s."""
-        return at(self.polynomials, np.asarray(times, dtype=float))
+        """Inputs (n, number of inputs) at times (n,) in s; `InputError` beyond the samples."""
+        times = checked_times(times)
+        within_run = times.clip(0.0, self.duration)
+        beyond = np.abs(times - within_run) > 1e-9 * self.duration
+        if beyond.any():
+            late = times[beyond][0]
+            raise InputError(f"{self} lasts from 0 to {self.duration:g} s: no inputs at {late:g} s")
+        return at(self.polynomials, within_run)
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
         """The signal with its factors set: so much faster and shorter, so many times as large."""
@@ -144,6 +157,7 @@ class Signal(Maneuver):
 
     def for_inputs(self, names: tuple[str, ...]) -> Signal:
         """The signal with all inputs of a model, in its order; `InputError` if they don't fit."""
+        names = listed(names)
         if self.inputs == names:
             return self
         if names not in self.kept:
@@ -316,9 +330,8 @@ def _output_samples(duration: float, step: Any) -> int:
     """Number of times about so many seconds apart."""
     if number("step", step) <= 0.0:
         raise InputError(f"step: {step:g} s is not positive")
-    within("step", step, (0.0, LONGEST_DURATION), " s")
-    samples = max(round(duration / step), 1) + 1
-    return int(within("number of samples", samples, (2, MOST_SAMPLES)))
+    within("step", step, (duration / (MOST_SAMPLES - 1), LONGEST_DURATION), " s")
+    return max(round(duration / step), 1) + 1
 
 
 def _integral(name: str) -> str:

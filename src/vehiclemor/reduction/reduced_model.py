@@ -14,7 +14,7 @@ from vehiclemor.arguments import number
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction import model_file
-from vehiclemor.reduction.interface import FittedModel, simulated
+from vehiclemor.reduction.interface import FittedModel, Method, simulated
 from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.training import own_speed
 from vehiclemor.reduction.trust import InputRange
@@ -44,8 +44,8 @@ class ReducedOrderModel(ShortRepr):
     reduced
         What the method's fit gave.
     input_range
-        Range of the inputs of its training, in which a run is known whose model has no ranges of
-        its own; none where it has learnt from nothing.
+        Range of the inputs of its training, in which a run is known whose model has learnt from
+        them and has no ranges of its own.
     """
 
     repr_fields = ("model", "method", "settings", "states", "inputs", "output_names")
@@ -110,6 +110,8 @@ class ReducedOrderModel(ShortRepr):
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
             run = simulated(self.reduced, chosen, begun, names)
+        # A copy would take a twentieth of a short run.
+        run.__dict__["method"] = self.method
         if not run.trust and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
         return run if times is None else run.chosen(times=times)
@@ -135,8 +137,9 @@ class ReducedOrderModel(ShortRepr):
 
     @cached_property
     def _range(self) -> InputRange | None:
-        """Inputs of the training, if the method has no ranges of its own."""
-        return None if component("method", self.method).own_limits else self.input_range
+        """Inputs that are known, if the method has no ranges of its own."""
+        method: Method = component("method", self.method)
+        return method.known_range(self.model, self.settings, lambda: self.input_range)
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""

@@ -65,7 +65,7 @@ def trust_in(ranges: Mapping[str, tuple[float, float]]) -> Trust:
     )
     if until == np.inf:
         return Trust(indicator)
-    return Trust(indicator, until, by_factor(f"{name} leaves its training range", used))
+    return Trust(indicator, until, by_factor(f"{name} leaves its known range", used))
 
 
 def by_factor(reason: str, factor: float) -> str:
@@ -222,3 +222,10 @@ def input_range(
     )
     lasts = np.inf if model.kind == "ae" and not follows_time else EDGE * longest
     return InputRange(largest_of(maneuvers), middle, reach, lasts, histories)
+
+
+def band_range(model: Model, highest: float) -> InputRange:
+    """Range of a structure's inputs of which all is known up to so many Hz, without training."""
+    shares = np.where(np.array(BANDS[:-1]) < highest, np.inf, EDGE * QUIET)
+    largest = np.tile(np.append(np.inf, shares)[:, None], len(model.inputs))
+    return InputRange(largest, 0.0, np.inf, np.inf)

@@ -20,9 +20,9 @@ from vehiclemor.report.findings import (
     counted,
 )
 from vehiclemor.report.frames import ERRORS
-from vehiclemor.report.labels import ERROR, Column, column, main_outputs, of_kind
+from vehiclemor.report.labels import ERROR, Column, column, declared, main_outputs, of_kind
 from vehiclemor.report.printing import Table, shown, wrapped
-from vehiclemor.report.sizes import COSTS, EXPLAINED, KIND, RIVALS, growth_text
+from vehiclemor.report.sizes import EXPLAINED, KIND, growth_text
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 Row = dict[str, Any]
@@ -225,9 +225,9 @@ def study_parts(rows: pd.DataFrame) -> list[Part]:
     sized = [row for row in records if row["kind"] == KIND]
     for own in _by(sized, "study").values():
         title = f"{own[0]['study']}: what a reduced model gains"
-        parts.append(Table(own, COSTS, title, below=growth_text(own)))
+        parts.append(Table(own, declared().sizes["costs"], title, below=growth_text(own)))
         compared = [row for row in own if row["error_motion"] == row["error_motion"]]
-        parts.append(Table(compared, RIVALS, below=EXPLAINED))
+        parts.append(Table(compared, declared().sizes["rivals"], below=EXPLAINED))
     judged = [row for row in records if row["kind"] not in (ERRORS, KIND)]
     return parts + (_unseen_parts(judged) if judged else [])
 
@@ -249,9 +249,11 @@ def _grid_parts(rows: list[Row]) -> list[Part]:
     title = wrapped(f"{first['study']}: {first['title']}") + "\n"
     errors = ("label", "median", "largest", "floor", "failed", "largest_at")
     costs = ["label", "runs", "failures", "warned", "trained", "evaluations", "seconds_in_loop"]
+    saturated = {row["label"]: row["saturates_at"] for row in rows if row["saturates_at"]}
+    below = "; ".join(f"{label} saturates at rank {rank}" for label, rank in saturated.items())
     return [
         title + wrapped("; ".join(filter(None, about)), 2, 2),
-        Table(lines, errors, group="of"),
+        Table(lines, errors, group="of", below=below),
         Table(runs, [*costs, "offline_seconds"], group="of"),
     ]
 

@@ -260,7 +260,7 @@ class DynamicModel(Model):
             "names": self.outputs,
             "model": self,
         }
-        if outputs is not None and not message:
+        if outputs not in (None, self.outputs) and not message:
             histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]
             fields |= {"names": outputs, "coordinates": nothing, "speeds": nothing}
             found = Trajectory.of(**fields, outputs=histories)

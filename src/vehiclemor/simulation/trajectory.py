@@ -103,6 +103,8 @@ class Trajectory(ShortRepr):
         Of the outputs.
     model
         Of which it is.
+    method
+        By which it was reduced; empty for a run of the full model.
     """
 
     times: np.ndarray
@@ -118,6 +120,7 @@ class Trajectory(ShortRepr):
     trust: Trust | None = None
     names: tuple[str, ...] = ()
     model: Any = None
+    method: str = ""
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None
@@ -159,6 +162,8 @@ class Trajectory(ShortRepr):
 
     def _columns(self, names: tuple[str, ...]) -> np.ndarray:
         """Histories (samples, names) of outputs, coordinates or speeds."""
+        if names == self.names:
+            return self.outputs
         recording = self.__dict__.get("recording")
         groups = {"outputs": self.names}
         if recording is not None or self.coordinates.shape[1]:
@@ -203,7 +208,8 @@ class Trajectory(ShortRepr):
 
     def dataset(self) -> xr.Dataset:
         """Labelled dataset of histories, counts, seconds and status, with units."""
-        return trajectory_dataset(self.model, self).assign_attrs(model=self.model.name)
+        dataset = trajectory_dataset(self.model, self).assign_attrs(model=self.model.name)
+        return dataset.assign_attrs(method=self.method) if self.method else dataset
 
     @property
     def finished(self) -> bool:

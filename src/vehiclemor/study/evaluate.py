@@ -98,7 +98,7 @@ def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> 
     # Whether it has learnt from the very run that it is tested on.
     seen = (
         experiment.keep != "errors"
-        and method.learns_from != "inputs"
+        and method.learns_from == "runs"
         and not isinstance(outcomes[0], Failure)
         and in_training(model, experiment.training, test[0])
     )
@@ -256,10 +256,9 @@ def _tested(
         run = replace(run, status="diverged", message="an output is not finite")
     judged = run
     method: Method = component("method", experiment.method)
-    # What has learned from nothing is the full order of a protocol's second runs; a model that is
-    # silent is not trusted beyond the training's inputs.
-    if experiment.training and not (run.trust or method.own_limits):
-        known = known_inputs(model, experiment.training, method.follows_time)
+    trained = partial(known_inputs, model, experiment.training, method.follows_time)
+    # A model that is silent is not trusted beyond the inputs that its method knows.
+    if not run.trust and (known := method.known_range(model, experiment.settings, trained)):
         judged = run.judged(known.trust(model, scenario.maneuver, speed_of(model, scenario)))
     if many:
         return Outcome(judged, reference)

@@ -157,9 +157,14 @@ def _share(
         "tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]",
         sp.cse(expressions, symbols=names, order="none"),
     )
-    definitions = dict(shared)
+    # What holds or not is no number: conditions stay where they are asked.
+    definitions, conditions = {}, {}
+    for symbol, expression in shared:
+        of_numbers = expression.xreplace(conditions)
+        (definitions if isinstance(of_numbers, sp.Expr) else conditions)[symbol] = of_numbers
+    reduced = [expression.xreplace(conditions) for expression in reduced]
     definitions.update(zip((s for s, _ in assignments), reduced, strict=False))
-    return definitions, list(reduced[len(assignments) :])
+    return definitions, reduced[len(assignments) :]
 
 
 class _Hoisting:
@@ -185,6 +190,8 @@ class _Hoisting:
         """Expression with every maximal parameter-only part replaced by one symbol."""
         if expression.is_Atom:
             return expression
+        if not isinstance(expression, sp.Expr):
+            return expression.func(*map(self.rewrite, expression.args))
         if expression.free_symbols and expression.free_symbols <= self.constant:
             if (-expression).is_Atom:
                 return expression

@@ -140,7 +140,7 @@ def test_pod_of_the_suspension_tells_that_an_input_is_another():
     for factors in ({"frequency": 1.2}, {"amplitude": 0.9}):
         run = pod.simulate(vm.maneuver("sine_travel", **factors))
         assert run.status == "untrusted"
-        assert "history of the inputs leaves its training range by" in run.message
+        assert "history of the inputs leaves its known range by" in run.message
 
 
 def test_pod_tells_when_it_leaves_its_training_run():
@@ -152,7 +152,7 @@ def test_pod_tells_when_it_leaves_its_training_run():
     run, full = pod.simulate(steering), car.simulate(steering)
     assert missed(pod, run, full) > 10.0
     assert run.status == "untrusted"
-    assert "history of the inputs leaves its training range by" in run.message
+    assert "history of the inputs leaves its known range by" in run.message
     # Half a second of the training run is known; what comes then is not.
     assert 0.0 < run.trust.until < 1.0
 
@@ -161,6 +161,6 @@ def test_a_remark_of_trust_is_a_sentence():
     run = vm.simulate("double_wishbone", "pod", training="nominal", frequency=1.2)
     remark = run["remark"].item()
     assert remark.startswith(
-        "not to be trusted: history of the inputs leaves its training range by"
+        "not to be trusted: history of the inputs leaves its known range by"
     )
     assert remark.endswith(" s on")

@@ -18,9 +18,12 @@ from vehiclemor.report.default_studies import of_paper, smaller_rank
 from vehiclemor.report.labels import (
     Column,
     column,
+    declared,
     default_rank,
     main_outputs,
+    method_text,
     of_kind,
+    readable_unit,
     tabled_outputs,
     tables_file,
     timing_cases,
@@ -85,6 +88,31 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
     assert lines == ["n", "a", "0", "2", "b", "1", "3"]
     micro = {"t": Column("time, us", ".1f", scale=1e6)}
     assert str(Table([{"t": 2.5e-6}], micro)).split() == ["time,", "us", "2.5"]
+
+
+@pytest.mark.parametrize(
+    ("largest", "unit", "expected"),
+    [
+        (0.01, "m", (1e3, "mm")),
+        (2e-5, "rad/s", (1e6, "µrad/s")),
+        (1.0, "m", (1.0, "m")),
+        # A prefix would be squared, or make another unit.
+        *((0.01, unit, (1.0, unit)) for unit in ("m^2", "min", "mol", "rads", "s")),
+    ],
+)
+def test_prefixes_keep_the_meaning_of_a_unit(largest, unit, expected):
+    assert readable_unit(largest, unit) == expected
+
+
+def test_a_colour_and_a_mark_name_one_method_of_the_package():
+    looks = declared().methods
+    assert set(names("method")) - {"full_order"} <= set(looks)
+    assert len({(look.color, look.mark) for look in looks.values()}) == len(looks)
+
+
+def test_methods_of_other_names_keep_them():
+    names = ("pod_literal", "tripod", "my_pod")
+    assert [method_text(name) for name in names] == ["POD literal", "tripod", "my POD"]
 
 
 def test_a_simulation_prints_the_errors_of_each_output_and_a_zero_as_such():

@@ -37,7 +37,7 @@ def training_set(
     if given is None:
         given = "protocol" if _of_protocol(model.name, method) else "nominal"
     entries = [given] if isinstance(given, Entry) else given
-    if not isinstance(entries, Sequence) or not entries:
+    if not isinstance(entries, Sequence) or isinstance(entries, range) or not entries:
         raise InputError(f"training is {quoted(given)}: give names, maneuvers or scenarios")
     if bool(factors) != any(isinstance(entry, str) and entry == "set" for entry in entries):
         raise InputError("training 'set' needs training_set, pairs of factors; nothing else does")
