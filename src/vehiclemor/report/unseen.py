@@ -61,7 +61,8 @@ def method_rows(dataset: xr.Dataset, protocol: StudyFile) -> list[Row]:
     the largest error and the 99 % quantile; `median_m`, `worst_deg` and so on are of the largest
     error of all bounded positions or angles, `misses_at_ten` of ten times the bounds.
     `chosen_settings` are those of the candidate that validation chose.  `seconds` is the mean of
-    whole calls, `loop_seconds` of their compiled loops, with the `spread` of the rounds (interquartile range over median).
+    whole calls, `loop_seconds` of their compiled loops, with the `spread` of the rounds
+    (interquartile range over median).
     `ratio_equal` and `ratio_equal_loop` are against the full order interpolated at the row's own
     score on the rows `equal_rows`, `ratio_within` against `within`, the fastest full-order row
     within the bounds.

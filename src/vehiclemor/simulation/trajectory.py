@@ -73,8 +73,8 @@ class Trust:
 
     @property
     def message(self) -> str:
-        """When and by what it leaves, empty if it does not."""
-        return f"from t = {self.until:.4g} s on {self.reason}" if self.reason else ""
+        """By what and when it leaves, empty if it does not."""
+        return f"{self.reason}, from t = {self.until:.4g} s on" if self.reason else ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -264,7 +264,7 @@ def _tested(
         return Outcome(judged, reference)
     if judged.status != run.status:
         # A study shows what a protocol would not trust; the status is the method's own.
-        remark = "; ".join(filter(None, (run.remark, f"not to be trusted {judged.message}")))
+        remark = "; ".join(filter(None, (run.remark, f"not to be trusted: {judged.message}")))
         judged = replace(judged, status=run.status, message=run.message, remark=remark)
     if reference is None:
         return Outcome(judged, None)
