@@ -75,7 +75,7 @@ def test_keys_of_few_parts_and_long_lists_are_read(tmp_path):
 
 def test_studies_are_named_by_paths_too(tmp_path):
     path = tmp_path / "study.toml"
-    path.write_text('title = "one"\nmodel = "double_wishbone"\n[[methods]]\nmethod = "full_order"\n')
+    path.write_text('title = "one"\nmodel = "double_wishbone"\n[[methods]]\nmethod = "pod"\n')
     results = tmp_path / "results"
     assert len(vm.compare(path, results=results)) > 0
     assert vm.figures([path], results=results)
