@@ -1,6 +1,7 @@
 """Training runs: full-order simulations that a method may learn from."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -8,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.multibody.quantities import DROP
+from vehiclemor.multibody.quantities import DROP, Quantity
+from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -16,6 +18,8 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 HISTORIES = ("times", "inputs", "states", "coordinates", "speeds", "outputs", "counts")
 # Parameter with the speed (m/s) at which a vehicle starts.
 SPEED = "initial_speed"
+# An input that is no larger was zero in training.
+NOTHING = 1e-11
 # Parameters that say how a run starts, not which model it is of.
 OF_STARTS = (SPEED, *DROP)
 
@@ -50,6 +54,44 @@ class TrainingRun(ShortRepr):
 
 
 Training = Sequence[TrainingRun]
+
+
+def training_summary(
+    method: str,
+    runs: Sequence[Mapping[str, Any]],
+    largest: np.ndarray,
+    inputs: Sequence[Quantity],
+) -> dict[str, str]:
+    """What the contents of training runs cover, and sizes of their inputs, see `InputRange`."""
+    if not runs or component("method", method).learns_from == "nothing":
+        return {"trained on": "no run"}
+    parameters = [dict(run.get("parameters", ())) for run in runs]
+    names = ", ".join(sorted({run["maneuver"] for run in runs}))
+    values = {
+        "starts": {str(run["start"]) for run in runs},
+        "initial speed, m/s": {run["speed"] for run in runs} - {None},
+        "frequency factor": {run["frequency"] for run in runs},
+        "amplitude factor": {run["amplitude"] for run in runs},
+    }
+    for name in parameters[0]:
+        values[name] = {run[name] for run in parameters}
+    covered = {name: _span(sorted(seen)) for name, seen in values.items() if seen}
+    for quantity, (size, *quick) in zip(inputs, largest.T.tolist(), strict=True):
+        text = f"up to {size:.3g} {quantity.unit}" if size > NOTHING else "zero"
+        if quantity.unit == "rad" and size > NOTHING:
+            text += f" ({math.degrees(size):.3g} deg)"
+        # Of structures they are shares of the bands.
+        if len(quick) == 2:
+            text += f"; above 2 Hz up to {quick[0]:.3g} {quantity.unit}"
+        covered[f"input {quantity.name}"] = text
+    return {"trained on": f"{len(runs)} run{'s' * (len(runs) > 1)} of {names}"} | covered
+
+
+def _span(seen: list[Any]) -> str:
+    """Both ends of numbers; all of texts and tables."""
+    if isinstance(seen[0], float) and len(seen) > 1:
+        return f"{seen[0]:g} to {seen[-1]:g}"
+    return ", ".join(f"{value:g}" if isinstance(value, float) else str(value) for value in seen)
 
 
 def own_speed(model: Model) -> float | None:
