@@ -62,7 +62,8 @@ def csv_samples(
             raise InputError(f"{path}: there is no column {quoted(name)}: {known}")
         if table[name].dtype.kind not in "iuf":
             texts = table[name].astype(str).str.replace(decimal, ".", regex=False)
-            odd = texts[pd.to_numeric(texts, errors="coerce").isna()].iloc[0]
+            numbers: Any = pd.to_numeric(texts, errors="coerce")
+            odd = texts[numbers.isna()].iloc[0]
             hint = ": is decimal=',' meant?" if "," in odd else ""
             raise InputError(f"{path}: column {name!r} holds {quoted(odd)}, not a number{hint}")
     values = np.column_stack([table[name] for name in columns.values()] or [np.empty(0)])

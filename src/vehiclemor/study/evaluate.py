@@ -254,7 +254,7 @@ def _tested(
     run = checked_run(own, scenario.maneuver, start, reduced)
     if run.finished and not np.isfinite(run.outputs).all():
         run = replace(run, status="diverged", message="an output is not finite")
-    if remark := lower_rank(experiment.settings, fit.reduced):
+    if remark := lower_rank(experiment.settings, reduced):
         run = replace(run, remark="; ".join(filter(None, (run.remark, remark))))
     judged = run
     method: Method = component("method", experiment.method)
