@@ -111,7 +111,7 @@ def simulate(
     if animate:
         print(f"written: {vm.animate(dataset, out=animate)}")
     if out is None and picture is None and animate is None:
-        print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
+        print("nothing is saved: --out FILE.nc saves the result, --plot draws it")
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
