@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,6 +24,7 @@ from vehiclemor.registry import choice, component
 from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, checked_array, checked_path
+from vehiclemor.simulation.linear_model import LinearModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
 from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, output_names
@@ -205,13 +207,13 @@ class ReducedOrderModel(ShortRepr):
             If the equations can't be solved.
         """
         check_positive("dt", dt, SHORTEST)
-        number("time", time)
+        time = _finite(time)
         ends = None if next_inputs is None else self._inputs(next_inputs, "next_inputs")
         return self._stepped.step(self._state(state), self._inputs(inputs), dt, time, ends)
 
     def rhs(self, state: Any, inputs: Any, time: float = 0.0) -> np.ndarray:
         """Time derivative (dim,) of a state; `InputError` if it isn't finite."""
-        rates = self._stepped.rates(self._state(state), self._inputs(inputs), time)
+        rates = self._stepped.rates(self._state(state), self._inputs(inputs), _finite(time))
         if not np.isfinite(rates).all():
             raise InputError(f"the derivative of {self._name} is not finite at this state")
         return rates
@@ -241,8 +243,15 @@ class ReducedOrderModel(ShortRepr):
         InputError
             If an argument is wrong, or the model has no such derivatives.
         """
-        u = self._inputs(inputs)
-        return self._stepped.sensitivities(self._state(state), u, time, with_respect_to, of)
+        x, u = self._state(state), self._inputs(inputs)
+        return self._stepped.sensitivities(x, u, _finite(time), with_respect_to, of)
+
+    def linearise(self, state: Any = None, inputs: Any = None) -> LinearModel:
+        """Linear model at a state, that of the first start by default, and inputs, 0 by default."""
+        u = self._inputs([0.0] * len(self.inputs) if inputs is None else inputs)
+        x = self.state(None, u) if state is None else self._state(state)
+        point = x, u, self.rhs(x, u), self.outputs(x, u)
+        return LinearModel.of(self, self.states, point)
 
     def full_state(self, state: Any, inputs: Any) -> np.ndarray:
         """State (n,) of the full model, or states (samples, n) of as many."""
@@ -331,6 +340,11 @@ class ReducedOrderModel(ShortRepr):
     @cached_property
     def _name(self) -> str:
         return f"{self.model.name} by {self.method}"
+
+
+def _finite(time: Any) -> float:
+    """A time in s; `InputError` if it is none."""
+    return time if type(time) is float and math.isfinite(time) else number("time", time)
 
 
 def load(path: Any) -> ReducedOrderModel:

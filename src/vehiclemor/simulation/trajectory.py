@@ -229,16 +229,16 @@ class Trajectory(ShortRepr):
         return np.hstack((self.coordinates, self.speeds))
 
 
-def output_names(outputs: Any) -> tuple[str, ...]:
-    """Names of chosen outputs; `InputError` if they are none."""
+def output_names(outputs: Any, what: str = "outputs") -> tuple[str, ...]:
+    """Names of chosen outputs, or of something else; `InputError` if they are none."""
     names = (outputs,) if isinstance(outputs, str) else outputs
     if isinstance(names, np.ndarray):
         names = names.ravel().tolist()
     if type(names) not in (tuple, list) or not names or not all(isinstance(n, str) for n in names):
-        raise InputError(f"outputs is {quoted(outputs)}, not a list of names")
+        raise InputError(f"{what} is {quoted(outputs)}, not a list of names")
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"outputs: {quoted(twice)} stands twice")
+        raise InputError(f"{what}: {quoted(twice)} stands twice")
     return tuple(names)
 
 

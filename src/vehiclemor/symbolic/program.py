@@ -8,7 +8,7 @@ that run at every time point read its results.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import sympy as sp
 
@@ -158,13 +158,15 @@ def _share(
         sp.cse(expressions, symbols=names, order="none"),
     )
     # What holds or not is no number: conditions stay where they are asked.
-    definitions, conditions = {}, {}
+    definitions: dict[sp.Symbol, Any] = {}
+    conditions: dict[Any, Any] = {}
     for symbol, expression in shared:
-        of_numbers = expression.xreplace(conditions)
-        (definitions if isinstance(of_numbers, sp.Expr) else conditions)[symbol] = of_numbers
-    reduced = [expression.xreplace(conditions) for expression in reduced]
-    definitions.update(zip((s for s, _ in assignments), reduced, strict=False))
-    return definitions, reduced[len(assignments) :]
+        number_or_not = expression.xreplace(conditions)
+        kind = definitions if isinstance(number_or_not, sp.Expr) else conditions
+        kind[symbol] = number_or_not
+    complete: list[Any] = [expression.xreplace(conditions) for expression in reduced]
+    definitions.update(zip((s for s, _ in assignments), complete, strict=False))
+    return definitions, complete[len(assignments) :]
 
 
 class _Hoisting:

@@ -89,6 +89,11 @@ class Protocol:
         name = Path(self.definition.extends or self.path).stem
         return f"{name}-{self.definition.version}, seed {self.seed}"
 
+    def timed_runs(self, runs: int) -> list[int]:
+        """Numbers of the runs of a set that are timed: all, or so many evenly spread over it."""
+        timed = min(self.definition.timed or runs, runs)
+        return np.linspace(0, runs - 1, timed).round().astype(int).tolist()
+
 
 def protocol_names() -> dict[str, str]:
     """Model -> name of the study with bounds that the package has of it."""

@@ -71,7 +71,7 @@ def run_protocol(
         )
     # A run whose result in the test set is a failure is not timed.
     judged = judged_set(sets)
-    sample = sampled_for_times(len(sets[judged]), protocol.definition.timed)
+    sample = protocol.timed_runs(len(sets[judged]))
     ends = np.array([row["status"].values[sample] for row in found[judged]])
     tests = tuple(sets[judged][run] for run in sample)
     timed = _timed(protocol, rows, tests, np.isin(ends, FINISHED), path)
@@ -85,11 +85,6 @@ def run_protocol(
         lambda: (run_path(folder, key) for key in keys),
         content_hash(protocol.definition),
     )
-
-
-def sampled_for_times(runs: int, timed: int | None) -> list[int]:
-    """Numbers of the runs of a set that are timed: all, or so many evenly spread over it."""
-    return np.linspace(0, runs - 1, min(timed or runs, runs)).round().astype(int).tolist()
 
 
 def second_runs(protocol: Protocol, scenarios: Scenarios) -> Experiment:
@@ -138,7 +133,7 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
     ]
     if len(fitting) > 1:
         validation = protocol.sets["validation"]
-        sample = sampled_for_times(len(validation), protocol.definition.timed)
+        sample = protocol.timed_runs(len(validation))
         tests = tuple(validation[run] for run in sample)
         timed = _timed(protocol, fitting, tests, None, path)
         seconds = timed["seconds"].mean("scenario").values
