@@ -133,7 +133,8 @@ def test_a_model_that_ships_shows_what_it_was_trained_on():
     shown = vm.describe(car.model.name)["reduced model that ships"]
     speeds = [run["speed"] for run in car.training]
     assert shown["initial speed, m/s"] == f"{min(speeds):g} to {max(speeds):g}"
-    assert shown["trained on"].startswith(f"{len(speeds)} runs of lane_change, multisine")
+    assert shown["training runs"] == str(len(speeds))
+    assert shown["maneuvers"].startswith("lane_change, multisine")
     assert shown["starts"] == "dropped, equilibrium"
     largest = car.input_range.largest[:, 0]
     assert f"{largest[0]:.3g} rad ({np.degrees(largest[0]):.3g} deg)" in shown["input delta"]
@@ -141,7 +142,7 @@ def test_a_model_that_ships_shows_what_it_was_trained_on():
     lines = str(car).splitlines()
     assert lines[0] == f"{car.model.name} by slow_manifold, order 12"
     assert lines[1:] == [f"  {name}: {text}" for name, text in shown.items() if name != "method"]
-    assert str(vm.reduce(car.model, "linear_single_track")).endswith("trained on: no run")
+    assert str(vm.reduce(car.model, "linear_single_track")).endswith("training runs: none")
 
 
 @pytest.mark.parametrize("name", names("method"))

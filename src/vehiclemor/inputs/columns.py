@@ -63,9 +63,11 @@ def csv_samples(
         if table[name].dtype.kind not in "iuf":
             texts = table[name].astype(str).str.replace(decimal, ".", regex=False)
             numbers: Any = pd.to_numeric(texts, errors="coerce")
-            odd = texts[numbers.isna()].iloc[0]
-            hint = ": is decimal=',' meant?" if "," in odd else ""
-            raise InputError(f"{path}: column {name!r} holds {quoted(odd)}, not a number{hint}")
+            if numbers.isna().any():
+                odd = texts[numbers.isna()].iloc[0]
+                hint = ": is decimal=',' meant?" if "," in odd else ""
+                raise InputError(f"{path}: column {name!r} holds {quoted(odd)}, not a number{hint}")
+            table[name] = numbers
     values = np.column_stack([table[name] for name in columns.values()] or [np.empty(0)])
     return table[time].to_numpy(), values, [*columns]
 

@@ -20,6 +20,14 @@ HISTORIES = ("times", "inputs", "states", "coordinates", "speeds", "outputs", "c
 SPEED = "initial_speed"
 # An input that is no larger was zero in training.
 NOTHING = 1e-11
+# What is shown of training runs -> key of their contents.
+COVERED = {
+    "maneuvers": "maneuver",
+    "starts": "start",
+    "initial speed, m/s": "speed",
+    "frequency factor": "frequency",
+    "amplitude factor": "amplitude",
+}
 # Parameters that say how a run starts, not which model it is of.
 OF_STARTS = (SPEED, *DROP)
 
@@ -64,34 +72,31 @@ def training_summary(
 ) -> dict[str, str]:
     """What the contents of training runs cover, and sizes of their inputs, see `InputRange`."""
     if not runs or component("method", method).learns_from == "nothing":
-        return {"trained on": "no run"}
-    parameters = [dict(run.get("parameters", ())) for run in runs]
-    names = ", ".join(sorted({run["maneuver"] for run in runs}))
-    values = {
-        "starts": {str(run["start"]) for run in runs},
-        "initial speed, m/s": {run["speed"] for run in runs} - {None},
-        "frequency factor": {run["frequency"] for run in runs},
-        "amplitude factor": {run["amplitude"] for run in runs},
-    }
-    for name in parameters[0]:
-        values[name] = {run[name] for run in parameters}
-    covered = {name: _span(sorted(seen)) for name, seen in values.items() if seen}
+        return {"training runs": "none"}
+    values: dict[str, list[Any]] = {}
+    for run in runs:
+        for name, key in COVERED.items():
+            values.setdefault(name, []).append(run[key])
+        for name, value in run.get("parameters", ()):
+            values.setdefault(name, []).append(value)
+    covered = {name: _span(seen) for name, seen in values.items() if seen[0] is not None}
     for quantity, (size, *quick) in zip(inputs, largest.T.tolist(), strict=True):
-        text = f"up to {size:.3g} {quantity.unit}" if size > NOTHING else "zero"
-        if quantity.unit == "rad" and size > NOTHING:
+        text = f"up to {size if size > NOTHING else 0.0:.3g} {quantity.unit}"
+        if quantity.unit == "rad":
             text += f" ({math.degrees(size):.3g} deg)"
         # Of structures they are shares of the bands.
         if len(quick) == 2:
             text += f"; above 2 Hz up to {quick[0]:.3g} {quantity.unit}"
         covered[f"input {quantity.name}"] = text
-    return {"trained on": f"{len(runs)} run{'s' * (len(runs) > 1)} of {names}"} | covered
+    return {"training runs": str(len(runs))} | covered
 
 
-def _span(seen: list[Any]) -> str:
+def _span(values: list[Any]) -> str:
     """Both ends of numbers; all of texts and tables."""
-    if isinstance(seen[0], float) and len(seen) > 1:
-        return f"{seen[0]:g} to {seen[-1]:g}"
-    return ", ".join(f"{value:g}" if isinstance(value, float) else str(value) for value in seen)
+    if not all(isinstance(value, float) for value in values):
+        return ", ".join(sorted(set(map(str, values))))
+    low, high = min(values), max(values)
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
 def own_speed(model: Model) -> float | None:
