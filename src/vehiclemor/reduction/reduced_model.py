@@ -61,7 +61,8 @@ class ReducedOrderModel(ShortRepr):
 
     def __str__(self) -> str:
         lines = [f"{self._name}, order {self.reduced.order}"]
-        lines += [self._lower_rank] * bool(self._lower_rank)
+        if self._lower_rank:
+            lines.append(self._lower_rank)
         if self.input_range is not None:
             runs = self.__getstate__()["training"]
             sizes, inputs = self.input_range.largest, self.model.definition.inputs
