@@ -93,6 +93,14 @@ class FittedModel(Protocol):
         ...
 
 
+def lower_rank(settings: Mapping[str, Any], reduced: FittedModel) -> str:
+    """That a model has a lower rank than its settings ask for; empty if it has not."""
+    rank = settings.get("rank", 0)
+    if reduced.order >= rank:
+        return ""
+    return f"effective rank {reduced.order}, where {rank} is asked for: training has no more"
+
+
 def simulated(
     reduced: FittedModel, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None
 ) -> Trajectory:
