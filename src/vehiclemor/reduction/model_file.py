@@ -18,7 +18,7 @@ import numpy as np
 
 from vehiclemor.arguments import file_path, quoted
 from vehiclemor.exceptions import FileError, InputError, VehiclemorError, one_line
-from vehiclemor.netcdf_file import INTEGRITY, opened, write_dataset
+from vehiclemor.netcdf_file import INTEGRITY, global_attributes, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.parts import Reader, Writer
@@ -52,7 +52,9 @@ def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
 
     path = file_path("path", path)
     if path.is_dir() or (path.exists() and not overwrite):
-        raise InputError(f"{path} is there already; overwrite=True replaces a file")
+        raise InputError(f"{path} is there already; overwrite=True replaces a saved model")
+    if path.exists() and "saved_model" not in global_attributes(path):
+        raise InputError(f"{path} is no saved model: it is not replaced")
     model, state, writer = rom.model, rom.__getstate__(), Writer(rom.model)
     try:
         parts = {name: writer.part(state[name], name) for name in PARTS}

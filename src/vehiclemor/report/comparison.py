@@ -1,6 +1,7 @@
 """Comparisons: with the paper, on unseen inputs, of every model, of any study; and costs."""
 
 import math
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,7 @@ def compare(
         at `model_comparison` and `study_comparison` in `vehiclemor.report.comparison`.
     """
     folder, jobs = file_path("results", results), count("jobs", jobs)
+    what = os.fspath(what) if isinstance(what, os.PathLike) else what
     if seed is not None and (what == PAPER or what in names("model")):
         raise InputError(f"seed: comparison {what!r} samples no test runs of its own")
     if what == PAPER:

@@ -1,5 +1,6 @@
 """What a name stands for: model, method, maneuver, study, or the schema of a file."""
 
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,7 @@ def description(
     name: str, parameters: Mapping[str, object] | None = None, parameter_file: Path | None = None
 ) -> Description:
     """What a name stands for; lists of dictionaries are the rows of tables."""
+    name = os.fspath(name) if isinstance(name, os.PathLike) else name
     if not isinstance(name, str):
         raise InputError(f"name is {quoted(name)}, not a text")
     if name in names("model"):
