@@ -198,6 +198,7 @@ class Method(ShortRepr):
             raise InputError(f"method {self.name!r}: packages are a tuple of names, not a text")
         for name in self.packages:
             line_of_text(f"method {self.name!r}: packages", name)
+        choice(f"learns_from of {self.name!r}", self.learns_from, ("runs", "inputs", "nothing"))
         for name in ("fit", "refusal", "check"):
             if not callable(getattr(self, name)):
                 raise InputError(f"method {self.name!r}: {name} is not a function")
