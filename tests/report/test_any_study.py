@@ -122,6 +122,8 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     checked(figure)
     # What a protocol would not trust has the status ok, a mark and a remark.
     data["warned"].loc[there | {"frequency_factor": 1.0}] = True
+    # The template's method reads no training: a mark that it could have.
+    data["in_training"].loc[there | {"frequency_factor": 1.0}] = True
     data["remark"] = data["remark"].astype(object)
     data["remark"].loc[there | {"frequency_factor": 1.0}] = "not driven; not to be trusted on Mars"
     data["remark"].loc[there | {"frequency_factor": 0.8}] = "not driven"

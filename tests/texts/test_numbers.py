@@ -67,15 +67,15 @@ def test_the_script_reads_what_is_stored_and_keeps_the_rest(results, monkeypatch
     found = measured_numbers.measured(results, known)
     new = {"value": 12.3457, "unit": "us", "source": "in_use.nc"}
     new |= {"command": "python paper/in_use.py"}
-    assert found == {"benchmark.x.median": old, "in_use.gv_step": new}
+    assert found == {"benchmark.x.median": old, "in_use.gv.step": new}
     assert "benchmark.json: missing; 1 numbers stay" in capsys.readouterr().err
 
     monkeypatch.setattr(measured_numbers, "FILE", results / "numbers.json")
     monkeypatch.setattr(measured_numbers, "ROOT", results)
     (results / "docs").mkdir()
-    (results / "docs/README.md.in").write_text('a step takes {{ n("in_use.gv_step", "d") }} us\n')
+    (results / "docs/README.md.in").write_text('a step takes {{ n("in_use.gv.step", "d") }} us\n')
     monkeypatch.setattr("sys.argv", ["measured_numbers.py", "--results", str(results)])
     measured_numbers.main()
     assert (results / "README.md").read_text() == "a step takes 12 us\n"
-    assert json.loads((results / "numbers.json").read_text()) == {"in_use.gv_step": new}
-    assert numbers_by_name.load(results / "numbers.json") == {"in_use.gv_step": new}
+    assert json.loads((results / "numbers.json").read_text()) == {"in_use.gv.step": new}
+    assert numbers_by_name.load(results / "numbers.json") == {"in_use.gv.step": new}

@@ -181,10 +181,8 @@ def _rounds(
                 long = turn == 0 or seconds[0, index, place, WHOLE] >= LONG_RUN
                 if reduced is None or not wanted[index, place] or (long and turn > rounds[1]):
                     continue
-                simulate, inputs = (
-                    for_test[index, place].simulate,
-                    INPUTS_OF_LONG if long else INPUTS,
-                )
+                simulate = for_test[index, place].simulate
+                inputs = INPUTS_OF_LONG if long else INPUTS
                 measured = attempt(partial(called, simulate, (maneuver, start), inputs))
                 if isinstance(measured, Failure):
                     wanted[index, place], seconds[:, index, place] = False, np.nan
