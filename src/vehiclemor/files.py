@@ -1,8 +1,9 @@
-"""Writing files whole: under a temporary name first, then moved into place."""
+"""Files: what is read, what may be replaced, and writing under a temporary name first."""
 
 import os
 import secrets
 import shutil
+import stat
 import tempfile
 import time
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from vehiclemor.exceptions import FileError, MachineError, machine_reason
 
 # Beginning of temporary names; and age (s) of a file that nobody is writing any more.
 TEMPORARY, OLD = ".partial-", 3600.0
+NO_FILE = "it is a folder, pipe or device, not a file"
 
 
 def make_folder(folder: Path) -> None:
@@ -34,6 +36,41 @@ def probe_folder(folder: Path) -> None:
         raise not_written(folder, error) from None
 
 
+def content_of(path: Path, most: int) -> bytes:
+    """Bytes of a file; `ValueError` if it is a folder, pipe or device, or has more than `most`."""
+    status = path.stat()
+    # Of a pipe or a device there may never be an end.
+    if not stat.S_ISREG(status.st_mode):
+        raise ValueError(NO_FILE)
+    if status.st_size > most:
+        raise ValueError(f"it has {status.st_size} bytes, more than {most}")
+    return path.read_bytes()
+
+
+def begins_with(beginning: bytes) -> Callable[[Path], bool]:
+    """Whether a path is a file of that beginning, as `replaceable` asks."""
+
+    def is_kind(path: Path) -> bool:
+        with path.open("rb") as file:
+            return file.read(len(beginning)) == beginning
+
+    return is_kind
+
+
+def replaceable(path: Path, kind: str, is_kind: Callable[[Path], bool]) -> Path:
+    """The path; `FileError` if something stands there that is not of this kind.
+
+    Devices, pipes, sockets and links that lead nowhere are of no kind.
+    """
+    try:
+        known = path.is_file() or path.is_dir()
+        if os.path.lexists(path) and not (known and is_kind(path)):
+            raise FileError(f"{path} exists and is no {kind}: it is not replaced; move it away")
+    except OSError as error:
+        raise not_written(path, error) from None
+    return path
+
+
 def not_written(path: Path, error: Exception) -> FileError | MachineError:
     """The error that tells why a path can't be written."""
     machine = machine_reason(error)
@@ -45,9 +82,10 @@ def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None
     """Let `write` fill a temporary file or folder, beside `path` by default; then move it there.
 
     The temporary path ends like `path`, on the same disk: a reader sees the old content or the new
-    one, never a part.  `FileError` if the folder can't be written, `MachineError` if the disk
-    fails.
+    one, never a part.  `FileError` if the folder can't be written or the path is a device or the
+    like, `MachineError` if the disk fails.
     """
+    replaceable(path, "file or folder", Path.exists)
     whole = path.absolute()
     temporary = temporary_path((folder or whole.parent) / whole.name)
     old = temporary.with_name(f"{temporary.name}.old")

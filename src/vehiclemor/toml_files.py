@@ -1,5 +1,6 @@
 """The border to TOML files: one clear line for whatever is wrong with a file."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -7,13 +8,22 @@ from typing import Annotated, Any, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from vehiclemor.exceptions import FileError
+from vehiclemor.files import content_of
+from vehiclemor.short_repr import shortened
 
+# Bytes of a file, characters of a line in it, and parts of a key: the parser takes a time that
+# grows with their square.
+MOST_BYTES, LONGEST, MOST_PARTS = 1_000_000, 1000, 8
+PART = r"""\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
+LONG_KEY = re.compile(f"(?:{PART}){{{MOST_PARTS}}}")
 Schema = TypeVar("Schema", bound="FileSchema")
 
 
 def _line(text: str) -> str:
     if not (text.strip() and text.isprintable()):
-        raise ValueError(f"{text!r} is not a line of text")
+        raise ValueError(f"{shortened(repr(text))} is not a line of text")
+    if len(text) > LONGEST:
+        raise ValueError(f"a text of {len(text)} characters; the longest has {LONGEST}")
     return text
 
 
@@ -34,7 +44,10 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
 def toml_content(path: Path) -> dict[str, Any]:
     """What a TOML file says; `FileError` if it is missing or unreadable."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        text = content_of(path, MOST_BYTES).decode()
+        if LONG_KEY.search(text):
+            raise ValueError(f"a key has more than {MOST_PARTS} parts")
+        return tomllib.loads(text)
     except RecursionError:
         raise FileError(f"{path}: tables or lists are nested too deeply") from None
     except FileNotFoundError:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import re
+import zipfile
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from vehiclemor.arguments import file_path, number, quoted, within
+from vehiclemor.arguments import file_path, flag, number, quoted, within
 from vehiclemor.exceptions import InputError
-from vehiclemor.files import make_folder, write_whole
+from vehiclemor.files import begins_with, make_folder, replaceable, write_whole
 from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
@@ -28,7 +32,7 @@ STEP = 1e-3
 STEPS = 1e-7, 1.0
 # What is always written.
 FILES = ("c", "fmu")
-# A folder with this file is one of ours.
+# A folder or unit with this file is one of ours.
 OURS = "vehiclemor_model.h"
 
 
@@ -106,20 +110,29 @@ def destination(name: str, to: str, out: str | Path | None, overwrite: bool) -> 
 
     `InputError` if what is there must not be replaced, or nothing can be written there.
     """
-    found = Path(f"{name}{ENDINGS[to]}") if out is None else file_path("out", out)
-    try:
-        folder, there = found.is_dir(), found.exists()
-        if not found.absolute().parent.is_dir():
-            raise InputError(f"{found}: the folder {found.parent} does not exist")
-    except OSError as error:
-        raise InputError(f"{found}: can't be written ({error.strerror})") from None
-    if there and not overwrite:
-        raise InputError(f"{found} exists; overwrite=True (--overwrite) replaces it")
-    if there and folder != (to == "c"):
-        raise InputError(f"{found} is {'a folder' if folder else 'a file'}: it is not replaced")
-    if folder and not (found / OURS).is_file():
-        raise InputError(f"{found} holds something else than an export: it is not replaced")
-    return found
+    path = file_path("out", Path(f"{name}{ENDINGS[to]}") if out is None else out)
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist")
+    if not flag("overwrite", overwrite) and os.path.lexists(path):
+        raise InputError(f"{path} exists; overwrite=True (--overwrite) replaces it")
+    return replaceable(path, f"export to {to}", IS_EXPORT[to])
+
+
+def _is_unit(path: Path) -> bool:
+    """Whether a path is a functional mock-up unit of this package."""
+    if not zipfile.is_zipfile(path):
+        return False
+    with suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
+        return f"sources/{OURS}" in archive.namelist()
+    return False
+
+
+# What an export may replace: one of its kind.
+IS_EXPORT: dict[str, Callable[[Path], bool]] = {
+    "c": lambda path: (path / OURS).is_file(),
+    "fmu": _is_unit,
+    "casadi": begins_with(b"jhpnnagiieaha"),
+}
 
 
 def name_of(model: str, method: str | None) -> str:

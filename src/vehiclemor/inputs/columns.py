@@ -11,6 +11,7 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import FileError, InputError, one_line
+from vehiclemor.files import NO_FILE
 
 # What may stand between columns in the place of the separator that is expected.
 SEPARATORS = ",;\t| "
@@ -28,7 +29,11 @@ def csv_samples(
     if not isinstance(separator, str) or len(separator) != 1:
         raise InputError(f"separator is {quoted(separator)}, not a character")
     read = partial(pd.read_csv, path, sep=separator, skipinitialspace=True)
+    if not isinstance(time, str):
+        raise InputError(f"time is {quoted(time)}, not the name of a column")
     try:
+        if path.exists() and not path.is_file():
+            raise ValueError(NO_FILE)
         # A longer row, of which an index would be made, is refused here; names are not yet altered.
         names = read(header=None, nrows=2, dtype=str).iloc[0]
         table = read()
@@ -44,8 +49,8 @@ def csv_samples(
     if len(names) == 1 and other:
         raise FileError(f"{path}: one column, {quoted(names[0])}: is separator={other[0]!r} meant?")
     table.columns = table.columns.astype(str)
-    chosen = inputs or [name for name in table if name != time]
-    named = chosen if isinstance(chosen, Mapping) else {name: name for name in listed(chosen)}
+    named = inputs if isinstance(inputs, Mapping) else {name: name for name in listed(inputs)}
+    named = named or {name: name for name in table if name != time}
     for name in listed([time, *named.values()]):
         if name not in table:
             known = ", ".join(table)

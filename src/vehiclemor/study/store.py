@@ -23,7 +23,14 @@ import numpy as np
 import xarray as xr
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
-from vehiclemor.files import make_folder, not_written, probe_folder, remove_leftovers, write_whole
+from vehiclemor.files import (
+    content_of,
+    make_folder,
+    not_written,
+    probe_folder,
+    remove_leftovers,
+    write_whole,
+)
 from vehiclemor.netcdf_file import global_attributes, read_dataset, write_dataset
 from vehiclemor.short_repr import shortened
 
@@ -32,6 +39,8 @@ ENDING, SCHEMA = ".safetensors", "vehiclemor run 4"
 # Bytes that say how long the header is; and where the hash stands, for which there are zeros while
 # it is computed.
 PREFIX, HASH, ZEROS = 8, '"sha256":"{}"', "0" * 64
+# Bytes of the file of a run: more than the histories of a whole study may have.
+MOST_BYTES = 1 << 32
 # What comes of a text that is none of ours.
 WRONG = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
 _LOG = logging.getLogger("vehiclemor")
@@ -143,11 +152,11 @@ def read_run(folder: Path, key: str) -> StoredRun:
     """Stored result; `FileError` if it is missing, `CorruptError` if not what was written."""
     path = run_path(folder, key)
     try:
-        return decoded(path.read_bytes(), key)
+        return decoded(content_of(path, MOST_BYTES), key)
     except CorruptError as error:
         raise CorruptError(error.reason, path, "; run again") from None
-    except IsADirectoryError:
-        raise CorruptError("is a folder, not a result file", path, "; run again") from None
+    except ValueError as error:
+        raise CorruptError(f"not a result file: {error}", path, "; run again") from None
     except FileNotFoundError:
         raise FileError(f"{path}: no such result file; run again") from None
     except OSError as error:
@@ -168,7 +177,7 @@ def finished_runs(folder: Path, keys: Iterable[str]) -> set[str]:
     finished = set()
     for key in keys:
         path = run_path(folder, key)
-        if path.exists():
+        if os.path.lexists(path):
             try:
                 if not read_run(folder, key).broken:
                     finished.add(key)
@@ -201,7 +210,8 @@ def combined_path(folder: Path, study: str) -> Path:
 def result_path(folder: Path, study: str, content: str) -> Path | None:
     """As `combined_path`, if there is one, of the study file of this content."""
     path = combined_path(folder, study)
-    return path if global_attributes(path).get("content") == content else None
+    attributes = global_attributes(path, stored=True)
+    return path if attributes.get("content") == content else None
 
 
 def stored(
@@ -218,15 +228,15 @@ def stored(
     The global `attribute` holds the key, `content` is the hash of a study file.  It is made again
     if one of the files that it is made from is missing, or a bug has ended a run.
     """
-    held = global_attributes(path)
+    held = global_attributes(path, stored=True)
     if held.get(attribute) == key and all(source.exists() for source in sources()):
-        dataset = read_dataset(path, "source", "vehiclemor")
+        dataset = read_dataset(path, "source", "vehiclemor", stored=True)
         # What a bug has ended is tried again.
         if "status" not in dataset or "error" not in dataset["status"].values:
             dataset.encoding["source"] = str(path)
             return dataset
     make_folder(path.parent)
-    if path.exists() and held.get("source") != "vehiclemor":
+    if os.path.lexists(path) and held.get("source") != "vehiclemor":
         quarantine(path, path.parent, "not as it was written, or no result of this package")
     dataset = make().assign_attrs({attribute: key})
     if content:

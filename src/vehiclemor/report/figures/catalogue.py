@@ -8,7 +8,7 @@ from typing import NamedTuple
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
+from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
 from vehiclemor.exceptions import InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder
@@ -17,7 +17,7 @@ from vehiclemor.report import default_studies
 from vehiclemor.report.figures import costs, result_plot, runs, theme
 from vehiclemor.report.result_selection import drawn
 from vehiclemor.resources import data_folder, data_names
-from vehiclemor.study.plans.loading import studies_and_files
+from vehiclemor.study.plans.loading import is_study, refuse_doubles, studies_and_files
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.run import run_studies
 
@@ -58,7 +58,7 @@ def find(name: str, results: Path) -> list[Entry]:
 
     Studies of a model that declares none are written to the results folder.
     """
-    if name.endswith(".toml") or name in data_names("studies"):
+    if is_study(name):
         members = studies_and_files(name).items()
         return [entry for member, found in members for entry in _of_a_study(member, *found)]
     kind, _, model = name.partition("-")
@@ -83,7 +83,7 @@ def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
 
 
 def figures(
-    only: Sequence[str] = (),
+    only: str | Path | Sequence[str | Path] = (),
     out: str | Path | None = None,
     results: str | Path = "results",
     jobs: int = 1,
@@ -123,13 +123,12 @@ def figures(
     """
     folder = file_path("results", results)
     target = folder / "figures" if out is None else file_path("out", out)
-    only = [only] if isinstance(only, str) else only
-    if not (isinstance(only, Sequence) and all(isinstance(name, str) for name in only)):
-        raise InputError(f"only is {quoted(only)}, not a list of names of figures")
+    only = study_names("only", only)
     # What is wrong is named before anything is computed.
     theme.styled(style, dpi)
     jobs = count("jobs", jobs, most=MOST_JOBS)
     wanted = only or ["paper"]
+    refuse_doubles(name for name in wanted if is_study(name))
     chosen = {entry.name: entry for name in wanted for entry in find(name, folder)}
     make_folder(target)
     data: dict[str, xr.Dataset] = {}
