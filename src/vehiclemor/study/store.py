@@ -16,11 +16,14 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from operator import eq
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
+from pydantic import TypeAdapter
+from typing_extensions import NotRequired, TypedDict
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
 from vehiclemor.files import (
@@ -41,6 +44,7 @@ ENDING, SCHEMA = ".safetensors", "vehiclemor run 4"
 PREFIX, HASH, ZEROS = 8, '"sha256":"{}"', "0" * 64
 # Bytes of the file of a run: more than the histories of a whole study may have.
 MOST_BYTES = 1 << 32
+MEND = "; move it away and run again"
 # What comes of a text that is none of ours.
 WRONG = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
 _LOG = logging.getLogger("vehiclemor")
@@ -60,6 +64,12 @@ class StoredRun(NamedTuple):
         return Counter(zip(*texts, strict=True))
 
     @property
+    def layout(self) -> dict[str, tuple[list[str], tuple[int, ...], str]]:
+        """Name -> dimensions, shape and kind of a variable."""
+        entries = self.variables.items()
+        return {name: (found[0], found[1].shape, found[1].dtype.kind) for name, found in entries}
+
+    @property
     def broken(self) -> bool:
         """Whether a bug has ended it: the next run tries it again."""
         return "error" in self.variables["status"][1].ravel().tolist()
@@ -67,6 +77,26 @@ class StoredRun(NamedTuple):
     def dataset(self) -> xr.Dataset:
         """As it was stored."""
         return xr.Dataset(self.variables, attrs=self.attributes).set_coords(self.coordinates)
+
+
+class DescribedVariable(TypedDict):
+    """What a run's file says of a variable, with its values if they are text."""
+
+    dimensions: list[str]
+    attributes: dict[Literal["units", "long_name", "clock"], str]
+    shape: NotRequired[list[int]]
+    text: NotRequired[list[str]]
+
+
+class DescribedRun(TypedDict):
+    """What a run's file says beside numbers."""
+
+    variables: dict[str, DescribedVariable]
+    coordinates: list[str]
+    attributes: dict[str, str]
+
+
+_SCHEMA = TypeAdapter(DescribedRun)
 
 
 def encoded(dataset: xr.Dataset, key: str) -> bytes:
@@ -105,14 +135,30 @@ def decoded(content: bytes, key: str) -> StoredRun:
         digest = header["sha256"]
         if hashlib.sha256(_with_hash(content, digest, ZEROS)).hexdigest() != digest:
             raise CorruptError("what it holds is not what was written")
-        found, arrays, variables = json.loads(header["dataset"]), load(content), {}
-        for name, entry in found["variables"].items():
+        described, arrays = _SCHEMA.validate_json(header["dataset"], strict=True), load(content)
+        run = StoredRun({}, described["coordinates"], described["attributes"])
+        for name, entry in described["variables"].items():
             if "text" in entry:
                 arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
-            variables[name] = entry["dimensions"], arrays[name], dict(entry["attributes"])
-        return StoredRun(variables, found["coordinates"], dict(found["attributes"]))
+            run.variables[name] = entry["dimensions"], arrays[name], entry["attributes"]
+        _check_layout(run)
+        return run
     except (*WRONG, SafetensorError):
         raise CorruptError("damaged, or no result of this package") from None
+
+
+def _check_layout(run: StoredRun) -> None:
+    """Raise `ValueError` if variables don't make a dataset, or there is no end of the run."""
+    sizes: dict[str, int] = {}
+    for name, (dimensions, array, _) in run.variables.items():
+        once = len({*dimensions}) == array.ndim and (array.ndim < 2 or name not in dimensions)
+        fit = all(map(eq, map(sizes.setdefault, dimensions, array.shape), array.shape))
+        if not (once and fit and name.isidentifier()):
+            raise ValueError(name)
+    ends = [run.variables[name][1].dtype for name in ("status", "message")]
+    known = {*run.coordinates} <= run.variables.keys()
+    if ends != [object, object] or not (known and all(map(str.isidentifier, sizes))):
+        raise ValueError("status")
 
 
 def _with_hash(content: bytes, old: str, new: str) -> bytes:
