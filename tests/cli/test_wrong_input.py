@@ -73,7 +73,7 @@ def test_output_that_is_something_else_is_kept(fails, tmp_path):
     out.write_text("my notes")
     simulate, study = [*TRAVEL.split(), "--out"], ["run", "figures-6-7", "--results"]
     fails([*simulate, out], "result.nc", "move it away")
-    fails([*simulate, tmp_path], "folder")
+    fails([*simulate, tmp_path], "ends with .nc")
     fails([*simulate, f"{long}.nc"], "too long")
     fails([*study, out], "not a folder")
     fails([*study, long], "too long")
