@@ -132,11 +132,8 @@ def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
 
 def _is_raised(error: BaseException, package: str) -> bool:
     """Whether a `raise` of a package raises an error; Ctrl-C strikes at other instructions."""
-    last: Any = error.__traceback__
-    while last.tb_next:
-        last = last.tb_next
-    module = last.tb_frame.f_globals.get("__name__", "")
-    instruction = last.tb_frame.f_code.co_code[last.tb_lasti]
+    *_, (frame, _) = walk_tb(error.__traceback__)
+    module, instruction = frame.f_globals.get("__name__", ""), frame.f_code.co_code[frame.f_lasti]
     return module.partition(".")[0] == package and instruction == dis.opmap["RAISE_VARARGS"]
 
 

@@ -47,14 +47,9 @@ def content_of(path: Path, most: int) -> bytes:
     return path.read_bytes()
 
 
-def begins_with(beginning: bytes) -> Callable[[Path], bool]:
-    """Whether a path is a file of that beginning, as `replaceable` asks."""
-
-    def is_kind(path: Path) -> bool:
-        with path.open("rb") as file:
-            return file.read(len(beginning)) == beginning
-
-    return is_kind
+def begins_with(beginning: bytes, at: int = 0) -> Callable[[Path], bool]:
+    """Whether a file has these bytes at its begin, as `replaceable` asks."""
+    return lambda path: path.is_file() and path.read_bytes()[at:].startswith(beginning)
 
 
 def replaceable(path: Path, kind: str, is_kind: Callable[[Path], bool]) -> Path:

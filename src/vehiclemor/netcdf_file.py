@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
-from vehiclemor.files import NO_FILE, write_whole
+from vehiclemor.files import NO_FILE, content_of, write_whole
 
 if TYPE_CHECKING:
     import netCDF4
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
 
 # Group of a file that ends with the hash of its bytes, and what stands before that hash: behind the
 # data, where no reader of netCDF looks.
-INTEGRITY, SEAL, DIGITS = "integrity", b"\nvehiclemor sha256 ", 64
-# What reads a file of others; bytes that its variables may have; and how long it may take: seconds
-# for any file, and bytes of it that are read in a second.
+INTEGRITY, SEAL = "integrity", b"\nvehiclemor sha256 "
+# What reads a file of others.  Bytes that a file and its variables may have; seconds that reading
+# any may take, and bytes that are read in a further one.
 READ = """
 import math, sys, netCDF4
 with netCDF4.Dataset(sys.argv[1]) as file:
     size = sum(8 * math.prod(variable.shape) for variable in file.variables.values())
-    if size > float(sys.argv[2]):
+    if size > int(sys.argv[2]):
         sys.exit(1)
     for owner in (file, *file.variables.values()):
         owner.__dict__
     for variable in file.variables.values():
         variable[...]
 """
-MOST_BYTES, LIMIT, SPEED = 8e9, 10.0, 2e7
+MOST_BYTES, LIMIT, SPEED = 8_000_000_000, 10.0, 2e7
 DAMAGED = "damaged, or no netCDF-4 file"
 # Of files that this process has written or read elsewhere.
 _KNOWN: set[bytes] = set()
@@ -55,7 +55,7 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
                 dataset.dump_to_store(NetCDF4DataStore(file))
                 file.createGroup(INTEGRITY)
             with temporary.open("ab") as file:
-                digest = _digest(temporary, file.tell())
+                digest = _digest(temporary.read_bytes())
                 file.write(SEAL + digest)
                 _KNOWN.add(digest)
         except (OSError, RuntimeError):
@@ -122,13 +122,12 @@ def opened(
         raise FileError(f"{path}: no such {kind}")
     try:
         digest = _sealed(path)
-        sealed = bool(digest)
-        if not (sealed and trusted) and digest not in _KNOWN:
+        if digest not in _KNOWN and not (digest and trusted):
             _read_elsewhere(path)
-            _KNOWN.update([digest] if sealed else [])
+            _KNOWN.update([digest] if digest else [])
         with netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
-            if INTEGRITY in file.groups and not sealed:
+            if INTEGRITY in file.groups and not digest:
                 raise ValueError("not what was written")
             yield file
     except (OSError, ValueError, RuntimeError, KeyError, AttributeError, IndexError) as error:
@@ -143,27 +142,16 @@ def opened(
 
 def _sealed(path: Path) -> bytes:
     """The hash that a file ends with, if it does; `ValueError` if it is not that of its bytes."""
-    size = path.stat().st_size - len(SEAL) - DIGITS
-    if size < 0:
+    whole, seal, digest = content_of(path, MOST_BYTES).rpartition(SEAL)
+    if not seal or len(digest) != len(_digest(b"")):
         return b""
-    with path.open("rb") as file:
-        file.seek(size)
-        seal, digest = file.read(len(SEAL)), file.read()
-    if seal != SEAL:
-        return b""
-    if digest != _digest(path, size):
+    if digest != _digest(whole):
         raise ValueError("what it holds is not what was written")
     return digest
 
 
-def _digest(path: Path, size: int) -> bytes:
-    """Hash of the first bytes of a file, which need not fit into the memory."""
-    found = hashlib.sha256()
-    with path.open("rb") as file:
-        while size > 0 and (part := file.read(min(size, 1 << 20))):
-            found.update(part)
-            size -= len(part)
-    return found.hexdigest().encode()
+def _digest(content: bytes) -> bytes:
+    return hashlib.sha256(content).hexdigest().encode()
 
 
 def _read_elsewhere(path: Path) -> None:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-import zipfile
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -30,9 +28,15 @@ ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi"}
 STEP = 1e-3
 # Shortest and longest: below, rounding is all; above, no model of a vehicle is stable.
 STEPS = 1e-7, 1.0
+# What an export may replace: one of its kind.
+IS_EXPORT: dict[str, Callable[[Path], bool]] = {
+    "c": lambda path: (path / OURS).is_file(),
+    "fmu": begins_with(b"modelDescription.xml", at=30),
+    "casadi": begins_with(b"jhpnnagiieaha"),
+}
 # What is always written.
 FILES = ("c", "fmu")
-# A folder or unit with this file is one of ours.
+# A folder with this file is one of ours.
 OURS = "vehiclemor_model.h"
 
 
@@ -116,23 +120,6 @@ def destination(name: str, to: str, out: str | Path | None, overwrite: bool) -> 
     if not flag("overwrite", overwrite) and os.path.lexists(path):
         raise InputError(f"{path} exists; overwrite=True (--overwrite) replaces it")
     return replaceable(path, f"export to {to}", IS_EXPORT[to])
-
-
-def _is_unit(path: Path) -> bool:
-    """Whether a path is a functional mock-up unit of this package."""
-    if not zipfile.is_zipfile(path):
-        return False
-    with suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
-        return f"sources/{OURS}" in archive.namelist()
-    return False
-
-
-# What an export may replace: one of its kind.
-IS_EXPORT: dict[str, Callable[[Path], bool]] = {
-    "c": lambda path: (path / OURS).is_file(),
-    "fmu": _is_unit,
-    "casadi": begins_with(b"jhpnnagiieaha"),
-}
 
 
 def name_of(model: str, method: str | None) -> str:

@@ -16,14 +16,11 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from operator import eq
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from pydantic import TypeAdapter
-from typing_extensions import NotRequired, TypedDict
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
 from vehiclemor.files import (
@@ -45,6 +42,8 @@ PREFIX, HASH, ZEROS = 8, '"sha256":"{}"', "0" * 64
 # Bytes of the file of a run: more than the histories of a whole study may have.
 MOST_BYTES = 1 << 32
 MEND = "; move it away and run again"
+# Of a variable.
+ATTRIBUTES = {"units", "long_name", "clock"}
 # What comes of a text that is none of ours.
 WRONG = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
 _LOG = logging.getLogger("vehiclemor")
@@ -77,26 +76,6 @@ class StoredRun(NamedTuple):
     def dataset(self) -> xr.Dataset:
         """As it was stored."""
         return xr.Dataset(self.variables, attrs=self.attributes).set_coords(self.coordinates)
-
-
-class DescribedVariable(TypedDict):
-    """What a run's file says of a variable, with its values if they are text."""
-
-    dimensions: list[str]
-    attributes: dict[Literal["units", "long_name", "clock"], str]
-    shape: NotRequired[list[int]]
-    text: NotRequired[list[str]]
-
-
-class DescribedRun(TypedDict):
-    """What a run's file says beside numbers."""
-
-    variables: dict[str, DescribedVariable]
-    coordinates: list[str]
-    attributes: dict[str, str]
-
-
-_SCHEMA = TypeAdapter(DescribedRun)
 
 
 def encoded(dataset: xr.Dataset, key: str) -> bytes:
@@ -135,12 +114,17 @@ def decoded(content: bytes, key: str) -> StoredRun:
         digest = header["sha256"]
         if hashlib.sha256(_with_hash(content, digest, ZEROS)).hexdigest() != digest:
             raise CorruptError("what it holds is not what was written")
-        described, arrays = _SCHEMA.validate_json(header["dataset"], strict=True), load(content)
-        run = StoredRun({}, described["coordinates"], described["attributes"])
-        for name, entry in described["variables"].items():
+        found, arrays = json.loads(header["dataset"]), load(content)
+        run = StoredRun({}, list(found["coordinates"]), dict(found["attributes"]))
+        texts = [*run.coordinates, *run.attributes, *run.attributes.values()]
+        for name, entry in found["variables"].items():
             if "text" in entry:
                 arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
-            run.variables[name] = entry["dimensions"], arrays[name], entry["attributes"]
+            dimensions, attributes = list(entry["dimensions"]), dict(entry["attributes"])
+            run.variables[name] = dimensions, arrays[name], attributes
+            texts += [*dimensions, *attributes.values(), *entry.get("text", [])]
+        # Of anything but texts it raises an error.
+        "".join(texts).encode()
         _check_layout(run)
         return run
     except (*WRONG, SafetensorError):
@@ -150,14 +134,14 @@ def decoded(content: bytes, key: str) -> StoredRun:
 def _check_layout(run: StoredRun) -> None:
     """Raise `ValueError` if variables don't make a dataset, or there is no end of the run."""
     sizes: dict[str, int] = {}
-    for name, (dimensions, array, _) in run.variables.items():
+    for name, (dimensions, array, attributes) in run.variables.items():
         once = len({*dimensions}) == array.ndim and (array.ndim < 2 or name not in dimensions)
-        fit = all(map(eq, map(sizes.setdefault, dimensions, array.shape), array.shape))
-        if not (once and fit and name.isidentifier()):
+        fit = [*map(sizes.setdefault, dimensions, array.shape)] == [*array.shape]
+        if not (once and fit and attributes.keys() <= ATTRIBUTES):
             raise ValueError(name)
     ends = [run.variables[name][1].dtype for name in ("status", "message")]
-    known = {*run.coordinates} <= run.variables.keys()
-    if ends != [object, object] or not (known and all(map(str.isidentifier, sizes))):
+    named = all(map(str.isidentifier, [*run.variables, *sizes]))
+    if ends != [object, object] or not (named and {*run.coordinates} <= run.variables.keys()):
         raise ValueError("status")
 
 
