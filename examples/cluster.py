@@ -45,7 +45,7 @@ if __name__ == "__main__":
 if __name__ == "__main__":
     result = vm.run_study(study, results=results)
     error = result["rms_error"].sel(output="toe").squeeze()
-    print(error.to_pandas().round(6))
+    print(error.to_pandas().map("{:.1e}".format))
     figure, axis = plt.subplots(figsize=(6.7, 3.4))
     for factor, column in error.groupby("frequency_factor"):
         axis.semilogy(error["rank"], column.squeeze(), "o-", label=f"{factor:g}")

@@ -24,9 +24,10 @@ np.savetxt(log, table, "%.4f", ",", header="time,steering angle", comments="")
 print(log.read_text()[:62])
 
 # %%
-# ``inputs`` maps the input of the model to the column. The factor turns degrees into radians.
-signal = vm.Signal.from_csv(log, "cubic", inputs={"delta": "steering angle"})
-signal = signal.perturbed(amplitude=np.pi / 180.0)
+# ``inputs`` maps the input of the model to the column. ``ratio=16`` would take the angle of a
+# steering wheel. In a shell: ``vehiclemor simulate MODEL --maneuver log.csv --csv unit=deg ...``.
+signal = vm.Signal.from_csv(log, "cubic", inputs={"delta": "steering angle"}, unit="deg")
+print(signal)
 
 # %%
 # A reduced car with 12 states ships with the package. It has never seen this log.

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import vehiclemor
 from vehiclemor.netcdf_file import read_dataset, write_dataset
+from vehiclemor.report.frames import frame
 
 README = """vehiclemor {version}: stored results of all studies
 
@@ -36,11 +37,8 @@ def compressed(path: Path, target: Path, tables: Path) -> dict[str, str]:
         variable.encoding = {"zlib": True, "complevel": 9, "shuffle": True} if numbers else {}
     # With the hash that this package checks before it reads a file.
     write_dataset(data, target)
-    axes = data["status"].dims if "status" in data else ()
-    if axes:
-        scalars = [name for name in data.data_vars if data[name].dims == axes]
-        table = data[scalars].reset_coords(drop=False).to_dataframe()
-        table.to_csv(tables / f"{path.stem}.csv")
+    if "status" in data and data["status"].ndim:
+        frame(data).to_csv(tables / f"{path.stem}.csv", index=False)
     return {key: str(data.attrs[key]) for key in ("machine", "versions") if key in data.attrs}
 
 

@@ -23,7 +23,7 @@ from number_tables import (
     Entry,
     benchmark,
     comparison,
-    in_use,
+    named_values,
     operations,
     peers,
     published,
@@ -38,6 +38,7 @@ from vehiclemor.report.printed_numbers import TIMING
 ROOT = FILE.parents[1]
 # Last part of a name -> its unit; an error has that of its output.
 UNITS = {"us": "us", "offline_us": "us", "ns_per_sample": "ns", "median": "s"}
+UNITS |= {"worst_m": "m", "worst_deg": "deg"}
 UNITS |= {"growth_rate": "1/s", "growth_largest": "1/s"}
 UNITS |= {"largest_lateral_position_without_steering": "m"}
 ERRORS = ("rms_error", "floor", "smallest", "largest", "natural")
@@ -68,7 +69,9 @@ def sources(results: Path) -> Iterator[tuple[str, str, Callable[[], Iterator[Ent
     yield "data/published/masoudi2015.toml", "", published
     yield "src", "", operations
     yield "studies", "vehiclemor compare paper", partial(comparison, results)
-    yield "in_use.nc", "python paper/in_use.py", partial(of_file, in_use, "in_use.nc")
+    for name in ("in_use", "other_steering"):
+        file = f"{name}.nc"
+        yield file, f"python paper/{name}.py", partial(of_file, partial(named_values, name), file)
     yield "benchmark.json", "tox -e bench", partial(of_file, benchmark, "benchmark.json")
     yield "peers.json", "tox -e peers", partial(of_file, peers, "peers.json")
     for name, make in studies():

@@ -48,8 +48,9 @@ COUNTS = ("rhs_calls", "iterations", "growth_rate")
 JUDGED = ["misses", "score", "seconds", "loop_seconds"]
 BESIDE = ["misses", "silent", "flagged", "score", "seconds", "offline_seconds"]
 TESTED = [*BESIDE, "loop_seconds", "ratio_equal", "ratio_equal_loop", "runs", "rank"]
+TESTED += ["misses_at_ten", "worst_m", "worst_deg"]
 TESTED += [f"outside_{name}" for name in ("runs", "misses", "silent", "flagged")]
-MOST_ERRORS = 12
+MOST_ERRORS, MEASURED = 12, ("worst_rms_", "worst_max_", "worst_relative_")
 OPERATIONS = ("total", "trigonometric", "divide")
 WORK = ("residual_evaluations", "iterations", "rhs_calls")
 SPEEDS = {"speed_up": "same", "speed_up_strongest": "fastest"}
@@ -124,6 +125,11 @@ def last_place(dataset: xr.Dataset) -> Frame:
     """Where the vehicle is at the end of every run."""
     place = dataset["outputs"].sel(output="lateral_position", drop=True).isel(time=-1, drop=True)
     return runs(dataset.assign(lateral_position=place), "lateral_position")[["lateral_position"]]
+
+
+def furthest_aside(dataset: xr.Dataset) -> Frame:
+    """Largest errors of the lateral position."""
+    return runs(dataset, "max_error")[["max_error.lateral_position"]]
 
 
 def of_truck(dataset: xr.Dataset) -> Frame:
@@ -215,7 +221,7 @@ def protocol(dataset: xr.Dataset) -> Iterator[Entry]:
     methods, head = rows[rows["kind"] == "method"], f"{kind}.{model}"
     methods = pd.concat([methods, methods[methods["winner"].eq(True)].assign(label="chosen")])
     full = methods["role"] == "full order"
-    worst = [name for name in methods if name.startswith("worst_")]
+    worst = [name for name in methods if name.startswith(MEASURED)]
     worst = worst if len(worst) <= MOST_ERRORS else []
     yield from cells(head, methods[full].set_index("label")[JUDGED])
     columns = TESTED + worst if kind == "predictive" else BESIDE + worst[:2]
@@ -285,10 +291,10 @@ def operations() -> Iterator[Entry]:
                 yield slug("operations", model, kernel, kind), counts.get(kind, 0)
 
 
-def in_use(dataset: xr.Dataset) -> Iterator[Entry]:
-    """Models in use."""
+def named_values(prefix: str, dataset: xr.Dataset) -> Iterator[Entry]:
+    """Values that have names."""
     for name, at in dataset.groupby("name"):
-        yield slug("in_use", name), at["value"].item(), at["output_unit"].item()
+        yield slug(prefix, *str(name).split()), at["value"].item(), at["output_unit"].item()
 
 
 def benchmark(rows: dict[str, Any]) -> Iterator[Entry]:
@@ -336,8 +342,8 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
         yield f"{short}-perturbations", partial(lines, f"perturbed.{model}", model, PERTURBED)
         yield f"{short}-settings", partial(settings, model)
         yield f"{short}-zero-steer", partial(grid, f"zero_steer.{model}", last_place)
-    for name in ("unseen-inputs", "unseen-inputs-trained"):
-        yield name, partial(grid, "unseen", partial(whole, VEHICLE))
+    for name in ("unseen-inputs", "unseen-inputs-ranks"):
+        yield name, partial(grid, "unseen", furthest_aside)
     yield "equation-order", orders
     yield "figure-14-spread", partial(spread, "figure-14-spread", SUSPENSION)
     yield "truck-contenders", partial(grid, "truck.bases", of_truck)

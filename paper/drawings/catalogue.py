@@ -41,7 +41,7 @@ FIGURES: Mapping[str, Entry] = {
     "zero-steer": Entry(
         vehicles.figure_zero_steer, ["vehicle-zero-steer", "high-fidelity-zero-steer"]
     ),
-    "unseen-inputs": Entry(vehicles.figure_unseen, ["unseen-inputs", "unseen-inputs-trained"]),
+    "unseen-inputs": Entry(vehicles.figure_unseen, ["unseen-inputs", "unseen-inputs-ranks"]),
     "pareto": Entry(fields.figure_pareto, PROTOCOLS),
     "size": Entry(fields.figure_size, ["size"]),
     "peers": Entry(fields.figure_peers, ["peers"]),

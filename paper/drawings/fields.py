@@ -10,6 +10,7 @@ from drawings import look
 from drawings.look import BLUE, GREEN, ORANGE, PINK, RED, THIN, TWO, Results, legend, panels, titles
 from vehiclemor.report.figures.costs import figure_size as figure_of_sizes
 from vehiclemor.report.figures.theme import tick_decades
+from vehiclemor.report.labels import declared
 from vehiclemor.report.unseen import method_rows, protocol_of
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
@@ -19,38 +20,11 @@ MODELS = {
     "high_fidelity_vehicle": "high-fidelity vehicle",
     "flexible_truck": "truck",
 }
-# Method -> what it is drawn as: kind, colour, mark.
-LEARNED = "learned by a library"
-LINEAR = "linear or projected"
-STYLES: Mapping[str, tuple[str, str]] = {
-    LEARNED: (RED, "s"),
-    LINEAR: (ORANGE, "^"),
-    "this suite's methods": (BLUE, "o"),
-}
-OF_LIBRARIES = (
-    "operator_inference",
-    "sparse_identification",
-    "dynamic_mode_decomposition",
-    "gaussian_process",
-    "neural_network",
-)
-PROJECTED = (
-    "balanced_truncation",
-    "irka",
-    "deim",
-    "modal_truncation",
-    "linear_single_track",
-    "pod",
-    "fixed_basis",
-    "craig_bampton",
-    "krylov",
-    "coarse_mesh",
-)
 
 
 def figure_pareto(results: Results) -> Figure:
     """Worst error on the test set over the time of a whole call: every method, all four models."""
-    figure, grid = panels(1, 4, TWO, 2.4)
+    figure, grid = panels(1, 4, TWO, 2.9)
     for axis, model in zip(grid.flat, MODELS, strict=True):
         found: dict[tuple[str, str], dict[str, Any]] = {}
         for study in (f"contenders-{model}", f"predictive-{model}"):
@@ -82,16 +56,13 @@ def _draw_front(axis: Any, points: list[tuple[float, float]]) -> None:
 
 
 def _draw_row(axis: Any, row: Mapping[str, Any]) -> None:
-    kind = LEARNED if row["method"] in OF_LIBRARIES else LINEAR
-    if row["method"] not in (*OF_LIBRARIES, *PROJECTED):
-        kind = "this suite's methods"
-    color, marker = STYLES[kind]
-    style = {"marker": marker, "linestyle": "none", "markersize": 4, "markerfacecolor": "none"}
-    axis.plot(1e3 * row["seconds"], row["score"], color=color, label=kind, **style)
+    look = declared().methods[row["method"]]
+    style = {"marker": look.mark, "linestyle": "none", "markersize": 4, "markerfacecolor": "none"}
+    axis.plot(1e3 * row["seconds"], row["score"], color=look.color, label=look.words, **style)
     if row["winner"]:
-        star = {"marker": "*", "markersize": 11, "linestyle": "none", "color": GREEN}
-        star["markerfacecolor"] = "none"
-        axis.plot(1e3 * row["seconds"], row["score"], label="chosen by validation", **star)
+        ring = {"marker": "o", "markersize": 10, "linestyle": "none", "color": "black"}
+        ring |= {"markerfacecolor": "none", "markeredgewidth": 0.7}
+        axis.plot(1e3 * row["seconds"], row["score"], label="chosen by validation", **ring)
 
 
 def figure_size(results: Results) -> Figure:

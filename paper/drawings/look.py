@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from vehiclemor.report.figures.theme import COLORS, letter
+from vehiclemor.report.figures.theme import COLORS, letter, method_style
+from vehiclemor.report.labels import declared
 
 # Width of a column, and of both, in inches.
 ONE, TWO = 8.6 / 2.54, 17.8 / 2.54
@@ -18,13 +19,9 @@ FULL: dict[str, Any] = {"color": "black", "linewidth": 2.4, "alpha": 0.35, "labe
 THIN: dict[str, Any] = {"color": "black", "linewidth": 0.7}
 PUBLISHED: dict[str, Any] = {"color": "black", "linewidth": 0.8, "linestyle": ":"}
 BOUND: dict[str, Any] = {"color": "#777777", "linewidth": 0.6}
+# Method -> its line, as in all figures.
 LINES: Mapping[str, dict[str, Any]] = {
-    "pod": {"color": BLUE, "linestyle": (0, (4, 3)), "label": "POD"},
-    "pod_literal": {"color": RED, "linestyle": "-.", "label": "POD, literal"},
-    "pod_r3": {"color": GREEN, "linestyle": (0, (5, 1, 1, 1)), "label": "POD, r = 3"},
-    "fixed_basis": {"color": GREEN, "linestyle": (0, (5, 1, 1, 1)), "label": "one basis"},
-    "replay": {"color": "#666666", "linestyle": ":", "linewidth": 1.5, "label": "replay"},
-    "slow_manifold": {"color": GREEN, "linestyle": (0, (5, 1, 1, 1)), "label": "slow manifold"},
+    name: method_style(look) | {"label": look.words} for name, look in declared().methods.items()
 }
 # A logarithmic axis of errors shows so many decades.
 DECADES = 6.0

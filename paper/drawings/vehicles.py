@@ -1,8 +1,10 @@
 """Figures 2 to 4, 9 and 10, and the vehicles on inputs that they were not trained on."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -103,49 +105,59 @@ def figure_zero_steer(results: Results) -> Figure:
 
 
 def figure_unseen(results: Results) -> Figure:
-    """Paths on three inputs that no reduced model was trained on; largest lateral errors below."""
+    """Paths on three inputs that no method was trained on; largest lateral errors over the rank."""
     inputs = {
-        -1.2: "amplitude 1.2 to the right",
-        0.5: "amplitude 0.5 to the left",
+        -1.2: "1.2 times the steering, to the right",
+        0.5: "half the steering, to the left",
         0.0: "no steering",
     }
-    labels = "replay", "pod", "slow_manifold"
-    heights = {"height_ratios": [2.0, 1.0]}
-    figure, grid = panels(2, 3, TWO, 2.7, sharey="row", gridspec_kw=heights)
+    heights = {"height_ratios": [1.7, 1.0]}
+    figure, grid = panels(2, 3, TWO, 3.4, sharey="row", gridspec_kw=heights)
     for (upper, lower), amplitude in zip(grid.T, inputs, strict=True):
-        points = [dataset.sel(amplitude_factor=amplitude).squeeze() for dataset in results.values()]
-        at = {str(label): point for point in points for label in np.atleast_1d(point["label"])}
-        runs = {k: v.sel(label=k) if v["label"].ndim else v for k, v in at.items() if k in labels}
-        _draw_path(upper, "full_order", runs["pod"]["reference_outputs"])
-        for label in labels:
-            _draw_path(upper, label, runs[label]["outputs"])
-        errors = [float(runs[k]["max_error"].sel(output="lateral_position")) for k in labels]
-        _draw_bars(lower, labels, errors)
+        others, ranks = (
+            data.sel(amplitude_factor=amplitude).squeeze() for data in results.values()
+        )
+        _draw_path(upper, FULL, others["reference_outputs"].isel(label=0))
+        for label, rank in (("pod", 3), ("pod", 8), ("fixed_basis", 8)):
+            _draw_path(upper, _of_rank(label, rank), ranks["outputs"].sel(label=label, rank=rank))
+        for label in ("replay", "slow_manifold"):
+            _draw_path(upper, LINES[label], others["outputs"].sel(label=label))
+        _draw_errors(lower, ranks["max_error"], others["max_error"])
         upper.set_xlim(0.0, 150.0)
         upper.set_xlabel("X (m)")
-        lower.set_xlabel("largest error of Y (m)")
+        lower.set_xlabel("rank r")
     grid[0, 0].set_ylabel("Y (m)")
+    grid[1, 0].set_ylabel("largest error of Y (m)")
     titles(grid[:1], inputs.values())
-    legend(figure, [grid[0, 0]], 4)
+    legend(figure, grid[:, 0], 4)
     return figure
 
 
-def _draw_path(axis: Axes, label: str, outputs) -> None:  # noqa: ANN001
+def _of_rank(label: str, rank: int) -> dict[str, Any]:
+    """Style of a basis of a rank: the lower one is drawn thinner."""
+    line = LINES[label]
+    return line | {"label": f"{line['label']}, r = {rank}", "linewidth": 0.9 if rank < 5 else 1.4}
+
+
+def _draw_path(axis: Axes, style: Mapping[str, Any], outputs: xr.DataArray) -> None:
     places = [outputs.sel(output=f"{name}_position").values for name in ("longitudinal", "lateral")]
-    axis.plot(*places, **(FULL if label == "full_order" else LINES[label]))
+    axis.plot(*places, **style)
 
 
-def _draw_bars(axis: Axes, labels: Sequence[str], errors: Sequence[float]) -> None:
-    """Largest errors with their numbers, on a logarithmic axis from a millimetre on."""
+def _draw_errors(axis: Axes, of_ranks: xr.DataArray, of_others: xr.DataArray) -> None:
+    """Largest errors over the rank, on a logarithmic axis from a millimetre on."""
     least = 1e-3
-    colors = [LINES[label]["color"] for label in labels]
-    texts = [str(LINES[label]["label"]) for label in labels]
-    bars = axis.barh(texts, np.maximum(errors, 1.2 * least), 0.65, color=colors)
-    numbers = [f"{e:.2g} m" if e >= least else "below 1 mm" for e in errors]
-    axis.bar_label(bars, numbers, padding=3, fontsize=7)
-    axis.set_ylim(len(labels) - 0.5, -0.5)
-    axis.set_xscale("log")
-    axis.set_xlim(least, 200.0)
-    axis.set_xticks([1e-3, 1e-1, 1e1], ["0.001", "0.1", "10"])
-    axis.minorticks_off()
-    axis.grid(visible=False, axis="y")
+    for label, marker in (("pod", "o"), ("fixed_basis", "s")):
+        errors = of_ranks.sel(label=label, output="lateral_position")
+        style = LINES[label] | {"marker": marker, "markersize": 3.5}
+        axis.semilogy(errors["rank"], np.maximum(errors, least), **style)
+    for label in ("replay", "slow_manifold"):
+        error = float(of_others.sel(label=label, output="lateral_position"))
+        axis.axhline(max(error, least), **LINES[label])
+        if error < least:
+            axis.text(6.0, 1.3 * least, "slow manifold: below 1 mm", ha="center", fontsize=7)
+    one_run = float(of_others.sel(label="pod_of_one_run", output="lateral_position"))
+    axis.plot(3, one_run, "x", color="black", label="POD of one run, r = 3")
+    axis.set_ylim(0.8 * least, 60.0)
+    axis.set_xticks(of_ranks["rank"].values)
+    look.decades(axis, 1)

@@ -95,11 +95,11 @@ def file_path(name: str, value: object) -> Path:
 
 
 def study_names(name: str, value: Any) -> list[str]:
-    """Names of studies or paths of their files, of which one may stand alone; or `InputError`."""
-    several = [value] if isinstance(value, str | os.PathLike) else value
-    if not isinstance(several, Sequence) or several[MOST_NAMES:]:
-        raise InputError(f"{name} is {quoted(value)}, not a list of names of studies")
-    return [str(file_path(name, one)) for one in several]
+    """Names of studies, or paths of their files, of which one may stand alone; or `InputError`."""
+    entries = [value] if isinstance(value, str | os.PathLike) else value
+    if not isinstance(entries, Sequence) or entries[MOST_NAMES:]:
+        raise InputError(f"{name} is {quoted(value)}, not a list of names or files of studies")
+    return [str(file_path(name, entry)) for entry in entries]
 
 
 def loop_array(values: Any) -> np.ndarray:

@@ -36,7 +36,7 @@ def probe_folder(folder: Path) -> None:
         raise not_written(folder, error) from None
 
 
-def content_of(path: Path, most: int) -> bytes:
+def read_regular(path: Path, most: int) -> bytes:
     """Bytes of a file; `ValueError` if it is a folder, pipe or device, or has more than `most`."""
     status = path.stat()
     # Of a pipe or a device there may never be an end.
@@ -49,7 +49,12 @@ def content_of(path: Path, most: int) -> bytes:
 
 def begins_with(beginning: bytes, at: int = 0) -> Callable[[Path], bool]:
     """Whether a file has these bytes at its begin, as `replaceable` asks."""
-    return lambda path: path.is_file() and path.read_bytes()[at:].startswith(beginning)
+
+    def is_kind(path: Path) -> bool:
+        with path.open("rb") as file:
+            return file.read(at + len(beginning))[at:] == beginning
+
+    return is_kind
 
 
 def replaceable(path: Path, kind: str, is_kind: Callable[[Path], bool]) -> Path:

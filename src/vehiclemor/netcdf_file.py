@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
-from vehiclemor.files import NO_FILE, content_of, write_whole
+from vehiclemor.files import NO_FILE, read_regular, write_whole
 
 if TYPE_CHECKING:
     import netCDF4
@@ -142,7 +142,7 @@ def opened(
 
 def _sealed(path: Path) -> bytes:
     """The hash that a file ends with, if it does; `ValueError` if it is not that of its bytes."""
-    whole, seal, digest = content_of(path, MOST_BYTES).rpartition(SEAL)
+    whole, seal, digest = read_regular(path, MOST_BYTES).rpartition(SEAL)
     if not seal or len(digest) != len(_digest(b"")):
         return b""
     if digest != _digest(whole):

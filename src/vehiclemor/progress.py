@@ -15,6 +15,8 @@ from time import perf_counter
 # What is done within this time (s) is not worth a word.
 QUIET = 1.0
 _LOG = logging.getLogger("vehiclemor")
+# Lines of this process.
+_SAID: set[str] = set()
 
 
 class StandardError(logging.Handler):
@@ -41,8 +43,11 @@ class _Task:
         self.seconds, self.told = 0.0, False
 
     def tell(self) -> None:
-        self.told = True
-        _LOG.info(self.began)
+        # One name may stand for several files.
+        if self.began not in _SAID:
+            _SAID.add(self.began)
+            self.told = True
+            _LOG.info(self.began)
 
     def tell_end(self) -> None:
         if self.told:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from vehiclemor.exceptions import FileError
-from vehiclemor.files import content_of
+from vehiclemor.files import read_regular
 from vehiclemor.short_repr import shortened
 
 # Bytes of a file, characters of a line in it, and parts of a key: the parser takes a time that
@@ -44,7 +44,7 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
 def toml_content(path: Path) -> dict[str, Any]:
     """What a TOML file says; `FileError` if it is missing or unreadable."""
     try:
-        text = content_of(path, MOST_BYTES).decode()
+        text = read_regular(path, MOST_BYTES).decode()
         if LONG_KEY.search(text):
             raise ValueError(f"a key has more than {MOST_PARTS} parts")
         return tomllib.loads(text)

@@ -7,13 +7,15 @@ import os
 import signal
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor.cli import main
+from vehiclemor import progress
+from vehiclemor.cli import main, studies
 from vehiclemor.cli.app import COMMANDS, ended
 from vehiclemor.cli.options import key_values
 from vehiclemor.exceptions import MachineError
@@ -79,6 +81,23 @@ def test_simulate_writes_what_the_interface_returns(tmp_path, printed, monkeypat
         assert json.loads(written.attrs["configuration"])["parameters"]["wheel_centre"] == point
 
 
+def test_a_log_is_simulated_as_its_signal_and_drawn(tmp_path, printed, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    times = np.linspace(0.0, 1.0, 11)
+    rows = [f"{t:.1f};{10.0 * t:.1f}".replace(".", ",") for t in times]
+    (tmp_path / "log.csv").write_text("\n".join(["Time [s];Travel [mm]", *rows]))
+    words = ["time=Time [s]", "z=Travel [mm]", "unit=mm", "separator=;", "decimal=,", "hold=cubic"]
+    log = "--maneuver", "log.csv", "--csv", *words
+    printed("simulate", "double_wishbone", *log, "--out", "run.nc")
+    signal = vm.Signal.from_samples(times, 0.01 * times, "cubic", inputs="z")
+    expected = vm.simulate("double_wishbone", maneuver=signal)
+    with xr.open_dataset("run.nc") as written:
+        np.testing.assert_allclose(written["coordinates"], expected["coordinates"], atol=1e-12)
+    assert "written: run-histories.png" in printed("plot", "run.nc")
+    assert main(["simulate", "double_wishbone", "--csv", "unit=mm"]) == 2
+    assert "--maneuver FILE.csv" in capsys.readouterr().err
+
+
 def test_text_of_the_command_line_gets_its_kind():
     texts = ["3", "-2", "2.5", "1e-6", "fast", "3a", "1,2.5", "theta,alpha", ""]
     values = [3, -2, 2.5, 1e-6, "fast", "3a", [1.0, 2.5], "theta,alpha", ""]
@@ -107,6 +126,23 @@ def test_a_model_shows_all_that_it_declares(name):
     rows = vm.describe("double_wishbone", {"wheel_centre": [0.0, 0.8, -0.1]})["parameters"]
     (row,) = [row for row in rows if row["name"] == "wheel_centre"]
     assert (row["value"], row["source"]) == ([0.0, 0.8, -0.1], "override")
+
+
+def test_a_model_that_ships_shows_what_it_was_trained_on():
+    car = vm.rom("independent_suspension_vehicle")
+    shown = vm.describe(car.model.name)["reduced model that ships"]
+    speeds = [run["speed"] for run in car.training]
+    assert shown["initial speed, m/s"] == f"{min(speeds):g} to {max(speeds):g}"
+    assert shown["training runs"] == str(len(speeds))
+    assert shown["maneuvers"].startswith("lane_change, multisine")
+    assert shown["starts"] == "dropped, equilibrium"
+    largest = car.input_range.largest[:, 0]
+    assert f"{largest[0]:.3g} rad ({np.degrees(largest[0]):.3g} deg)" in shown["input delta"]
+    assert shown["input delta"].endswith(f"above 2 Hz up to {largest[1]:.3g} rad")
+    lines = str(car).splitlines()
+    assert lines[0] == f"{car.model.name} by slow_manifold, order 12"
+    assert lines[1:] == [f"  {name}: {text}" for name, text in shown.items() if name != "method"]
+    assert str(vm.reduce(car.model, "linear_single_track")).endswith("training runs: none")
 
 
 @pytest.mark.parametrize("name", names("method"))
@@ -201,6 +237,16 @@ def test_what_the_machine_does_is_one_line_and_status_1(capsys, error):
     assert ended(lambda: raising(error)) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert str(error.args[-1]) in line
+
+
+def test_a_long_study_tells_how_far_it_is_every_five_seconds(monkeypatch, capsys):
+    clock = iter([0.0, 1.0, 4.9, 5.0, 9.9, 10.0, 20.0])
+    monkeypatch.setattr(studies, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    with studies.shown_progress():
+        for done in (0, 1, 2, 3, 4, 9):
+            progress.tell("grid", done, 9)
+    lines = ["grid: 9 of 9 to compute", "grid: 2 of 9, 5 s", "grid: 4 of 9, 10 s"]
+    assert capsys.readouterr().err.splitlines() == lines
 
 
 def test_runs_are_counted_and_those_with_errors_tried_again(run, monkeypatch, capsys):

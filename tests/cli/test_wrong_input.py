@@ -30,7 +30,7 @@ WRONG = [
     (f"{TRAVEL} --plot a.txt", "a.txt"),
     ("simulate", "model"),
     ("run figures-6-7 --jobs 1.5", "1.5"),
-    ("figures --only ,", "names no figure"),
+    ("figures --only", "names no figure"),
     ("export double_wishbone --to c --set rank=3", "--method"),
     ("export double_wishbone --to c --method shipped --set rank=3", "settings"),
 ]

@@ -14,6 +14,7 @@ from vehiclemor import contracts
 from vehiclemor.exceptions import InputError
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.registry import component, names
+from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study.experiment import complete_settings
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "my_method.py"
@@ -54,6 +55,21 @@ def test_a_broken_structure_is_named(monkeypatch, alter, message):
     monkeypatch.setattr(contracts, "build", lambda _: replace(model, definition=definition))
     with pytest.raises(InputError, match=message):
         contracts.check_model(TRUCK)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-6])
+def test_a_jacobian_is_judged_by_the_size_of_the_residual(monkeypatch, off):
+    # Residuals in micrometres, and an element that is wrong by a millionth of the largest.
+    for name in ("residual", "residual_at", "jacobian"):
+        plain = getattr(AlgebraicModel, name)
+        wrong = 1.0 + off * (name == "jacobian")
+        scaled = lambda *given, plain=plain, wrong=wrong: 1e6 * wrong * plain(*given)  # noqa: E731
+        monkeypatch.setattr(AlgebraicModel, name, scaled)
+    if not off:
+        contracts.check_model(KINEMATIC[0])
+    else:
+        with pytest.raises(AssertionError, match="Jacobian differs"):
+            contracts.check_model(KINEMATIC[0])
 
 
 @pytest.mark.usefixtures("plug_in_package")

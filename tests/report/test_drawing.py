@@ -1,6 +1,8 @@
 """Any result is drawn: runs that end in every way, over any axes, of one to seven methods."""
 
 import json
+import re
+import shutil
 
 import numpy as np
 import pytest
@@ -129,7 +131,7 @@ def test_a_run_far_from_full_order_is_cut_where_it_leaves(folder):
 
 def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeypatch):
     names = ("numbers", "map-4", "alone-diverged")
-    only = ["--only", ",".join(str(folder / f"{name}.toml") for name in names)]
+    only = ["--only", *(str(folder / f"{name}.toml") for name in names)]
     arguments = ["figures", *only, "--results", str(folder), "--out", str(folder / "figures")]
     assert main([*arguments, "--dpi", "20"]) == 0
     written = {path.stem.removeprefix("figure-") for path in (folder / "figures").iterdir()}
@@ -142,14 +144,16 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeyp
     def broken(*_):
         raise IndexError("index 51 is out of bounds")
 
-    monkeypatch.setitem(result_plot.DRAWINGS, "histories", broken)
-    only = ["--only", f"{folder / 'late.toml'},{folder / 'numbers.toml'}"]
-    only += ["--results", str(folder)]
+    histories = result_plot.PICTURES["histories"]._replace(draw=broken)
+    monkeypatch.setitem(result_plot.PICTURES, "histories", histories)
+    # A comma belongs to the name of a file.
+    late = shutil.copy(folder / "late.toml", folder / "late, or not.toml")
+    only = ["--only", str(late), "--only", str(folder / "numbers.toml"), "--results", str(folder)]
     assert main(["figures", *only, "--out", str(folder / "some"), "--dpi", "20"]) == 1
     printed = capsys.readouterr()
     *_, line = printed.err.splitlines()
-    assert line.startswith("figure late-histories can't be drawn: IndexError")
-    assert [row.rpartition("-")[2] for row in printed.out.split()] == ["errors.png"] * 2
+    assert line.startswith("figure late, or not-histories can't be drawn: IndexError")
+    assert [row.rpartition("-")[2] for row in printed.out.splitlines()] == ["errors.png"] * 2
     page = vm.write_report([str(folder / "late.toml")], folder / "page.html", folder)
     head, _, rest = page.read_text(encoding="utf-8").partition("<ol")
     assert "late (IndexError: index 51" in head
@@ -158,16 +162,50 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeyp
 
 def test_what_was_not_compared_is_drawn_alone(tmp_path):
     rom = vm.reduce("double_wishbone", "pod", rank=3)
-    for result in (rom.dataset(rom.simulate()), vm.simulate("double_wishbone", errors=False)):
+    alone = {"POD": rom.dataset(rom.simulate())}
+    alone["full order"] = vm.simulate("double_wishbone", errors=False)
+    for name, result in alone.items():
         figure = vm.plot(result, out=tmp_path / "run.png")
-        assert len(figure.axes) == 2
+        assert len(figure.axes) == 3
         legend, notes = said(figure)
         assert notes == []
-        assert len(legend) == 1
+        assert legend == [name]
+        (travel,) = figure.axes[2].lines
+        np.testing.assert_array_equal(travel.get_ydata(), result["inputs"].sel(input="z"))
         shown = 1e3 * result["outputs"].sel(output="second_euler_angle")
         np.testing.assert_array_equal(figure.axes[0].lines[-1].get_ydata(), shown)
         with pytest.raises(InputError, match="not compared"):
             vm.plot(result, "errors")
+
+
+def test_a_run_beside_full_order_has_its_methods_name_and_one_unit_in_a_panel():
+    rom = vm.reduce("double_wishbone", "pod", rank=3, training="nominal")
+    run, full = rom.simulate("sine_travel"), rom.model.simulate("sine_travel")
+    figure = checked(vm.plot(run, full))
+    assert "POD" in said(figure)[0]
+    error = float(vm.errors(run, full)["rms_error"].sel(output="spindle_y"))
+    panel = figure.axes[4]
+    assert panel.get_title(loc="left") == f"(e) RMS error {1e6 * error:.3g} µm"
+    assert panel.get_ylabel().endswith("(µm)")
+
+
+def test_a_rank_study_has_ranks_across_says_where_they_end_and_names_its_point(tmp_path, capsys):
+    study = STUDIES["none"].partition("[grid]")[0] + "[grid]\nrank = [3, 4, 8]\n"
+    study += "frequency_factor = [1.0, 1.2]\n"
+    study += "".join(f'[[methods]]\nmethod = "{name}"\n' for name in ("pod", "replay"))
+    path = tmp_path / "ranks.toml"
+    path.write_text(study)
+    assert main(["compare", str(path), "--results", str(tmp_path)]) == 0
+    assert "\npod saturates at rank 4\n" in capsys.readouterr().out
+    figure = checked(vm.plot(path, "errors", results=tmp_path))
+    assert [axis.get_xlabel() for axis in figure.axes] == ["rank; POD saturates at 4"] * 2
+    assert "POD, frequency factor 1.2" in said(figure)[0]
+    page = vm.write_report([str(path)], tmp_path / "page.html", tmp_path).read_text()
+    cells = re.findall(r"<div>replay</div></td><td>(.*?)</td><td>(.*?)</td>", page)
+    factors = [re.sub("<.*?>", "", factor) for factor, rank in cells if rank == "<div></div>"]
+    assert factors == ["1", "1.2"]
+    point = vm.plot(path, results=tmp_path).get_suptitle()
+    assert point.endswith("at frequency_factor 1.0, rank 3")
 
 
 def test_errors_are_drawn_over_what_is_not_chosen(folder):
@@ -206,6 +244,7 @@ MANY = {"rank": [*range(1, 9)]}
     ("dimensions", "label", "panels", "meshes"),
     [
         (FACTOR | {"rank": [1, 2, 3]}, "frequency perturbation (%)", 2, 0),
+        (FACTOR | MANY, "rank", 2, 0),
         (FACTOR | {"amplitude_factor": [0.9, 1.0]}, "frequency perturbation (%)", 4, 4),
         ({"tolerance": [1e-8, 1e-6, 1e-3]}, "tolerance", 2, 0),
         (MANY | {"snapshots": [*range(5, 11)]}, "rank", 4, 4),
@@ -248,6 +287,16 @@ def test_curves_and_maps_show_the_errors():
     shown = figure.axes[0].collections[0].get_array().ravel()
     assert 1e-3 * shown.max() == pytest.approx(float(errors.max()))
     assert shown.size == errors.size
+
+
+def test_of_many_lines_no_two_have_one_colour():
+    data = varied(["pod"], frequency_factor=np.linspace(0.8, 1.4, 9), rank=[*range(1, 9)])
+    lines = [
+        line
+        for line in plot_result(data, None, "errors").axes[0].lines
+        if "rank" in line.get_label()
+    ]
+    assert len({line.get_color() for line in lines}) == len(lines) == 8
 
 
 def test_samples_are_drawn_over_what_was_sampled():

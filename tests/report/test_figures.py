@@ -1,5 +1,7 @@
 """The figures of studies as data: what their texts, lines and limits are; and as files."""
 
+import re
+
 import matplotlib
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from tests.report.figure_texts import checked, varied
+from tests.report.figure_texts import checked, texts_of, varied
 from vehiclemor.exceptions import InputError
 from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.costs import figure_pareto, figure_size
@@ -105,6 +107,15 @@ def test_axes_have_units_and_no_label_is_longer_than_its_axis(drawn):
                 assert axis.xaxis.label.get_window_extent().width <= 1.1 * axis.bbox.width, name
 
 
+def test_exponents_are_superscripts(drawn):
+    for name, figure in drawn.items():
+        for text, _ in texts_of(figure):
+            assert not re.search(r"\^[^{]", text.get_text()), (name, text)
+    legend = [text.get_text() for text in drawn["size"].axes[0].get_legend().get_texts()]
+    # Of two small meshes of beams no growth is known.
+    assert {"shells, full: n$^{1.0}$", "beams, full"} <= set(legend)
+
+
 def test_lines_differ_in_grey_too(drawn):
     for name, figure in drawn.items():
         for axis in figure.axes:
@@ -122,7 +133,7 @@ def test_lines_differ_in_grey_too(drawn):
 def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, results):
     run = results["figures-2-4"].sel({"label": "pod", "start": "equilibrium", "output": "pitch"})
     shown = shown_outputs(results["figures-2-4"])
-    axis = drawn["figures-2-4-histories"].axes[len(shown) + shown.index("pitch")]
+    axis = drawn["figures-2-4-histories"].axes[len(shown) + 1 + shown.index("pitch")]
     marks = [line.get_ydata() for line in axis.lines if line.get_marker() == "<"]
     heights = [mark[0] for mark in marks if np.size(mark)]
     assert run["rms_error"].item() in heights

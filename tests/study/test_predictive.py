@@ -161,13 +161,24 @@ def test_a_second_run_computes_nothing_and_processes_change_nothing(
 
 
 def test_the_comparison_marks_the_winner_and_judges_it(done):
-    folder, study, _ = done
+    folder, study, dataset = done
     rows = study_comparison(study, folder)
     methods = rows[rows["kind"] == "method"].set_index("label")
     assert methods.index[methods["winner"].astype(bool)].tolist() == ["fixed basis"]
     assert np.isnan(methods.loc["replay", "ratio_equal"])
     assert methods.loc["newton 1e-6", "equal_rows"] == "newton 1e-6"
     assert methods.loc["newton 1e-6", "ratio_equal"] == 1.0
+    assert methods["chosen_settings"]["fixed basis"] == "rank=4"
+    part = dataset.sel(label="replay", scenario=dataset["scenario_set"] == "drawn")
+    part = part.sel(scenario=part["apart"] == "")
+    y = part["rms_error"].sel(output="spindle_y").values
+    angle = part["max_error"].sel(output="second_euler_angle").values
+    missed = (y > 7.57e-4) | (angle > 2.4e-4)
+    assert methods.loc["replay", "misses_at_ten"] == missed.sum()
+    found = methods.loc["replay", ["median_m", "worst_m", "median_deg", "worst_deg"]]
+    degrees = np.degrees(angle)
+    expected = [np.median(y), y.max(), np.median(degrees), degrees.max()]
+    np.testing.assert_allclose(found.tolist(), expected)
     full = methods[methods["role"] == "full order"]
     won = methods.loc["fixed basis"]
     assert won["ratio_within"] == full["seconds"].min() / won["seconds"]
@@ -175,7 +186,9 @@ def test_the_comparison_marks_the_winner_and_judges_it(done):
     # The times are real ones: this machine may be too busy to compare them.
     assert set(targets["verdict"]) <= {"met", "missed", "not_comparable"}
     assert {"undetected failures", "undetected failures outside"} <= set(targets["item"])
-    assert "newton 1e-6" in comparison_text("predictive", rows, folder)
+    text = comparison_text("predictive", rows, folder)
+    assert "newton 1e-6" in text
+    assert "fixed basis (chosen) rank=4" in text
     json.loads(rows.to_json(orient="records"))
 
 

@@ -11,7 +11,9 @@ import xarray as xr
 
 import vehiclemor as vm
 from vehiclemor.exceptions import FileError, InputError
-from vehiclemor.study.plans.choice import Validation, choose, outcomes, reasons
+from vehiclemor.study.evaluate import evaluate
+from vehiclemor.study.experiment import complete_settings, make_experiment
+from vehiclemor.study.plans.choice import Validation, choose, outcomes, reasons, scores
 from vehiclemor.study.plans.protocol import (
     _of_group,
     _sampled_run,
@@ -61,6 +63,14 @@ def test_a_study_that_extends_another_has_its_sets_and_the_rows_it_names(
     for old, new, words in (
         ("replay", "rerun", "unknown row of the extended study 'rerun'"),
         ("small.toml", "none.toml", "none.toml: no such file"),
+        (
+            'rows = ["replay", "newton"]\n        targets = []',
+            "",
+            (
+                "'newton 1e-12', a row of small.toml: rows is needed and must name its method, of "
+                "newton, replay, fixed basis"
+            ),
+        ),
         ("small.toml", "other.toml", "other.toml extends a study itself, or is a collection"),
     ):
         (tmp_path / "other.toml").write_text(more.replace(old, new, 1))
@@ -229,3 +239,11 @@ def test_the_best_candidate_that_is_stable_everywhere_is_chosen():
     assert choose([Validation(0.5, np.inf, 1.0), Validation(0.9, np.inf, 9.0)]) == 1
     # What leaves room to the bounds is chosen by its cost.
     assert choose([Validation(1.0, 0.1, 9.0), Validation(1.0, 0.49, 1.0)]) == 1
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_the_strongest_full_order_keeps_all_bounds_on_the_validation_runs(protocols, name):
+    protocol = protocols[name]
+    settings = complete_settings(protocol.model, "full_order", preset="strongest")
+    tested = protocol.model, "full_order", settings, (), protocol.sets["validation"], "errors"
+    assert scores(evaluate(make_experiment(*tested)), protocol.definition.bounds).max() <= 1.0

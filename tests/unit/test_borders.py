@@ -14,6 +14,7 @@ from vehiclemor.inputs.maneuver import Maneuver
 
 SUSPENSION, CAR = "double_wishbone", "independent_suspension_vehicle"
 STEER = vm.Signal.from_samples([0.0, 0.1, 0.2], [0.0, 0.01, 0.0], inputs=["delta"])
+TRUCK, LIMITS = "flexible_truck", (2**63, 5e-324, 0.0, np.nan, "1")
 MASKED = np.ma.array([1.0, 2.0], mask=[True, False])
 DATE = datetime.date(2020, 1, 1)
 NONE = (None, set(), range(0))
@@ -57,7 +58,7 @@ def trained(points):
         (simulated("maneuver"), [3, np.sin, "", "lane_change"], "maneuver"),
         (simulated("start"), ["", [0.0] * 8], "start"),
         (simulated("preset"), [["literal"], None], "unknown preset"),
-        (simulated("training"), [3, [], "nomnal", "sine_travl"], "training"),
+        (simulated("training"), [3, [], "nomnal", "sine_travl", range(10**12)], "training"),
         (simulated("training"), [["nominal", 3], "lane_change"], "maneuver"),
         (simulated("training"), [range(10**12)], "training is range"),
         (simulated("start"), ["n" * 10**5], "unknown start 'nnn"),
@@ -144,8 +145,12 @@ def trained(points):
         (vm.plot, ["none.nc"], "no such result"),
         (vm.rom, [[], {}, *WRONG], "unknown reduced model that ships"),
         (lambda v: vm.rom(CAR).rhs(vm.rom(CAR).state(), v), [1e308], "is not finite"),
+        (lambda v: vm.rom(CAR).rhs(vm.rom(CAR).state(), [0], v), [*NONE, np.nan, *WRONG], "time: "),
+        (lambda v: vm.rom(CAR).jacobian(vm.rom(CAR).state(), [0], time=v), ["0", *WRONG], "time: "),
+        (lambda v: vm.model(TRUCK).simulate(vm.road("C"), tolerance=v), LIMITS, "tolerance: "),
         (lambda v: vm.Signal.from_samples([0, 1], [0, 1], v), ["cubics", *WRONG], "unknown hold"),
         (lambda v: vm.Signal.from_samples([0, 1], [0, 1], output_step=v), [1e308], "above"),
+        (lambda v: vm.Signal.from_samples(v, [0, 1]), [range(10**12)], "not a number"),
         (lambda v: vm.Signal.from_samples([0, 1], [0, 1], name=v), [None, ""], "name is"),
         (lambda v: STEER.perturbed(amplitude=v), WRONG, "amplitude factor"),
         (lambda v: STEER.perturbed(frequency=v), [0.0, *WRONG], "frequency factor"),

@@ -1,6 +1,7 @@
 """Signals: piecewise polynomials through samples, wherever a maneuver is wanted."""
 
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,11 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, interp1d
 
 import vehiclemor as vm
-from vehiclemor.exceptions import VehiclemorError
+from vehiclemor.exceptions import InputError, VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.dynamic import DynamicModel
 
+PRESETS = "recommended", "strongest", "paper"
 GAPS = st.lists(st.floats(1e-3, 0.5), min_size=1, max_size=30)
 
 
@@ -62,6 +64,7 @@ def of_inputs(**given):
 
 
 TABLE = "time,delta\n0,1\n1,2\n"
+COMMAS = "time;delta\n0,5;90,0\n1,5;180,0\n"
 CAR = "independent_suspension_vehicle"
 BEYOND = vm.Signal.from_samples([0.0, 1.0], [0.0, 2.0])
 SQUARE = vm.Signal.from_samples([0.0, 1.0], np.eye(2))
@@ -81,27 +84,60 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: vm.many_signals([0.0, 0.1], [1.0, 2.0, 3.0]), r"t has shape \(2,\)"),
         (lambda: vm.many_signals([0, 1], [[0, 0], [0, np.inf]]), r"u\[1\] of run 1 is not finite"),
         (lambda: of_inputs(inputs=["s"]), "derivatives of s follow from a cubic hold alone"),
-        (lambda: of_inputs(inputs=["angle"]), "'angle', the model needs s, s_dot, s_ddot"),
+        (lambda: of_inputs(inputs=["angle"]), "needs s, s_dot, s_ddot: say which column"),
+        (lambda: vm.simulate(CAR, maneuver="log.csv"), "a CSV file is read by vm.Signal.from_csv"),
         (of_inputs, "1 columns without names"),
         (lambda: SQUARE.for_inputs(("s",)), "2 columns without names"),
         (lambda: vm.simulate(CAR, maneuver=BEYOND), r"input delta is 1\.08 rad at t = 0\.54 s"),
         (lambda: of_csv(None), "no such file"),
         (lambda: of_csv(""), "no CSV file"),
-        (lambda: of_csv("t,delta\n0,1\n1,2\n"), "no column 'time' among t, delta"),
-        (lambda: of_csv("time,delta\n0,1\n1,two\n"), "is not a number"),
+        (lambda: of_csv("t,delta\n0,1\n1,2\n"), "no column 'time': set time= to one of t, d"),
+        (lambda: of_csv("time,delta\n0,1\n1,two\n"), "'delta' holds 'two', not a number$"),
+        (lambda: of_csv(COMMAS, separator=";"), "'time' holds '0,5', not a number: is decimal=','"),
+        (lambda: of_csv(COMMAS), "is separator=';' with decimal=',' meant"),
+        (lambda: of_csv(TABLE, decimal=","), "separator and decimal are both ','"),
+        (lambda: of_csv(TABLE, ratio=0), "ratio is 0"),
+        (lambda: of_csv(TABLE, unit="degrees"), "unknown unit 'degrees'"),
         (lambda: of_csv("time,delta\n0,1,2\n1,2,3\n"), "no CSV file: .* in line 2"),
         (lambda: of_csv("time,delta\n0,1\n1,2,3\n"), "no CSV file"),
         (lambda: of_csv("time,a,a\n0,1,2\n1,2,3\n", inputs=["a"]), "columns have the same name"),
         (lambda: of_csv("time;delta\n0;1\n1;2\n"), "separator=';'"),
         (lambda: of_csv(TABLE, separator=3), "separator is 3"),
-        (lambda: of_csv(TABLE, inputs=["s"]), "no column 's' among time, delta"),
+        (lambda: of_csv(TABLE, inputs=["s"]), "no column 's': set inputs= to one of time, delta"),
         (lambda: of_csv(TABLE, inputs=3), "inputs is 3, not a list of names"),
         (lambda: of_csv(TABLE, inputs={"d": ["delta"]}), "not a list of names"),
+        *[(partial(BEYOND.at, t), "list of finite times") for t in (3.0, "t", [np.nan], [1j])],
+        *[(partial(SQUARE.for_inputs, n), "not a list of names") for n in (3, [["s"]], np.ones(2))],
+        (partial(vm.many_signals, [0, 2], [[0, 1]], output_step=1e-308), "step: 1e-308 s is below"),
     ],
 )
 def test_bad_samples_are_refused_in_one_line(call, told):
     with pytest.raises(VehiclemorError, match=told):
         call()
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero", "cubic"])
+def test_a_signal_ends_with_its_last_sample(car, hold):
+    t = np.linspace(0.0, 10.0, 101)
+    signal = vm.Signal.from_samples(t, 0.01 * np.sin(t), hold).perturbed(frequency=2.0)
+    np.testing.assert_array_equal(signal.at([5.0 + 1e-12, -1e-12]), signal.at([5.0, 0.0]))
+    for time in (-0.1, 5.1, 30.0):
+        with pytest.raises(InputError, match=f"lasts from 0 to 5 s: no inputs at {time:g} s"):
+            signal.at([1.0, time])
+    with pytest.raises(InputError, match="within the run, 0 to 5 s"):
+        car.simulate(signal, times=np.array([1.0, 5.1]))
+
+
+def test_an_unknown_argument_is_one_of_the_function_that_was_called():
+    with pytest.raises(TypeError, match="from_csv"):
+        of_csv(TABLE, comma=",")
+
+
+def test_a_log_is_scaled_and_prints_its_file_and_size():
+    signal = of_csv(COMMAS, separator=";", decimal=",", unit="deg", ratio=2.0)
+    np.testing.assert_allclose(signal.at(np.array([0.0, 1.0]))[:, 0], [np.pi / 4, np.pi / 2])
+    assert str(signal) == "signal 'log.csv' (1 s, 2 samples, linear hold; inputs delta)"
+    assert str(BEYOND) == "signal (1 s, 2 samples, linear hold; inputs in the model's order)"
 
 
 def straight(t: np.ndarray) -> np.ndarray:
@@ -157,6 +193,22 @@ def test_what_is_noisy_is_run_as_accurately_as_what_is_smooth(car, hold):
     found = car.simulate(signal, "equilibrium", solver="ros34pw2", tolerance=2e-3)
     place = car.outputs.index("lateral_position")
     assert np.abs(found.outputs - exact.outputs)[:, place].max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "duration"),
+    [("independent_suspension_vehicle", 300.0), ("high_fidelity_vehicle", 60.0)],
+)
+def test_a_log_may_be_long_and_noisy(name, duration):
+    t = np.arange(0.0, duration + 0.005, 0.01)
+    u = 0.002 * np.sin(0.5 * t) + 1e-4 * np.random.default_rng(3).normal(size=len(t))
+    full, shipped = vm.model(name), vm.rom(name)
+    log = vm.Signal.from_samples(t, u, "cubic", inputs=full.inputs[:1])
+    exact = full.simulate(log, outputs=["yaw"])
+    for car in (shipped, *(vm.reduce(full, "full_order", preset=p) for p in PRESETS)):
+        run = car.simulate(log, outputs=["yaw"])
+        assert run.status in ("ok", "untrusted"), run.message
+        assert np.abs(run["yaw"] - exact["yaw"]).max() < 0.02
 
 
 @pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4", "exponential_adams", "rodas4"])

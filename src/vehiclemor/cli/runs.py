@@ -2,7 +2,7 @@
 
 import inspect
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -22,6 +22,7 @@ from vehiclemor.cli.options import (
 )
 from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.export import STEP, FileTarget, destination, name_of
+from vehiclemor.report.labels import Kind
 from vehiclemor.report.printing import wrapped
 
 # Method that stands for the model that ships.
@@ -34,6 +35,7 @@ def simulate(
     method: str = "full_order",
     settings: Settings = None,
     maneuver: str | None = None,
+    csv: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     frequency: float = 1.0,
     amplitude: float = 1.0,
     start: str | None = None,
@@ -57,7 +59,11 @@ def simulate(
     method
         Registered name.
     maneuver
-        Registered name; the model's own by default.
+        Registered name, or a CSV file of a log; the model's own by default.
+    csv
+        key=value, once or several: how to read a CSV file. INPUT=COLUMN says which column is an
+        input; time=COLUMN, unit=deg (or mm), ratio=16 (steering wheel to wheels), hold=cubic,
+        separator=; and decimal=, are the words of vm.Signal.from_csv.
     frequency
         Factor on the input's frequency.
     amplitude
@@ -87,7 +93,7 @@ def simulate(
     if out is not None:
         result_file("--out", out)
     ready = vm.model(model, key_values("--parameter", parameter), parameter_file)
-    how: dict[str, Any] = {"maneuver": maneuver, "start": start, "preset": preset}
+    how: dict[str, Any] = {"maneuver": _maneuver(maneuver, csv), "start": start, "preset": preset}
     how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
     dataset = vm.simulate(ready, method, **how, **chosen)
     from vehiclemor.netcdf_file import write_dataset
@@ -105,8 +111,21 @@ def simulate(
     if animate:
         print(f"written: {vm.animate(dataset, out=animate)}")
     if out is None and picture is None and animate is None:
-        print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
+        print("nothing is saved: --out FILE.nc saves the result, --plot draws it")
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
+
+
+def _maneuver(name: str | None, csv: list[str] | None) -> str | vm.Signal | None:
+    """A registered name, or the signal of a CSV file."""
+    options = key_values("--csv", csv)
+    if name and Path(name).suffix.lower() == ".csv":
+        words = inspect.signature(vm.Signal.from_csv).parameters.keys() - {"path"}
+        columns = {key: str(options.pop(key)) for key in options.keys() - words}
+        how: dict[str, Any] = {"inputs": columns, **options}
+        return vm.Signal.from_csv(name, **how)
+    if options:
+        raise InputError("--csv is for a log: --maneuver FILE.csv")
+    return name
 
 
 def _picture(plot: list[Path] | None, usual: str) -> Path | None:
@@ -121,7 +140,7 @@ def _picture(plot: list[Path] | None, usual: str) -> Path | None:
 def plot(
     result: str,
     *,
-    kind: Literal["histories", "paths", "errors"] = "histories",
+    kind: Kind = "histories",
     select: list[str] | None = None,
     out: Path | None = None,
     animate: Path | None = None,
@@ -141,22 +160,32 @@ def plot(
     out
         Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
     animate
-        GIF file for a film of the moving vehicle, in place of a picture.
+        GIF file for a film of the moving vehicle; with --out a picture too.
     """
     if animate is not None:
         new_file("--animate", animate, (".gif",))
-    picture = animate or picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
+    picture = None
+    if out is not None or animate is None:
+        picture = picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
     from vehiclemor.report.figures.result_plot import plot_result
-    from vehiclemor.report.result_selection import drawn, stored_result
+    from vehiclemor.report.result_selection import select_point, stored_result
 
-    dataset, point = drawn(stored_result(result, results), kind, key_values("--select", select))
-    if animate:
-        vm.animate(dataset, out=animate)
-    else:
+    stored, chosen = stored_result(result, results), key_values("--select", select)
+    if picture is not None:
+        dataset, point = select_point(stored, kind, chosen)
         plot_result(dataset, picture, kind)
+        _print_point(point)
+        print(f"written: {picture}")
+    if animate is not None:
+        dataset, point = select_point(stored, "histories", chosen)
+        film = vm.animate(dataset, out=animate)
+        _print_point(point)
+        print(f"written: {film}")
+
+
+def _print_point(point: str) -> None:
     if point:
         print(wrapped(f"at {point}; --select dimension=value draws another point", 0, 2))
-    print(f"written: {picture}")
 
 
 def export(

@@ -118,7 +118,7 @@ def compare(
 
 def figures(
     *,
-    only: str | None = None,
+    only: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
     out: Path | None = None,
     results: Results = RESULTS,
     jobs: Jobs = 1,
@@ -130,9 +130,9 @@ def figures(
     Parameters
     ----------
     only
-        Names, separated by commas: a study, collection or protocol by name or TOML file, of which
-        is drawn what its dimensions ask for; or histories-, errors-, map- or pareto- and the name
-        of a model.  The studies of the paper by default.
+        One or several: a study, collection or protocol by name or TOML file, of which is drawn
+        what its dimensions ask for; or histories-, errors-, map- or pareto- and the name of a
+        model.  The studies of the paper by default.
     out
         Folder of the figures; by default `figures` in the results folder.
     style
@@ -140,12 +140,11 @@ def figures(
     dpi
         Dots an inch of PNG files; 200 by default.
     """
-    chosen = [name.strip() for name in (only or "").split(",") if name.strip()]
-    if only is not None and not chosen:
-        raise InputError(f"--only {only!r} names no figure")
+    if only is not None and not only:
+        raise InputError("--only names no figure")
     failed: dict[str, str] = {}
     with shown_progress():
-        written = vm.figures(chosen, out, results, jobs, style=style, dpi=dpi, failed=failed)
+        written = vm.figures(only or (), out, results, jobs, style=style, dpi=dpi, failed=failed)
     for path in written:
         print(path)
     for name, why in failed.items():

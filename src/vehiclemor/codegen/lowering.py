@@ -137,6 +137,8 @@ class _Lowering(Listing):
                 return self._power(expression.base, expression.exp)
             case sp.Piecewise():
                 return self._choice(expression.args)
+            case sp.Max() | sp.Min():
+                return self._extreme(expression)
             case sp.Expr() if expression.is_number and not expression.args:
                 return self.number(float(expression))
         name = getattr(expression, "rel_op", type(expression).__name__)
@@ -198,8 +200,31 @@ class _Lowering(Listing):
             return self.value(expression)
         if not others:
             raise ValueError(f"{condition}: what holds otherwise?")
+        if isinstance(condition, sp.And | sp.Or | sp.Not):
+            sides = self.let(self.value(expression)), self.let(self._choice(others))
+            return self._branch(condition, *sides)
         test = self.value(condition)
         return self.new("select", test, self.value(expression), self._choice(others))
+
+    def _branch(self, condition: Any, then: Value, other: Value) -> Value:
+        """One value where a condition holds, else the other."""
+        if isinstance(condition, sp.Not):
+            return self._branch(condition.args[0], other, then)
+        if not isinstance(condition, sp.And | sp.Or):
+            return self.new("select", self.value(condition), then, other)
+        first, *rest = condition.args
+        of_rest = self.let(self._branch(condition.func(*rest), then, other))
+        if isinstance(condition, sp.And):
+            return self._branch(first, of_rest, other)
+        return self._branch(first, then, of_rest)
+
+    def _extreme(self, expression: sp.Max | sp.Min) -> Value:
+        """The largest or smallest argument; where 0 and x are equal, x alone changes Max(0, x)."""
+        kind = ">" if isinstance(expression, sp.Max) else "<="
+        one, *others = (self.let(self.value(argument)) for argument in expression.args)
+        for other in others:
+            one = self.let(self.new("select", self.new(kind, one, other), one, other))
+        return one
 
 
 @dataclass(frozen=True)

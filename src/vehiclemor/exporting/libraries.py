@@ -102,7 +102,7 @@ def sympy_expressions(system: ExportedSystem) -> Expressions:
         array: [sp.Symbol(q.name, real=True) for q in listed]
         for array, listed in quantities.items()
     }
-    functions = _functions(sp, OF_SYMPY)
+    functions = _functions(sp, OF_SYMPY) | {"==": sp.Eq, "!=": sp.Ne}
     functions["select"] = lambda test, then, other: sp.Piecewise((then, test), (other, True))
     assignments: list[tuple[sp.Symbol, sp.Expr]] = []
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -104,8 +105,8 @@ class Maneuver(ShortRepr):
         return tuple(times.tolist())
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Inputs (n, number of inputs) at the given times (n,) in s."""
-        times = np.asarray(times, dtype=float)
+        """Inputs (n, number of inputs) at times (n,) in s."""
+        times = checked_times(times)
         with blamed(f"{self}: signal", self.signal):
             values = self.signal(times, self.frequency_factor, self.amplitude_factor)
             values = real_array(values)
@@ -123,6 +124,17 @@ class Maneuver(ShortRepr):
     def for_inputs(self, names: tuple[str, ...]) -> "Maneuver":  # noqa: ARG002
         """The maneuver as a model with these inputs takes it."""
         return self
+
+
+def checked_times(times: Any) -> np.ndarray:
+    """Finite times (n,) in s, or `InputError`."""
+    try:
+        array = real_array(times)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    if array.ndim != 1 or not np.isfinite(array).all():
+        raise InputError(f"times are {quoted(times)}, not a list of finite times in s")
+    return array
 
 
 def checked_factor(name: str, value: object) -> float:

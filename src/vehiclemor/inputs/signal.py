@@ -10,11 +10,25 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
+from vehiclemor.arguments import file_path, line_of_text, number, within
 from vehiclemor.codegen.loops import Loop, loops
-from vehiclemor.exceptions import InputError, blamed, one_line
-from vehiclemor.inputs.columns import csv_samples, listed
-from vehiclemor.inputs.maneuver import LONGEST_DURATION, MOST_SAMPLES, Maneuver, checked_factor
+from vehiclemor.exceptions import InputError, blamed
+from vehiclemor.inputs.columns import (
+    column_names,
+    csv_samples,
+    derivative_order,
+    integral_of,
+    listed,
+    sample_arrays,
+    unit_factor,
+)
+from vehiclemor.inputs.maneuver import (
+    LONGEST_DURATION,
+    MOST_SAMPLES,
+    Maneuver,
+    checked_factor,
+    checked_times,
+)
 from vehiclemor.inputs.polynomial_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
 from vehiclemor.registry import choice
 
@@ -28,8 +42,9 @@ FUNCTION_STEP = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Signal(Maneuver):
-    """Inputs through samples, from the first to the last; made by `from_samples` and its kin.
+    """Inputs through samples, made by `from_samples` and its kin.
 
+    It ends with the last sample, whatever the hold: later inputs are refused, not extrapolated.
     `perturbed` scales its time, so its duration, and its values.  Inputs are the names of those
     that are given, empty if they are all of a model's, in its order; `hold` is what lies between
     samples, `pieces` the polynomials for factors of 1, `kept` what is made of it when it is run.
@@ -45,6 +60,11 @@ class Signal(Maneuver):
     def __getstate__(self) -> dict[str, Any]:
         """What a copy takes along: addresses are its own."""
         return super().__getstate__() | {"kept": {}}
+
+    def __str__(self) -> str:
+        name = "signal" if self.name == "signal" else f"signal {self.name!r}"
+        inputs = ", ".join(self.inputs) or "in the model's order"
+        return f"{name} ({self.duration:.6g} s, {self.summary}; inputs {inputs})"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Signal) and self._identity == other._identity
@@ -91,7 +111,7 @@ class Signal(Maneuver):
         InputError
             If times don't increase, a value isn't finite, or shapes don't fit.
         """
-        times, values = _arrays(t, u)
+        times, values = sample_arrays(t, u)
         how: dict[str, Any] = {"inputs": inputs, "output_step": output_step, "name": name}
         return many_signals(times, values[None], hold, **how)[0]
 
@@ -103,7 +123,9 @@ class Signal(Maneuver):
             return self.pieces
         if "polynomials" not in self.kept:
             inputs = self.pieces.coefficients.shape[1]
-            orders = np.array([_order(name, self.inputs) for name in self.inputs] or [0] * inputs)
+            orders = np.array(
+                [derivative_order(name, self.inputs) for name in self.inputs] or [0] * inputs
+            )
             amplitudes = amplitude * frequency**orders
             self.kept["polynomials"] = self.pieces._replace(
                 edges=self.pieces.edges / frequency,
@@ -118,8 +140,14 @@ class Signal(Maneuver):
         return tuple(self.polynomials.edges[1:-1].tolist())
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Inputs (n, number of inputs) at the given times (n,) in s."""
-        return at(self.polynomials, np.asarray(times, dtype=float))
+        """Inputs (n, number of inputs) at times (n,) in s; `InputError` beyond the samples."""
+        times = checked_times(times)
+        within_run = times.clip(0.0, self.duration)
+        beyond = np.abs(times - within_run) > 1e-9 * self.duration
+        if beyond.any():
+            late = times[beyond][0]
+            raise InputError(f"{self} lasts from 0 to {self.duration:g} s: no inputs at {late:g} s")
+        return at(self.polynomials, within_run)
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
         """The signal with its factors set: so much faster and shorter, so many times as large."""
@@ -137,6 +165,7 @@ class Signal(Maneuver):
 
     def for_inputs(self, names: tuple[str, ...]) -> Signal:
         """The signal with all inputs of a model, in its order; `InputError` if they don't fit."""
+        names = listed(names)
         if self.inputs == names:
             return self
         if names not in self.kept:
@@ -154,7 +183,10 @@ class Signal(Maneuver):
             )
         for name in self.inputs:
             if name not in names:
-                raise InputError(f"{self} gives input {name!r}, the model needs {needed}")
+                raise InputError(
+                    f"{self} gives input {name!r}, the model needs {needed}: "
+                    f"say which column is which input"
+                )
         coefficients = np.stack([self._column(name) for name in names], axis=1)
         pieces = self.pieces._replace(coefficients=coefficients)
         return replace(self, inputs=names, pieces=pieces, kept={})
@@ -163,7 +195,7 @@ class Signal(Maneuver):
         """Polynomials (pieces, 6) of an input, at factors of 1."""
         pieces, order = self.pieces, 0
         while name not in self.inputs:
-            lower = _integral(name)
+            lower = integral_of(name)
             if not lower:
                 return np.zeros_like(pieces.coefficients[:, 0])
             name, order = lower, order + 1
@@ -208,24 +240,38 @@ class Signal(Maneuver):
         hold: str = "linear",
         *,
         separator: str = ",",
+        decimal: str = ".",
         time: str = "time",
         inputs: str | Sequence[str] | Mapping[str, str] = (),
-        **further: Any,
+        unit: str = "SI",
+        ratio: float = 1.0,
+        output_step: float = OUTPUT_STEP,
+        name: str = "",
     ) -> Signal:
         """A signal through the rows of a CSV file, whose first line names its columns.
 
         Parameters
         ----------
-        separator, time
-            Character between columns; column of the times in s.
+        separator, decimal
+            Character between columns, and before decimals.
+        time
+            Column of the times in s.
         inputs
             Columns to take, or input -> column where they have other names; all by default.
-        **further
-            As of `from_samples`.
+        unit
+            Of these columns: `SI`, `deg` or `mm`.
+        ratio
+            Divides them, as a steering ratio does the angle of a steering wheel.
+        hold, output_step, name
+            As of `from_samples`; the name is that of the file by default.
         """
         path = file_path("path", path)
-        times, values, names = csv_samples(path, separator, time, inputs)
-        return cls.from_samples(times, values, hold, inputs=names, **further)
+        scale = unit_factor(unit, ratio)
+        times, values, names = csv_samples(path, separator, decimal, time, inputs)
+        name = name or path.name
+        return cls.from_samples(
+            times, scale * values, hold, inputs=names, output_step=output_step, name=name
+        )
 
 
 def many_signals(
@@ -247,7 +293,7 @@ def many_signals(
         See `Signal.from_samples`.
     """
     choice("hold", hold, HOLDS)
-    times, values = _arrays(t, u)
+    times, values = sample_arrays(t, u)
     if times.ndim != 1 or values.ndim not in (2, 3) or values.shape[1] != len(times):
         raise InputError(
             f"samples of a signal: t has shape {times.shape} and u {values.shape[1:]} in a run, "
@@ -257,7 +303,7 @@ def many_signals(
         raise InputError(f"a signal needs two samples at least, not {len(times)}")
     within("number of samples", len(times), (2, MOST_SAMPLES))
     times, values = times - times[0], values.reshape(*values.shape[:2], -1)
-    names = _names(inputs, values.shape[2])
+    names = column_names(inputs, values.shape[2])
     if not line_of_text("name", name):
         raise InputError("name is empty")
     every = through(times, np.ascontiguousarray(values), hold)
@@ -271,42 +317,12 @@ def _unused(*_: Any) -> Any:
     raise NotImplementedError("a signal is evaluated by its polynomials, which have its corners")
 
 
-def _arrays(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
-    try:
-        return real_array(t), real_array(u)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"samples of a signal: {one_line(error)}") from None
-
-
-def _names(inputs: Any, columns: int) -> tuple[str, ...]:
-    """Names of the columns, or none."""
-    names = listed(inputs)
-    if len(set(names)) < len(names) or len(names) not in (0, columns):
-        raise InputError(f"a signal of {columns} columns can't be named {quoted(names)}")
-    return names
-
-
 def _output_samples(duration: float, step: Any) -> int:
     """Number of times about so many seconds apart."""
     if number("step", step) <= 0.0:
         raise InputError(f"step: {step:g} s is not positive")
-    within("step", step, (0.0, LONGEST_DURATION), " s")
-    samples = max(round(duration / step), 1) + 1
-    return int(within("number of samples", samples, (2, MOST_SAMPLES)))
-
-
-def _integral(name: str) -> str:
-    """Name of the input whose derivative an input is by its own name, if it is one."""
-    base, dot, order = name.rpartition("_")
-    if order == "ddot":
-        return f"{base}_dot"
-    return base if dot and order == "dot" else ""
-
-
-def _order(name: str, inputs: Sequence[str]) -> int:
-    """How often one of the inputs has been derived from the lowest of them."""
-    lower = _integral(name)
-    return 1 + _order(lower, inputs) if lower in inputs else 0
+    within("step", step, (duration / (MOST_SAMPLES - 1), LONGEST_DURATION), " s")
+    return max(round(duration / step), 1) + 1
 
 
 @cache

@@ -17,6 +17,7 @@ from vehiclemor.arguments import line_of_text, quoted
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.settings import Settings, Value
+from vehiclemor.reduction.trust import InputRange, band_range
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
@@ -92,6 +93,14 @@ class FittedModel(Protocol):
         ...
 
 
+def lower_rank(settings: Mapping[str, Any], reduced: FittedModel) -> str:
+    """That a model has a lower rank than its settings ask for; empty if it has not."""
+    rank = settings.get("rank", 0)
+    if reduced.order >= rank:
+        return ""
+    return f"effective rank {reduced.order}, where {rank} is asked for: training has no more"
+
+
 def simulated(
     reduced: FittedModel, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None
 ) -> Trajectory:
@@ -141,11 +150,14 @@ class Method(ShortRepr):
     refusal
         Model of such a kind -> why the method can't reduce it all the same; empty if it can.
     learns_from
-        What `fit` looks at: `runs` of the model that it reduces; of runs the `inputs` at most, so
-        that nothing is learnt of the model's parameters.
+        What `fit` reads of the training: its `runs`, which are of the model that it reduces; their
+        `inputs` alone; or `nothing`.
     own_limits
         Whether its runs have a trust indicator of their own, or it knows no bounds; else a run
-        beyond the inputs of the training runs is not trusted.
+        beyond the inputs that `fit` has read is not trusted.
+    band
+        Name of the setting up to whose frequency in Hz a structure's inputs are known, of a method
+        that reads nothing.
     follows_time
         Whether what it fits belongs to the times of the training runs, as a basis for each control
         period does: then a run is known where its inputs are those of a training run.
@@ -170,8 +182,9 @@ class Method(ShortRepr):
     reference: str = ""
     refusal: Callable[[Any], str] = never_refused
     check: Callable[[Any, Any], None] = fits_all
-    learns_from: Literal["runs", "inputs"] = "runs"
+    learns_from: Literal["runs", "inputs", "nothing"] = "runs"
     own_limits: bool = False
+    band: str = ""
     follows_time: bool = False
     fits_others: bool = False
     presets: Mapping[str, Presets] = field(default_factory=dict)
@@ -185,6 +198,7 @@ class Method(ShortRepr):
             raise InputError(f"method {self.name!r}: packages are a tuple of names, not a text")
         for name in self.packages:
             line_of_text(f"method {self.name!r}: packages", name)
+        choice(f"learns_from of {self.name!r}", self.learns_from, ("runs", "inputs", "nothing"))
         for name in ("fit", "refusal", "check"):
             if not callable(getattr(self, name)):
                 raise InputError(f"method {self.name!r}: {name} is not a function")
@@ -212,6 +226,16 @@ class Method(ShortRepr):
         if not isinstance(reason, str):
             reason = f"method {self.name!r}: refusal gives {quoted(reason)}, not text"
         return not reason, reason
+
+    def known_range(
+        self, model: Model, settings: Mapping[str, Any], trained: Callable[[], InputRange | None]
+    ) -> InputRange | None:
+        """Inputs that are known, where runs have no trust of their own; none where all are."""
+        if self.own_limits:
+            return None
+        if self.learns_from != "nothing":
+            return trained()
+        return band_range(model, settings[self.band]) if self.band in settings else None
 
     def presets_of(self, kind: str) -> Presets:
         """Presets for models of a kind: name -> values that differ from the defaults."""

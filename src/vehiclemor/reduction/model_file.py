@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -20,10 +20,12 @@ import numpy as np
 from vehiclemor.arguments import file_path, flag, quoted
 from vehiclemor.exceptions import FileError, InputError, VehiclemorError, one_line
 from vehiclemor.files import replaceable
+from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.netcdf_file import INTEGRITY, is_saved_model, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.parts import Reader, Writer
+from vehiclemor.reduction.training import training_summary
 from vehiclemor.reduction.trust import BANDS, InputRange
 from vehiclemor.reduction.validation import checked_fit, checked_settings, validated
 from vehiclemor.registry import component
@@ -114,6 +116,14 @@ def read(path: Any) -> dict[str, Any]:
         raise _unfit(path, one_line(error)) from None
     except (SyntaxError, ValueError, VehiclemorError) as error:
         raise _unfit(path, str(error)) from None
+
+
+def training_of(path: Path, inputs: Sequence[Quantity]) -> dict[str, str]:
+    """Method of a file and what it was trained on, without the model being built."""
+    stored, attrs = content(path)
+    method, runs = str(attrs["method"]), json.loads(stored["training"])
+    covered = training_summary(method, runs, stored["input_range.largest"], inputs)
+    return {"method": method} | covered
 
 
 def _parsed(text: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,15 +15,16 @@ from vehiclemor.arguments import number, real_array
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction import model_file
-from vehiclemor.reduction.interface import FittedModel, simulated
+from vehiclemor.reduction.interface import FittedModel, Method, lower_rank, simulated
 from vehiclemor.reduction.settings import Value
-from vehiclemor.reduction.training import own_speed
+from vehiclemor.reduction.training import own_speed, training_summary
 from vehiclemor.reduction.trust import InputRange
 from vehiclemor.reduction.validation import for_model, validated
 from vehiclemor.registry import choice, component
 from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, checked_array, checked_path
+from vehiclemor.simulation.linear_model import LinearModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
 from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, output_names
@@ -44,8 +46,8 @@ class ReducedOrderModel(ShortRepr):
     reduced
         What the method's fit gave.
     input_range
-        Range of the inputs of its training, in which a run is known whose model has no ranges of
-        its own; none where it has learnt from nothing.
+        Range of the inputs of its training, in which a run is known whose model has learnt from
+        them and has no ranges of its own.
     """
 
     repr_fields = ("model", "method", "settings", "states", "inputs", "output_names")
@@ -56,6 +58,21 @@ class ReducedOrderModel(ShortRepr):
     training: tuple[Any, ...]
     reduced: FittedModel
     input_range: InputRange | None = None
+
+    def __str__(self) -> str:
+        lines = [f"{self._name}, order {self.reduced.order}"]
+        if self._lower_rank:
+            lines.append(self._lower_rank)
+        if self.input_range is not None:
+            runs = self.__getstate__()["training"]
+            sizes, inputs = self.input_range.largest, self.model.definition.inputs
+            covered = training_summary(self.method, runs, sizes, inputs)
+            lines += [f"{name}: {text}" for name, text in covered.items()]
+        return "\n  ".join(lines)
+
+    @cached_property
+    def _lower_rank(self) -> str:
+        return lower_rank(self.settings, self.reduced)
 
     @cached_property
     def states(self) -> tuple[str, ...]:
@@ -110,6 +127,10 @@ class ReducedOrderModel(ShortRepr):
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
             run = simulated(self.reduced, chosen, begun, names)
+        # A copy would take a twentieth of a short run.
+        run.__dict__["method"] = self.method
+        if self._lower_rank:
+            run.__dict__["remark"] = "; ".join(filter(None, (run.remark, self._lower_rank)))
         if not run.trust and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
         return run if times is None else run.chosen(times=times)
@@ -135,8 +156,9 @@ class ReducedOrderModel(ShortRepr):
 
     @cached_property
     def _range(self) -> InputRange | None:
-        """Inputs of the training, if the method has no ranges of its own."""
-        return None if component("method", self.method).own_limits else self.input_range
+        """Inputs that are known, if the method has no ranges of its own."""
+        method: Method = component("method", self.method)
+        return method.known_range(self.model, self.settings, lambda: self.input_range)
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""
@@ -186,13 +208,13 @@ class ReducedOrderModel(ShortRepr):
             If the equations can't be solved.
         """
         check_positive("dt", dt, SHORTEST)
-        number("time", time)
+        time = _finite(time)
         ends = None if next_inputs is None else self._inputs(next_inputs, "next_inputs")
         return self._stepped.step(self._state(state), self._inputs(inputs), dt, time, ends)
 
     def rhs(self, state: Any, inputs: Any, time: float = 0.0) -> np.ndarray:
         """Time derivative (dim,) of a state; `InputError` if it isn't finite."""
-        rates = self._stepped.rates(self._state(state), self._inputs(inputs), time)
+        rates = self._stepped.rates(self._state(state), self._inputs(inputs), _finite(time))
         if not np.isfinite(rates).all():
             raise InputError(f"the derivative of {self._name} is not finite at this state")
         return rates
@@ -222,8 +244,15 @@ class ReducedOrderModel(ShortRepr):
         InputError
             If an argument is wrong, or the model has no such derivatives.
         """
-        u = self._inputs(inputs)
-        return self._stepped.sensitivities(self._state(state), u, time, with_respect_to, of)
+        x, u = self._state(state), self._inputs(inputs)
+        return self._stepped.sensitivities(x, u, _finite(time), with_respect_to, of)
+
+    def linearise(self, state: Any = None, inputs: Any = None) -> LinearModel:
+        """Linear model at a state, that of the first start by default, and inputs, 0 by default."""
+        u = self._inputs([0.0] * len(self.inputs) if inputs is None else inputs)
+        x = self.state(None, u) if state is None else self._state(state)
+        point = x, u, self.rhs(x, u), self.outputs(x, u)
+        return LinearModel.of(self, self.states, point)
 
     def full_state(self, state: Any, inputs: Any) -> np.ndarray:
         """State (n,) of the full model, or states (samples, n) of as many."""
@@ -316,6 +345,11 @@ class ReducedOrderModel(ShortRepr):
     @cached_property
     def _name(self) -> str:
         return f"{self.model.name} by {self.method}"
+
+
+def _finite(time: Any) -> float:
+    """A time in s; `InputError` if it is none."""
+    return time if type(time) is float and math.isfinite(time) else number("time", time)
 
 
 def load(path: Any) -> ReducedOrderModel:

@@ -60,12 +60,18 @@ def ranges_of(
 def trust_in(ranges: Mapping[str, tuple[float, float]]) -> Trust:
     """Trust of a run, from how much it uses of each range and since when (s) it is beyond it."""
     indicator = max((used for used, _ in ranges.values()), default=0.0)
-    name, (_, until) = min(ranges.items(), key=lambda item: item[1][1], default=("", (0.0, np.inf)))
+    name, (used, until) = min(
+        ranges.items(), key=lambda item: item[1][1], default=("", (0.0, np.inf))
+    )
     if until == np.inf:
         return Trust(indicator)
+    return Trust(indicator, until, by_factor(f"{name} leaves its known range", used))
+
+
+def by_factor(reason: str, factor: float) -> str:
+    """A reason with how many times the range of training is used."""
     # Of what was zero in training no multiple tells anything.
-    times = f", in the run up to {indicator:.3g} times" if indicator < 1e6 else ""
-    return Trust(indicator, until, f"{name} is beyond its known range{times}")
+    return f"{reason} by a factor of {factor:.3g}" if factor < 1e6 else reason
 
 
 def largest_samples(maneuvers: Sequence[Maneuver]) -> np.ndarray:
@@ -148,7 +154,7 @@ class InputRange:
         lasts = maneuver.duration / self.longest
         ranges["duration"] = lasts, self.longest if lasts > 1.0 else np.inf
         if self.histories is not None:
-            ranges["difference from the inputs of training runs"] = self._unlike(maneuver)
+            ranges["history of the inputs"] = self._unlike(maneuver)
         return trust_in(ranges)
 
     def _extents(self, names: Sequence[str], maneuver: Maneuver) -> dict[str, tuple[float, float]]:
@@ -216,3 +222,10 @@ def input_range(
     )
     lasts = np.inf if model.kind == "ae" and not follows_time else EDGE * longest
     return InputRange(largest_of(maneuvers), middle, reach, lasts, histories)
+
+
+def band_range(model: Model, highest: float) -> InputRange:
+    """Range of a structure's inputs of which all is known up to so many Hz, without training."""
+    shares = np.where(np.array(BANDS[:-1]) < highest, np.inf, EDGE * QUIET)
+    largest = np.tile(np.append(np.inf, shares)[:, None], len(model.inputs))
+    return InputRange(largest, 0.0, np.inf, np.inf)

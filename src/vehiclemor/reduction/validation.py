@@ -77,7 +77,7 @@ def fitted(
 def for_model(method: Method, reduced: FittedModel, model: Model, settings: Any) -> FittedModel:
     """What a method gives of a model with other parameters; `InputError` if it learns from runs."""
     remade, own = getattr(reduced, "for_model", None), getattr(reduced, "model", model)
-    if method.learns_from != "inputs" and (remade is None or difference(own, model)):
+    if method.learns_from == "runs" and (remade is None or difference(own, model)):
         raise InputError(
             f"{method.name} is trained on runs of one model: reduce that with the other parameters"
         )

@@ -11,6 +11,8 @@ from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path
 from vehiclemor.reduction.interface import never_refused
+from vehiclemor.reduction.model_file import training_of
+from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build_derived
@@ -68,6 +70,9 @@ def _model(
         starts = [DESIGN_START]
     else:
         starts = [UNKNOWN] if definition.solved else list(definition.starts(parameters.values()))
+    shipped, file = {}, shipped_folder() / f"{name}.nc"
+    if file.exists():
+        shipped["reduced model that ships"] = training_of(file, definition.inputs)
     declared = zip(definition.parameters.items(), parameters.entries.values(), strict=True)
     return {
         "model": name,
@@ -77,6 +82,7 @@ def _model(
         "starts": starts,
         "methods": [method for method, answer in accepted.items() if answer == "yes"],
         f"methods that may fit ({UNKNOWN})": [m for m, a in accepted.items() if a == "?"],
+        **shipped,
         **{kind: _quantities(getattr(definition, kind)) for kind in QUANTITIES},
         "parameter file": str(path),
         "parameters": [

@@ -75,7 +75,8 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     `runs` are different ones; `failures` says how those that have `failed` ended, `reason` why.  Of
     those that have ended there are `median` and `largest` RMS errors over the grid, and at the
     place of the largest that of the best approximation (`floor`).  Seconds (of the compiled loop)
-    and evaluations are medians.
+    and evaluations are medians.  `saturates_at` is the largest rank that the training allows, where
+    more is asked for; else 0.
     """
     attributes = {key: str(dataset.attrs[key]) for key in ("study", "title", "model", "training")}
     head = {"kind": ERRORS, **attributes, "grid": _grid_text(dataset)}
@@ -83,18 +84,34 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     extended = dataset.assign(trained=trained_runs(dataset), evaluations=dataset[count])
     kept = ["rms_error", "floor_rms_error", "cell_key", "status", "message"]
     runs: Any = frame(extended, [*kept, *MEDIANS, "effective_rank", "warned", "trained"])
+    saturated = saturated_ranks(dataset)
     rows: list[dict[str, Any]] = []
     for start, label in itertools.product(dataset["start"].values, dataset["label"].values):
         own = runs[(runs["start"] == start) & (runs["label"] == label)]
         # Points of the grid that a method does not depend on are one run.
         own = own.drop_duplicates("cell_key")
         place = head | {"start": str(start), "label": str(label)} | _counts(own)
+        place["saturates_at"] = saturated.get(str(label), 0)
         varied = [str(d) for d in dataset["status"].dims if len(set(own[d])) > 1]
         ended = own[own["status"].isin(FINISHED)]
         for output, unit in dataset["output_unit"].to_series().items():
             about = {"output": str(output), "unit": unit}
             rows.append(place | about | _errors(ended, str(output), varied))
     return rows
+
+
+def saturated_ranks(dataset: xr.Dataset) -> dict[str, int]:
+    """Label -> largest rank of its runs, where the grid asks for more than the training has."""
+    wanted = ["effective_rank", "cell_key", "status"]
+    if not {"rank", *wanted} <= set(dataset.variables) or "rank" not in dataset["status"].dims:
+        return {}
+    # A method that has no rank is one run at all ranks.
+    runs: Any = frame(dataset, wanted).drop_duplicates(["label", "cell_key"])
+    runs = runs[runs["status"].isin(FINISHED)]
+    ranks = runs.groupby("label", sort=False)["rank"].agg(["min", "max"])
+    reached = runs.groupby("label", sort=False)["effective_rank"].max()
+    less = reached[(ranks["min"] < ranks["max"]) & (reached < ranks["max"])]
+    return {str(label): int(rank) for label, rank in less.items()}
 
 
 def _counts(runs: Any) -> dict[str, Any]:

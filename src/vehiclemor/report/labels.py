@@ -6,8 +6,9 @@ gets rows by its kind of equations.
 
 from __future__ import annotations
 
+import re
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -19,12 +20,15 @@ from vehiclemor.toml_files import FileSchema, Line, read_toml
 if TYPE_CHECKING:
     import xarray as xr
 
+# What is drawn of a run, or of a point of a grid.
+Kind = Literal["histories", "paths", "errors"]
 # What is said of a run that was in its own training, and the mark of it in a legend.
 TRAINED, MARK = "trained on this run", "*"
 # Letters of an axis' label that leave no room for more beside them; of one beside a low panel.
 LONG, LONGEST = 16, 26
+EXPONENT = re.compile(r"\^(-?\d+(?:\.\d+)?)")
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
-# Format of errors: an exact zero is a dash, since orders of magnitude are compared.
+# Format of errors: an exact zero is 0, since orders of magnitude are compared.
 ERROR = ".1e"
 MOST_PRINTED = 3
 LARGEST_DEFAULT_RANK = 3
@@ -40,6 +44,15 @@ class Label(NamedTuple):
     short: str
 
 
+class MethodLook(NamedTuple):
+    """How a method is called and drawn; dashes are lengths of lines and gaps in line widths."""
+
+    words: str
+    color: str
+    mark: str
+    dashes: list[float]
+
+
 class Column(NamedTuple):
     """How a column is printed: heading, format, meaning below the table, factor on the SI unit."""
 
@@ -53,17 +66,20 @@ class LabelFile(FileSchema):
     """Schema of `data/figures/labels.toml`."""
 
     outputs: dict[str, Label]
+    methods: dict[str, MethodLook]
     columns: dict[str, Column]
+    sizes: dict[str, dict[str, Column]]
 
 
 @cache
-def _declared() -> LabelFile:
+def declared() -> LabelFile:
+    """The package's own file."""
     return read_toml(data_folder() / "figures" / "labels.toml", LabelFile)
 
 
 def column(name: str) -> Column:
     """How a column is printed; one without an entry has its name as heading."""
-    known = _declared().columns
+    known = declared().columns
     if name.startswith("rms_") and name not in known:
         return Column(f"{label_of(name.removeprefix('rms_')).short} error", ERROR)
     return known.get(name, Column(name.replace("_", " ")))
@@ -72,7 +88,7 @@ def column(name: str) -> Column:
 def label_of(output: str) -> Label:
     """The label of an output; one that has no symbol has its name."""
     name = output.replace("_", " ")
-    return _declared().outputs.get(output, Label(name, name, name))
+    return declared().outputs.get(output, Label(name, name, name))
 
 
 def full_label(output: str, between: str = " ") -> str:
@@ -88,7 +104,15 @@ def unit_of(dataset: xr.Dataset, output: str) -> str:
 
 def method_text(label: str) -> str:
     """A method's label in a study, as a legend has it."""
-    return label.replace("pod", "POD").replace("_", " ")
+    if look := declared().methods.get(label):
+        return look.words
+    words = ["POD" if word == "pod" else word for word in label.split("_")]
+    return " ".join(words)
+
+
+def raised(unit: str) -> str:
+    """A unit or formula whose exponents are superscripts in a figure."""
+    return EXPONENT.sub(r"$^{\1}$", unit)
 
 
 def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
@@ -98,7 +122,8 @@ def trained_runs(dataset: xr.Dataset) -> xr.DataArray:
 
 def readable_unit(largest: float, unit: str) -> tuple[float, str]:
     """Factor and prefixed unit in which values up to `largest` have few digits."""
-    if not unit.startswith(("m", "rad")) or not 0.0 < largest < 0.1:
+    # A prefix of m^2 would be squared too.
+    if unit.split("/", maxsplit=1)[0] not in ("m", "rad") or not 0.0 < largest < 0.1:
         return 1.0, unit
     factor, prefix = next((f, p) for f, p in PREFIXES if f * largest >= 0.1 or p == "n")
     return factor, prefix + unit
@@ -107,13 +132,16 @@ def readable_unit(largest: float, unit: str) -> tuple[float, str]:
 def axis_label(dataset: xr.Dataset, output: str, unit: str = "") -> str:
     """Name, symbol and unit (the output's own by default) of an output."""
     text = full_label(output, "\n" if len(label_of(output).name) > LONG else " ")
-    return f"{text} ({unit or unit_of(dataset, output)})"
+    return f"{text} ({raised(unit or unit_of(dataset, output))})"
 
 
 def error_label(dataset: xr.Dataset, kind: str, output: str, unit: str = "") -> str:
     """An error of an output, its symbol and unit, such as `RMS error`; long ones in two lines."""
-    label = f"{kind} of {label_of(output).symbol} ({unit or unit_of(dataset, output)})"
-    return label if len(label.replace("$", "")) <= LONGEST else label.replace(" of ", " of\n", 1)
+    unit = unit or unit_of(dataset, output)
+    symbol = label_of(output).symbol
+    letters = len(f"{kind} of {symbol} ({unit})".replace("$", ""))
+    between = " " if letters <= LONGEST else "\n"
+    return f"{kind} of{between}{symbol} ({raised(unit)})"
 
 
 # What is shown of a model.

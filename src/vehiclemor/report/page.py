@@ -20,31 +20,23 @@ from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
 from vehiclemor.report.comparison import paper_comparison, result_rows
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.figures.costs import figure_pareto, figure_size
-from vehiclemor.report.figures.result_plot import plot_result, shown_outputs
-from vehiclemor.report.figures.runs import PATH
+from vehiclemor.report.figures.result_plot import PICTURES, pictures_of, plot_result, shown_outputs
 from vehiclemor.report.figures.theme import METADATA, styled
 from vehiclemor.report.frames import counted_ends, frame
 from vehiclemor.report.labels import TRAINED, Column, trained_runs, unit_of
 from vehiclemor.report.printing import Table
-from vehiclemor.report.result_selection import drawn
+from vehiclemor.report.result_selection import KINDS, select_point
 from vehiclemor.report.screens import Part, claim_parts, paper_parts, study_parts
 from vehiclemor.study.plans.loading import refuse_doubles
 from vehiclemor.study.run import run_studies
 
-# Of a report, and how it begins.
-ENDINGS = ".html", ".htm"
+# Of a report.
 BEGINNING = b"""<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta name="generator" content="vehiclemor">"""
 # More runs of a study are not listed.
 MOST_ROWS = 200
-PICTURES = {
-    "histories": "Outputs over the time, differences from full order below",
-    "paths": "Paths in the plane, distances from full order below",
-    "errors": "RMS errors",
-}
 COUNTS = ("effective_rank", "rhs_calls", "iterations", "steps")
 
 
@@ -89,8 +81,8 @@ def write_report(
         If a name is wrong, nothing is stored, or the file can't be written.
     """
     path, folder = file_path("out", out), file_path("results", results)
-    if path.suffix.lower() not in ENDINGS:
-        raise InputError(f"out: {path} ends with neither of {', '.join(ENDINGS)}")
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"out: {path} does not end in .html")
     replaceable(path, "report of vehiclemor", begins_with(BEGINNING))
     studies = study_names("studies", studies)
     left_out: dict[str, str] = {}
@@ -156,23 +148,22 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
     """A study or protocol as `compare` has it, and every picture that it has the data for."""
     parts: list[Part] = []
     pictures: dict[str, Callable[[], Figure]] = {}
-    if "mesh" in dataset.dims:
-        pictures["Times over the size of the model"] = partial(figure_size, dataset)
-    elif "scenario_set" in dataset.coords:
-        pictures["Worst error over bound, over time"] = partial(figure_pareto, dataset)
-    else:
+    kinds = pictures_of(dataset)
+    if "errors" in kinds:
         parts.append(f"Study of {dataset.attrs['model']}: {counted_ends(dataset)}.")
         runs = error_table(dataset)
         shown = {column: Column(str(column).replace("_", " "), ".3g") for column in runs}
         few = len(runs) <= MOST_ROWS
         parts.append(Table(runs, shown, "Every run") if few else f"{len(runs)} runs: see convert")
-        held = {"histories": bool(dataset.sizes.get("time")), "errors": True}
-        held["paths"] = held["histories"] and set(PATH) <= set(dataset["output"].values)
-        for kind in filter(held.get, PICTURES):
-            for start in dataset["start"].values if kind != "errors" else [None]:
-                part, point = drawn(dataset, kind, {"start": start} if start else {})
-                caption = f"{PICTURES[kind]}{f' at {point}' if point else ''}"
-                pictures[caption] = partial(plot_result, part, None, kind)
+    for kind in kinds:
+        caption, draw = PICTURES[kind]
+        if kind not in KINDS:
+            pictures[caption] = partial(draw, dataset)
+            continue
+        for start in dataset["start"].values if kind != "errors" else [None]:
+            part, point = select_point(dataset, kind, {"start": start} if start else {})
+            where = f"{caption} at {point}" if point else caption
+            pictures[where] = partial(plot_result, part, None, kind)
     made = [
         picture
         for caption, draw in pictures.items()
@@ -187,11 +178,16 @@ def error_table(dataset: xr.Dataset) -> pd.DataFrame:
     units = {output: unit_of(dataset, output) for output in shown_outputs(dataset)}
     heads = {f"rms_error.{o}": f"RMS error of {o} ({unit})" for o, unit in units.items()}
     runs: Any = frame(dataset.assign(trained=trained_runs(dataset))).rename(columns=heads)
+    # Points of the grid that a method does not depend on are one run.
+    runs = runs.drop_duplicates(["label", "cell_key"])
     said = runs["message"] + runs["remark"].where(runs["warned"] & (runs["status"] == "ok"), "")
     marks = runs["trained"].map({True: f" ({TRAINED})", False: ""})
     status = runs["status"] + marks + said.map(lambda text: f": {text}" if text else "")
     axes = [str(d) for d in dataset["status"].dims if d != "label" and dataset.sizes[d] > 1]
     axes += [n for n, c in dataset.coords.items() if c.dims == ("sample",) and n not in axes]
+    for axis in axes:
+        fixed = runs.groupby("label")[axis].transform("nunique") == 1
+        runs[axis] = runs[axis].astype(object).mask(fixed, "")
     counts = [name for name in COUNTS if name in runs]
     shown = runs[["label", *axes, *heads.values(), *counts]]
     return shown.assign(status=status, cell=runs["cell_key"])

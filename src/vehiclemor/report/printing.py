@@ -107,12 +107,13 @@ class Table:
 
 
 def shown(value: object, form: str = ".6g", scale: float = 1.0) -> str:
-    """A value as text: a dash for a missing number, nothing for none."""
+    """A value as text: a dash for a missing number, `0` for exactly zero, nothing for none."""
     if isinstance(value, list):
         return ", ".join(shown(part, form) for part in value)
     if isinstance(value, float):
-        missing = value != value or (value == 0.0 and form == ERROR)
-        return "-" if missing else format(scale * value, form)
+        if value != value:
+            return "-"
+        return "0" if value == 0.0 and form == ERROR else format(scale * value, form)
     return "" if value is None else str(value)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import xarray as xr
@@ -14,6 +14,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.metrics import errors
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import unknown
+from vehiclemor.report.labels import Kind
 from vehiclemor.study.plans.loading import content_hash, is_study, load_studies
 from vehiclemor.study.plans.study_runs import FACTORS
 from vehiclemor.study.store import combined_path, result_path
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from vehiclemor.simulation.trajectory import Trajectory
 
-KINDS = ("histories", "paths", "errors")
+KINDS: tuple[str, ...] = get_args(Kind)
 # Values of a dimension that an error lists.
 MOST_NAMED = 12
 
@@ -47,10 +48,13 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
     return read_dataset(path, "source", "vehiclemor", stored)
 
 
-def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple[xr.Dataset, str]:
+def select_point(
+    dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]
+) -> tuple[xr.Dataset, str]:
     """What of a result is drawn: one point of a study's grid with all methods, and its name.
 
     A dimension that is not chosen is at its nominal or first value, but errors are drawn over it.
+    The point stands in the title.
     """
     if not isinstance(kind, str) or kind not in KINDS:
         raise unknown("kind of plot", kind, KINDS)
@@ -78,7 +82,11 @@ def drawn(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> tuple
         dataset = dataset.isel({dimension: places[0]})
         if len(values) > 1:
             parts.append(f"{dimension} {value}")
-    return dataset, ", ".join(parts)
+    point = ", ".join(parts)
+    if point:
+        title = f"{dataset.attrs.get('title', '')}\nat {point}".strip()
+        dataset = dataset.assign_attrs(title=title)
+    return dataset, point
 
 
 @xr.register_dataset_accessor("vehiclemor")
@@ -92,7 +100,7 @@ class ResultAccessor:
         """Draw the result; see `vehiclemor.plot`."""
         from vehiclemor.report.figures.result_plot import plot_result
 
-        dataset, _ = drawn(self._dataset, kind, at)
+        dataset, _ = select_point(self._dataset, kind, at)
         return plot_result(dataset, None if out is None else file_path("out", out), kind)
 
 

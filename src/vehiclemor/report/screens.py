@@ -20,9 +20,9 @@ from vehiclemor.report.findings import (
     counted,
 )
 from vehiclemor.report.frames import ERRORS
-from vehiclemor.report.labels import ERROR, Column, column, main_outputs, of_kind
+from vehiclemor.report.labels import ERROR, Column, column, declared, main_outputs, of_kind
 from vehiclemor.report.printing import Table, shown, wrapped
-from vehiclemor.report.sizes import COSTS, EXPLAINED, KIND, RIVALS, growth_text
+from vehiclemor.report.sizes import EXPLAINED, KIND, growth_text
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 Row = dict[str, Any]
@@ -225,9 +225,9 @@ def study_parts(rows: pd.DataFrame) -> list[Part]:
     sized = [row for row in records if row["kind"] == KIND]
     for own in _by(sized, "study").values():
         title = f"{own[0]['study']}: what a reduced model gains"
-        parts.append(Table(own, COSTS, title, below=growth_text(own)))
+        parts.append(Table(own, declared().sizes["costs"], title, below=growth_text(own)))
         compared = [row for row in own if row["error_motion"] == row["error_motion"]]
-        parts.append(Table(compared, RIVALS, below=EXPLAINED))
+        parts.append(Table(compared, declared().sizes["rivals"], below=EXPLAINED))
     judged = [row for row in records if row["kind"] not in (ERRORS, KIND)]
     return parts + (_unseen_parts(judged) if judged else [])
 
@@ -249,9 +249,11 @@ def _grid_parts(rows: list[Row]) -> list[Part]:
     title = wrapped(f"{first['study']}: {first['title']}") + "\n"
     errors = ("label", "median", "largest", "floor", "failed", "largest_at")
     costs = ["label", "runs", "failures", "warned", "trained", "evaluations", "seconds_in_loop"]
+    saturated = {row["label"]: row["saturates_at"] for row in rows if row["saturates_at"]}
+    below = "; ".join(f"{label} saturates at rank {rank}" for label, rank in saturated.items())
     return [
         title + wrapped("; ".join(filter(None, about)), 2, 2),
-        Table(lines, errors, group="of"),
+        Table(lines, errors, group="of", below=below),
         Table(runs, [*costs, "offline_seconds"], group="of"),
     ]
 
@@ -288,10 +290,17 @@ def _protocol_parts(rows: Mapping[str, list[Row]], explain: bool) -> list[Part]:
     for row in named:
         ends = f"{100 * row['stable_share']:.0f} % of the runs end, {row['failure']}"
         row["ends"] = ends if row["failure"] else ""
-    errors = ("label", "misses", "silent", "flagged", "validation_score", "score")
+    errors = ("label", "misses", "misses_at_ten", "silent", "flagged", "validation_score", "score")
+    units = ("label", "median_m", "worst_m", "median_deg", "worst_deg")
     costs = ["label", "seconds", "loop_seconds", "ratio_equal", "ratio_equal_loop"]
     parts.append(Table(named, errors, note="ends", explain=explain))
-    return [*parts, Table(named, [*costs, "offline_seconds"], explain=explain)]
+    if any(row[unit] == row[unit] for row in named for unit in units[1:]):
+        parts.append(Table(named, units, explain=explain))
+    parts.append(Table(named, [*costs, "offline_seconds"], explain=explain))
+    chosen = [row for row in named if row["role"] != FULL_ORDER and row["chosen_settings"]]
+    if chosen:
+        parts.append(Table(chosen, ("label", "chosen_settings")))
+    return parts
 
 
 def _winner_parts(
@@ -307,5 +316,5 @@ def _winner_parts(
     errors = {"output": Column(f"errors of {winner['label']}, SI units")}
     errors |= {name: column(name) for name in ("bound", "worst", "most")}
     errors["reason"] = Column("bound from")
-    below = "*: bound of our own" if explain else ""
+    below = "*: bound added here" if explain else ""
     return [Table(reached, columns, head, below=below), Table(bounds, errors)]

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.report.labels import Column
 from vehiclemor.study.plans.size import FULL, GROUPS
 
 if TYPE_CHECKING:
@@ -106,30 +105,6 @@ def growth_text(rows: Sequence[Row]) -> str:
     return f"Times grow with the number n of coordinates ({'; '.join(parts)})." if parts else ""
 
 
-COSTS = {
-    "mesh": Column("mesh"),
-    "coordinates": Column("n", ".0f"),
-    "label": Column("reduced model"),
-    "order": Column("r", ".0f"),
-    "full_seconds": Column("full, s", ".3g"),
-    "seconds": Column("reduced, s", ".3g"),
-    "gain_mesh": Column("times faster", ".3g", "than the full model on the same mesh"),
-    "offline_seconds": Column("offline, s", ".2g", "CPU time of training and fit"),
-    "break_even": Column("pays after", ".2g", "runs that earn the offline cost"),
-}
-RIVALS = {
-    "mesh": Column("mesh"),
-    "label": Column("reduced model"),
-    **{
-        name: Column(heading, form)
-        for group in GROUPS
-        for name, heading, form in (
-            (f"error_{group}", f"{group}, error", ".1e"),
-            (f"rival_{group}", "cheapest full", ""),
-            (f"gain_{group}", "times faster", ".3g"),
-        )
-    },
-}
 EXPLAINED = (
     "Errors: worst RMS error of the group against the finest mesh, over the output's range. "
     "Cheapest full: the full model, on any mesh, that is at least as accurate."

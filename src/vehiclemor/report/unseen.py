@@ -7,6 +7,7 @@ ends just above the error is continued by the law of its last two rows: else a s
 would stand in for it.
 """
 
+import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby, pairwise
@@ -29,6 +30,8 @@ OUTSIDE = ("outside", "drawn_outside")
 CLOCKS = {"seconds": "ratio_equal", "loop_seconds": "ratio_equal_loop"}
 # Of the bounds of rates.
 CONFIDENCE = 0.95
+# SI unit of a bounded output -> the unit in which errors are printed, and its factor.
+PRINTED_UNITS = {"m": ("m", 1.0), "rad": ("deg", 180.0 / math.pi)}
 # Smallest part of the error of its last row to which a ladder is continued.
 CONTINUED = 0.5
 
@@ -55,8 +58,11 @@ def method_rows(dataset: xr.Dataset, protocol: StudyFile) -> list[Row]:
     there.  Of the runs `misses` miss a bound, `silent` ones with the status ok; of `flagged` ones
     the model says that it has left what it knows.  `score` is the largest error of a bounded output
     as a multiple of its bound (infinite if a run has failed), `worst_MEASURE_OUTPUT` and `most_...`
-    the largest error and the 99 % quantile.  `seconds` is the mean of whole calls, `loop_seconds`
-    of their compiled loops, with the `spread` of the rounds (interquartile range over median).
+    the largest error and the 99 % quantile; `median_m`, `worst_deg` and so on are of the largest
+    error of all bounded positions or angles, `misses_at_ten` of ten times the bounds.
+    `chosen_settings` are those of the candidate that validation chose.  `seconds` is the mean of
+    whole calls, `loop_seconds` of their compiled loops, with the `spread` of the rounds
+    (interquartile range over median).
     `ratio_equal` and `ratio_equal_loop` are against the full order interpolated at the row's own
     score on the rows `equal_rows`, `ratio_within` against `within`, the fastest full-order row
     within the bounds.
@@ -83,6 +89,7 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: S
         "runs": part.sizes["scenario"],
         "apart": int((sets == judged_set(set(sets))).sum()) - part.sizes["scenario"],
         "misses": int(found.missed.sum()),
+        "misses_at_ten": int((found.scores > 10.0).sum()),
         "silent": int(found.undetected.sum()),
         "flagged": int(found.warned.sum()),
         "score": float(found.scores.max()),
@@ -95,7 +102,9 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: S
         "outside_flagged": int(outside.warned.sum()),
         "validation_score": float(part["validation_score"]),
         "offline_seconds": float(part["offline_seconds"]),
+        "chosen_settings": _chosen_settings(json.loads(part["validation"].item())),
     }
+    row |= _errors_in_units(part, protocol)
     for name, (output, measure) in error_columns(protocol).items():
         errors: Any = errors_by(part, output, measure).to_series()
         # Of the runs that have come to their end.
@@ -105,6 +114,30 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: S
     times = {n: float(part[n].mean()) for n in (*CLOCKS, "seconds_lower", "seconds_upper")}
     spread = times.pop("seconds_upper") - times.pop("seconds_lower")
     return row | times | {"spread": spread / times["seconds"] if times["seconds"] > 0.0 else 0.0}
+
+
+def _chosen_settings(candidates: list[Row]) -> str:
+    """What sets the chosen candidate apart from the others; empty if there is no other."""
+    tables = [candidate["settings"] for candidate in candidates]
+    chosen = next(candidate["settings"] for candidate in candidates if candidate["chosen"])
+    differing = [name for name in chosen if any(table[name] != chosen[name] for table in tables)]
+    return ", ".join(f"{name}={chosen[name]}" for name in differing)
+
+
+def _errors_in_units(part: xr.Dataset, protocol: StudyFile) -> dict[str, float]:
+    """Median and worst run, by the largest error of all outputs whose bounds are in a unit."""
+    columns = {}
+    for si_unit, (unit, factor) in PRINTED_UNITS.items():
+        errors = [
+            errors_by(part, output, bound.measure).values
+            for output, bound in protocol.bounds.items()
+            if bound.measure != "relative" and unit_of(part, output) == si_unit
+        ]
+        of_runs = factor * np.max(errors or [[math.nan]], axis=0)
+        finite = of_runs[np.isfinite(of_runs)]
+        columns[f"median_{unit}"] = float(np.median(finite)) if finite.size else math.nan
+        columns[f"worst_{unit}"] = float(finite.max(initial=0.0)) if finite.size else math.nan
+    return columns
 
 
 def error_columns(protocol: StudyFile) -> dict[str, tuple[str, str]]:

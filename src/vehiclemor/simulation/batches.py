@@ -72,8 +72,8 @@ def simulate_many(
     model
         Reduced or full model made by `reduce()`; or a full model, or its name, which is integrated
         as `Model.simulate` does by default, to be measured against: `reduce(model, "full_order",
-        solver="ros34pw2", tolerance=2e-3)` is far faster.  Or whatever has a full `model` and a
-        function `simulate` of a maneuver, a start and `outputs`.
+        preset="strongest")` is far faster.  Or whatever has a full `model` and a function
+        `simulate` of a maneuver, a start and `outputs`.
     signals
         A signal or maneuver for each run, see `many_signals`.  They have the same output times,
         unless `times` are given.

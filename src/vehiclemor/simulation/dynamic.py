@@ -20,6 +20,7 @@ from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.evaluation import By, chosen
 from vehiclemor.simulation.integrators.catalogue import integrator
 from vehiclemor.simulation.integrators.step_kernels import partners
+from vehiclemor.simulation.linear_model import LinearModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.recording import Recorder, Recording
 from vehiclemor.simulation.system import System
@@ -115,6 +116,13 @@ class DynamicModel(Model):
     ) -> np.ndarray:
         """Analytic derivatives of `rhs` or `outputs`, see `Model.jacobian`."""
         return self.jacobian_of(chosen(of, RESULTS), state, u, with_respect_to)
+
+    def linearise(self, state: Start | None = None, inputs: Any = None) -> LinearModel:
+        """Linear model at a state or start, the first by default, and inputs, 0 by default."""
+        x = self.start(state)
+        u = self._inputs([0.0] * len(self.inputs) if inputs is None else inputs)
+        point = x, u, self.rhs(x, u), self.outputs_at(x[None], u[None])[0]
+        return LinearModel.of(self, self.definition.states, point)
 
     def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
         """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""
@@ -260,7 +268,7 @@ class DynamicModel(Model):
             "names": self.outputs,
             "model": self,
         }
-        if outputs is not None and not message:
+        if outputs not in (None, self.outputs) and not message:
             histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]
             fields |= {"names": outputs, "coordinates": nothing, "speeds": nothing}
             found = Trajectory.of(**fields, outputs=histories)

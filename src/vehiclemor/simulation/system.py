@@ -37,7 +37,7 @@ from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Pool, Run, Sol
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
 REASONS = {
-    TOO_MANY_CALLS: f"more than {catalogue.MOST_CALLS} evaluations of the right-hand side",
+    TOO_MANY_CALLS: f"more than {catalogue.MOST_CALLS} evaluations of the right-hand side in 1 s",
     NOT_FINITE: "a state is not finite",
     SINGULAR: "the matrix of a linear system is singular",
     STEP_TOO_SMALL: "the step size has become too small",

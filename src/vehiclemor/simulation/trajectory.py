@@ -73,8 +73,8 @@ class Trust:
 
     @property
     def message(self) -> str:
-        """When and by what it leaves, empty if it does not."""
-        return f"from t = {self.until:.4g} s on {self.reason}" if self.reason else ""
+        """By what and when it leaves, empty if it does not."""
+        return f"{self.reason}, from t = {self.until:.4g} s on" if self.reason else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +103,8 @@ class Trajectory(ShortRepr):
         Of the outputs.
     model
         Of which it is.
+    method
+        By which it was reduced; empty for a run of the full model.
     """
 
     times: np.ndarray
@@ -118,6 +120,7 @@ class Trajectory(ShortRepr):
     trust: Trust | None = None
     names: tuple[str, ...] = ()
     model: Any = None
+    method: str = ""
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None
@@ -159,6 +162,8 @@ class Trajectory(ShortRepr):
 
     def _columns(self, names: tuple[str, ...]) -> np.ndarray:
         """Histories (samples, names) of outputs, coordinates or speeds."""
+        if names == self.names:
+            return self.outputs
         recording = self.__dict__.get("recording")
         groups = {"outputs": self.names}
         if recording is not None or self.coordinates.shape[1]:
@@ -203,7 +208,8 @@ class Trajectory(ShortRepr):
 
     def dataset(self) -> xr.Dataset:
         """Labelled dataset of histories, counts, seconds and status, with units."""
-        return trajectory_dataset(self.model, self).assign_attrs(model=self.model.name)
+        dataset = trajectory_dataset(self.model, self).assign_attrs(model=self.model.name)
+        return dataset.assign_attrs(method=self.method) if self.method else dataset
 
     @property
     def finished(self) -> bool:
@@ -223,16 +229,16 @@ class Trajectory(ShortRepr):
         return np.hstack((self.coordinates, self.speeds))
 
 
-def output_names(outputs: Any) -> tuple[str, ...]:
-    """Names of chosen outputs; `InputError` if they are none."""
+def output_names(outputs: Any, what: str = "outputs") -> tuple[str, ...]:
+    """Names of chosen outputs, or of something else; `InputError` if they are none."""
     names = (outputs,) if isinstance(outputs, str) else outputs
     if isinstance(names, np.ndarray):
         names = names.ravel().tolist()
     if type(names) not in (tuple, list) or not names or not all(isinstance(n, str) for n in names):
-        raise InputError(f"outputs is {quoted(outputs)}, not a list of names")
+        raise InputError(f"{what} is {quoted(outputs)}, not a list of names")
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"outputs: {quoted(twice)} stands twice")
+        raise InputError(f"{what}: {quoted(twice)} stands twice")
     return tuple(names)
 
 

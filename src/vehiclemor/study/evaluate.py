@@ -14,7 +14,7 @@ from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, bla
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
-from vehiclemor.reduction.interface import FitOther, FittedModel, Method
+from vehiclemor.reduction.interface import FitOther, FittedModel, Method, lower_rank
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.trust import InputRange, input_range
 from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
@@ -98,7 +98,7 @@ def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> 
     # Whether it has learnt from the very run that it is tested on.
     seen = (
         experiment.keep != "errors"
-        and method.learns_from != "inputs"
+        and method.learns_from == "runs"
         and not isinstance(outcomes[0], Failure)
         and in_training(model, experiment.training, test[0])
     )
@@ -254,18 +254,19 @@ def _tested(
     run = checked_run(own, scenario.maneuver, start, reduced)
     if run.finished and not np.isfinite(run.outputs).all():
         run = replace(run, status="diverged", message="an output is not finite")
+    if remark := lower_rank(experiment.settings, reduced):
+        run = replace(run, remark="; ".join(filter(None, (run.remark, remark))))
     judged = run
     method: Method = component("method", experiment.method)
-    # What has learned from nothing is the full order of a protocol's second runs; a model that is
-    # silent is not trusted beyond the training's inputs.
-    if experiment.training and not (run.trust or method.own_limits):
-        known = known_inputs(model, experiment.training, method.follows_time)
+    trained = partial(known_inputs, model, experiment.training, method.follows_time)
+    # A model that is silent is not trusted beyond the inputs that its method knows.
+    if not run.trust and (known := method.known_range(model, experiment.settings, trained)):
         judged = run.judged(known.trust(model, scenario.maneuver, speed_of(model, scenario)))
     if many:
         return Outcome(judged, reference)
     if judged.status != run.status:
         # A study shows what a protocol would not trust; the status is the method's own.
-        remark = "; ".join(filter(None, (run.remark, f"not to be trusted {judged.message}")))
+        remark = "; ".join(filter(None, (run.remark, f"not to be trusted: {judged.message}")))
         judged = replace(judged, status=run.status, message=run.message, remark=remark)
     if reference is None:
         return Outcome(judged, None)

@@ -24,10 +24,10 @@ import xarray as xr
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
 from vehiclemor.files import (
-    content_of,
     make_folder,
     not_written,
     probe_folder,
+    read_regular,
     remove_leftovers,
     write_whole,
 )
@@ -35,12 +35,12 @@ from vehiclemor.netcdf_file import global_attributes, read_dataset, write_datase
 from vehiclemor.short_repr import shortened
 
 QUARANTINE = "quarantine"
+# Bytes of a run's file: more than any history has.
+MOST_BYTES = 1 << 30
 ENDING, SCHEMA = ".safetensors", "vehiclemor run 4"
 # Bytes that say how long the header is; and where the hash stands, for which there are zeros while
 # it is computed.
 PREFIX, HASH, ZEROS = 8, '"sha256":"{}"', "0" * 64
-# Bytes of the file of a run: more than the histories of a whole study may have.
-MOST_BYTES = 1 << 32
 MEND = "; move it away and run again"
 # Of a variable.
 ATTRIBUTES = {"units", "long_name", "clock"}
@@ -182,7 +182,7 @@ def read_run(folder: Path, key: str) -> StoredRun:
     """Stored result; `FileError` if it is missing, `CorruptError` if not what was written."""
     path = run_path(folder, key)
     try:
-        return decoded(content_of(path, MOST_BYTES), key)
+        return decoded(read_regular(path, MOST_BYTES), key)
     except CorruptError as error:
         raise CorruptError(error.reason, path, "; run again") from None
     except ValueError as error:

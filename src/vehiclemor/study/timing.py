@@ -1,11 +1,13 @@
 """The timing pass: runs interleaved in one process, medians of rounds, stored by content.
 
-What counts is a whole call of `simulate`, all states and outputs delivered, timed from outside;
-what a model tells of its own loop is recorded beside it and decides nothing.  Between two runs of a
-comparison other work throws code and data out of the caches, so every timed call follows one of the
-same run that is not: a user who runs a model again and again finds them warm.  Seconds stored with
-the results of a study are measured while others run beside them; a speed-up is quoted from this
-pass only.
+What counts is a whole call of `simulate` with an input that was just made, all states and outputs
+delivered, timed from outside: whatever a model works out about an input is part of its call. Inputs
+arrive as signals, piecewise polynomials: making these of a formula takes milliseconds of Python,
+once, for reduced models and full order alike. The same call repeated, and what a model tells of its
+own loop, are recorded beside it and decide nothing. Between two runs of a comparison other work
+throws code and data out of the processor's caches, so a call that is not timed comes first. Seconds
+stored with the results of a study are measured while others run beside them; a speed-up is quoted
+from this pass only.
 """
 
 from __future__ import annotations
@@ -14,19 +16,24 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from vehiclemor.codegen.cache import compiler_identity
 from vehiclemor.failure import Failure, attempt
+from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import signal_of
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.progress import tell
 from vehiclemor.provenance import attributes, machine
 from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.run_timer import CLOCK, timed
+from vehiclemor.simulation.run_timer import CLOCK, one_thread, timed
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.evaluate import evaluate, for_run, fresh_fit, kept_fit, model_of
 from vehiclemor.study.experiment import Experiment
@@ -36,14 +43,14 @@ from vehiclemor.study.store import stored
 
 # Rounds of a cost table, and of the test set of a protocol, which has many runs; and those of them
 # in which long runs stand, which scatter less.
-CASE_ROUNDS, PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG = 41, 7, 3
-# Calls of a short and of a long run in a row, the first a warm-up; length (s) of a long one.
-REPEATS, REPEATS_OF_LONG, LONG_RUN = 4, 2, 2e-3
+CASE_ROUNDS, PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG = 31, 3, 2
+# New inputs in a row for a short and a long run, the first to warm up; length (s) of a long run.
+INPUTS, INPUTS_OF_LONG, LONG_RUN = 3, 2, 2e-3
 # Fits whose median counts, as long as they take no more than these seconds together; and the length
 # (s) of a fit beside which loading machine code is nothing.
 FITS, FIT_SECONDS, LONG_FIT = 9, 2.0, 1.0
 # Variable -> case against which it is the speed-up, and what of a run; quantiles of its seconds.
-WHOLE, LOOP = 0, 1
+WHOLE, REPEATED, LOOP = 0, 1, 2
 SPEED_UPS = {
     "speed_up": ("baseline", WHOLE),
     "speed_up_strongest": ("strongest", WHOLE),
@@ -69,7 +76,7 @@ def timed_starts(experiments: Mapping[str, Mapping[str, Experiment]], path: Path
 
 def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -> xr.Dataset:
     """What is stored for this content and machine, or else is made and stored at `path`."""
-    text = json.dumps([content, machine(), compiler_identity(), REPEATS, REPEATS_OF_LONG, CLOCK])
+    text = json.dumps([content, machine(), compiler_identity(), INPUTS, INPUTS_OF_LONG, CLOCK])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
     return stored(path, "timing", key, make)
 
@@ -123,13 +130,14 @@ def timed_tests(
 def _dataset(
     experiments: Mapping[str, Experiment], seconds: np.ndarray, offline: list[float], what: str
 ) -> xr.Dataset:
-    """Median and quartiles of rounds (rounds, cases, scenarios, whole call and loop)."""
-    whole, loop = seconds[..., WHOLE], seconds[..., LOOP]
+    """Median and quartiles of rounds (rounds, cases, scenarios, parts of `Seconds`)."""
+    whole = seconds[..., WHOLE]
     with warnings.catch_warnings():
         # What was never timed has none.
         warnings.filterwarnings("ignore", "All-NaN slice")
         quantiles = {n: np.nanquantile(whole, share, axis=0) for n, share in QUANTILES.items()}
-        quantiles["loop_seconds"] = np.nanmedian(loop, axis=0)
+        quantiles["repeated_seconds"] = np.nanmedian(seconds[..., REPEATED], axis=0)
+        quantiles["loop_seconds"] = np.nanmedian(seconds[..., LOOP], axis=0)
     found = variables(quantiles, "case", "scenario")
     found |= variables({"offline_seconds": offline}, "case")
     found["seconds"] = found.pop("seconds_median")
@@ -139,20 +147,21 @@ def _dataset(
     return xr.Dataset(found, labels, attributes(title, first.kernel, model=first.model))
 
 
+@one_thread()
 def _rounds(
     experiments: Sequence[Experiment],
     rounds: tuple[int, int],
     what: str,
     finished: np.ndarray | None = None,
 ) -> tuple[np.ndarray, list[float]]:
-    """Seconds of runs (rounds, experiments, scenarios, whole call and loop), and of fits.
+    """Seconds of runs (rounds, experiments, scenarios, parts of `Seconds`), and of fits.
 
     `rounds` are all of them, and those of long runs, which have no seconds (NaN) in the others, as
     runs that fail have in all.  All runs of a round follow one another: load hits all alike.
     """
     model = model_of(experiments[0])
     scenarios = experiments[0].test
-    tests = [(scenario.maneuver, start_of(model, scenario)) for scenario in scenarios]
+    tests = [(as_signal(model, s.maneuver), start_of(model, s)) for s in scenarios]
     shape = (len(experiments), len(tests))
     wanted = np.ones(shape, dtype=bool) if finished is None else finished.copy()
     # Each has a name of its own, so that progress never goes back.
@@ -164,44 +173,83 @@ def _rounds(
         for index, (reduced, _) in enumerate(fits)
         for place, scenario in enumerate(scenarios)
     }
-    seconds = np.full((rounds[0] + 1, *shape, 2), np.nan)
+    seconds = np.full((rounds[0] + 1, *shape, len(Seconds._fields)), np.nan)
     for turn in range(rounds[0] + 1):
-        for place, test in enumerate(tests):
+        for place, (maneuver, start) in enumerate(tests):
             for index, (reduced, _) in enumerate(fits):
                 # The first round loads machine code, and tells how long a run takes.
                 long = turn == 0 or seconds[0, index, place, WHOLE] >= LONG_RUN
                 if reduced is None or not wanted[index, place] or (long and turn > rounds[1]):
                     continue
-                run = partial(for_test[index, place].simulate, *test)
-                found = attempt(partial(called, run, REPEATS_OF_LONG if long else REPEATS))
-                if isinstance(found, Failure):
+                simulate, inputs = (
+                    for_test[index, place].simulate,
+                    INPUTS_OF_LONG if long else INPUTS,
+                )
+                measured = attempt(partial(called, simulate, (maneuver, start), inputs))
+                if isinstance(measured, Failure):
                     wanted[index, place], seconds[:, index, place] = False, np.nan
                 else:
-                    seconds[turn, index, place] = found
+                    seconds[turn, index, place] = measured
         tell(work, turn + 1, rounds[0] + 1)
     return seconds[1:], [offline for _, offline in fits]
 
 
-def called(run: Callable[[], Trajectory], repeats: int) -> tuple[float, float] | Failure:
-    """Seconds of a call from outside, and of its loop by its own account; or how it has failed.
+class Seconds(NamedTuple):
+    """Of a whole call with a new input, of the same call again, and of the loop by its account."""
 
-    They are medians of all calls but the first, which warms the caches.
+    whole: float
+    repeated: float
+    loop: float
+
+
+def as_signal(model: Model, maneuver: Maneuver) -> Maneuver:
+    """A maneuver as the signal of its polynomials; a structure's, which takes samples, as it is."""
+    if isinstance(maneuver, Signal) or model.kind == "structural":
+        return maneuver
+    pieces: Any = signal_of(maneuver).bundle
+    values = {f.name: getattr(maneuver, f.name) for f in fields(Maneuver)}
+    values |= {"frequency_factor": 1.0, "amplitude_factor": 1.0}
+    return Signal(**values, hold="polynomials", pieces=pieces)
+
+
+def as_new(maneuver: Maneuver) -> Maneuver:
+    """A maneuver as a user has just made it: nothing is known of its inputs from earlier calls."""
+    if isinstance(maneuver, Signal):
+        return replace(maneuver, pieces=maneuver.pieces._replace(), kept={})
+    # What is worked out about inputs is looked up by their function.
+    return replace(maneuver, signal=partial(maneuver.signal))
+
+
+def called(
+    simulate: Callable[..., Trajectory],
+    run: tuple[Maneuver, *tuple[Any, ...]],
+    inputs: int,
+    *,
+    again: bool = True,
+) -> Seconds | Failure:
+    """Median seconds of a run with so many new inputs, the first to warm up; or the failure.
+
+    The maneuver comes first of what the run takes.  Without `again` no call is repeated.
     """
+    maneuver, *further = run
 
-    def delivered() -> Trajectory:
+    def delivered(new: Maneuver) -> Trajectory:
         # Histories are made when they are first read.
-        trajectory = run()
+        trajectory = simulate(new, *further)
         assert trajectory.outputs is not None
         return trajectory
 
-    found: list[tuple[float, float]] = []
-    for _ in range(repeats):
-        trajectory, seconds = timed(delivered)
+    measured: list[Seconds] = []
+    for _ in range(inputs):
+        new = as_new(maneuver)
+        trajectory, whole = timed(partial(delivered, new))
         if not trajectory.finished:
             return Failure(trajectory.status, trajectory.message)
-        found.append((seconds, trajectory.seconds))
-    whole, loop = np.median(found[1:], axis=0)
-    return float(whole), float(loop)
+        repeated = np.nan
+        if again:
+            trajectory, repeated = timed(partial(delivered, new))
+        measured.append(Seconds(whole, repeated, trajectory.seconds))
+    return Seconds(*np.median(measured[1:], axis=0).tolist())
 
 
 def _warm_fit(

@@ -8,7 +8,7 @@ that run at every time point read its results.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import sympy as sp
 
@@ -157,9 +157,16 @@ def _share(
         "tuple[list[tuple[sp.Symbol, sp.Expr]], list[sp.Expr]]",
         sp.cse(expressions, symbols=names, order="none"),
     )
-    definitions = dict(shared)
-    definitions.update(zip((s for s, _ in assignments), reduced, strict=False))
-    return definitions, list(reduced[len(assignments) :])
+    # What holds or not is no number: conditions stay where they are asked.
+    definitions: dict[sp.Symbol, Any] = {}
+    conditions: dict[Any, Any] = {}
+    for symbol, expression in shared:
+        number_or_not = expression.xreplace(conditions)
+        kind = definitions if isinstance(number_or_not, sp.Expr) else conditions
+        kind[symbol] = number_or_not
+    complete: list[Any] = [expression.xreplace(conditions) for expression in reduced]
+    definitions.update(zip((s for s, _ in assignments), complete, strict=False))
+    return definitions, complete[len(assignments) :]
 
 
 class _Hoisting:
@@ -185,6 +192,8 @@ class _Hoisting:
         """Expression with every maximal parameter-only part replaced by one symbol."""
         if expression.is_Atom:
             return expression
+        if not isinstance(expression, sp.Expr):
+            return expression.func(*map(self.rewrite, expression.args))
         if expression.free_symbols and expression.free_symbols <= self.constant:
             if (-expression).is_Atom:
                 return expression

@@ -63,13 +63,21 @@ def test_pulses_of_the_steering_are_right_or_told(start):
     np.testing.assert_allclose(many["until"], [run.trust.until for run in runs])
 
 
+def test_a_car_that_starts_straight_with_a_jump_of_the_steering_is_told_so():
+    t = np.linspace(0.0, 2.0, 101)
+    run = shipped(CAR).simulate(vm.Signal.from_samples(t, 0.01 * np.cos(t)), "equilibrium")
+    told = "steering or lateral motion at the start is larger than in training by a factor of 7.19"
+    assert run.message == f"{told}, from t = 0 s on"
+
+
 @pytest.mark.parametrize(("size", "hold"), [(0.8812298, "linear"), (0.3, "zero"), (-0.06, "zero")])
 def test_a_pulse_between_two_output_times_is_told_of_when_it_comes(size, hold):
     rom = shipped(CAR)
     signal = vm.Signal.from_samples([0, 1.689, 1.692, 1.694, 10], [0, 0, size, 0, 0], hold)
     run = rom.simulate(signal, "equilibrium")
     assert run.status == "untrusted"
-    assert "it is steered further or quicker than any training run" in run.message
+    assert run.message.startswith("steering goes further or changes faster than in training by a")
+    assert run.message.endswith(", from t = 1.7 s on")
     assert run.trust.until == pytest.approx(1.7)
     together = vm.many_signals([0, 1.689, 1.692, 1.694, 10], [[0, 0, size, 0, 0], [0] * 5], hold)
     many = vm.simulate_many(rom, together, "equilibrium", outputs=["yaw"])
@@ -132,7 +140,7 @@ def test_pod_of_the_suspension_tells_that_an_input_is_another():
     for factors in ({"frequency": 1.2}, {"amplitude": 0.9}):
         run = pod.simulate(vm.maneuver("sine_travel", **factors))
         assert run.status == "untrusted"
-        assert "difference from the inputs of training runs" in run.message
+        assert "history of the inputs leaves its known range by" in run.message
 
 
 def test_pod_tells_when_it_leaves_its_training_run():
@@ -144,6 +152,22 @@ def test_pod_tells_when_it_leaves_its_training_run():
     run, full = pod.simulate(steering), car.simulate(steering)
     assert missed(pod, run, full) > 10.0
     assert run.status == "untrusted"
-    assert "difference from the inputs of training runs" in run.message
+    assert "history of the inputs leaves its known range by" in run.message
     # Half a second of the training run is known; what comes then is not.
     assert 0.0 < run.trust.until < 1.0
+
+
+def test_a_lower_rank_than_asked_for_is_told():
+    told = "effective rank 4, where 8 is asked for: training has no more"
+    pod = vm.reduce("double_wishbone", "pod", rank=8, training="nominal")
+    assert told in str(pod)
+    assert pod.simulate().remark == told
+    assert vm.simulate("double_wishbone", "pod", rank=8)["remark"].item() == told
+    assert vm.simulate("double_wishbone", "pod", rank=4)["remark"].item() == ""
+
+
+def test_a_remark_of_trust_is_a_sentence():
+    run = vm.simulate("double_wishbone", "pod", training="nominal", frequency=1.2)
+    remark = run["remark"].item()
+    assert remark.startswith("not to be trusted: history of the inputs leaves its known range by")
+    assert remark.endswith(" s on")

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field
 
+import vehiclemor as vm
 from tests.reducing import figure_errors, fitted, floor_errors, training_runs, two_way_travel
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method
@@ -17,6 +18,8 @@ from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
 from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
+from vehiclemor.study.evaluate import reference_run
+from vehiclemor.study.scenario import Scenario, start_of
 
 
 def test_least_squares_is_near_the_projection_floor_and_falls_with_the_rank(model, nominal, full):
@@ -129,6 +132,61 @@ def test_replay_of_several_runs_takes_the_nearest_input(model, nominal):
         run = replay.simulate(nominal.perturbed(*tested), start)
         expected = model.simulate(nominal.perturbed(*pair)).coordinates
         np.testing.assert_array_equal(run.coordinates, expected)
+
+
+CAR, SPEEDS = "independent_suspension_vehicle", (18.0, 22.0)
+STARTS = ("equilibrium", "dropped")
+# Model -> runs of which no two differ in one thing alone that replay might not look at.
+DIFFERENT = {
+    "double_wishbone": [
+        Scenario.of(name, (f, 1.0), "equilibrium")
+        for name in ("chirp_travel", "travel_and_rack")
+        for f in (1.0, 1.3)
+    ],
+    "flexible_truck": [
+        Scenario.of("road:3", (1.0, 1.0), "equilibrium", None, (("payload", payload),))
+        for payload in (0.0, 5e3)
+    ],
+    CAR: [Scenario.of("lane_change", (1.0, 1.0), s, v) for s in STARTS for v in SPEEDS],
+    "high_fidelity_vehicle": [
+        Scenario.of("rack_lane_change", (1.0, 1.0), s, v) for s in STARTS for v in SPEEDS
+    ],
+}
+
+
+@pytest.mark.parametrize("name", DIFFERENT)
+def test_replay_is_exact_on_every_training_run(name):
+    replay = vm.reduce(name, "replay", training=DIFFERENT[name])
+    for scenario in DIFFERENT[name]:
+        online = dict(scenario.parameters)
+        own = replay.for_parameters(online) if online else replay
+        run = own.simulate(scenario.maneuver, start_of(replay.model, scenario))
+        full = reference_run(replay.model, scenario)
+        np.testing.assert_array_equal(run.outputs, full.outputs)
+        np.testing.assert_array_equal(run.states, full.states)
+
+
+def test_replay_weighs_each_input_by_its_range_in_training():
+    times = np.linspace(0.0, 5.0, 101)
+
+    def moved(travel, rack):
+        inputs = np.outer(np.sin(times), [travel, rack])
+        return vm.Signal.from_samples(times, inputs, "cubic")
+
+    # The rack moves ten times less than the wheel, and is as far as it goes from the second run.
+    training = [moved(0.1, 0.01), moved(0.06, -0.01)]
+    replay = vm.reduce("double_wishbone", "replay", training=training)
+    first = replay.model.simulate(training[0])
+    np.testing.assert_array_equal(replay.simulate(moved(0.07, 0.01)).states, first.states)
+
+
+def test_replay_saves_runs_of_other_online_parameters(tmp_path):
+    runs = DIFFERENT["flexible_truck"]
+    replay = vm.reduce("flexible_truck", "replay", training=runs)
+    again = vm.load(replay.save(tmp_path / "truck.nc"))
+    for rom in (replay, again):
+        run = rom.for_parameters({"payload": 5e3}).simulate(runs[1].maneuver)
+        np.testing.assert_array_equal(run.outputs, reference_run(rom.model, runs[1]).outputs)
 
 
 @given(size=st.floats(0.0, 3.0), sample=st.integers(0, 9), column=st.integers(0, 1))

@@ -45,7 +45,7 @@ def test_what_learns_from_runs_refuses_those_of_another_model(name):
         reduced(name, heavy(), car())
 
 
-@pytest.mark.parametrize("name", of_kind("inputs"))
+@pytest.mark.parametrize("name", of_kind("nothing"))
 def test_what_looks_at_no_run_is_the_same_remade_and_fitted(name):
     method, own, settings = reduced(name, car(), car())
     remade = for_model(method, own, heavy(), settings).simulate(LANE, "equilibrium")

@@ -377,6 +377,7 @@ windows rank bases.0.vectors=ones((len(a),len(a)+1))
 replay samples recorded.0.inputs=a[:-1] recorded.0.outputs=a[:-1] recorded.0.speeds=ones(3)
 replay time recorded.0.times=a[:0] recorded.0.times=a.astype(int)
 replay outputs recorded.0.outputs=a[:,:-1]
+replay conditions conditions=a[:0] conditions=a[:,:-1]
 """
 ROWS = [row.split() for row in SIZES.strip().splitlines()]
 CASES = [(file, word, change) for file, word, *row in ROWS for change in row]

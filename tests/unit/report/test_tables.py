@@ -18,9 +18,12 @@ from vehiclemor.report.default_studies import of_paper, smaller_rank
 from vehiclemor.report.labels import (
     Column,
     column,
+    declared,
     default_rank,
     main_outputs,
+    method_text,
     of_kind,
+    readable_unit,
     tabled_outputs,
     tables_file,
     timing_cases,
@@ -72,8 +75,8 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
     lines = text.splitlines()
     assert lines.index("first") < lines.index("second")
     found = [line.split()[-3:] for line in lines if line.startswith(("a|b", "plain"))]
-    # An exact zero is no order of magnitude.
-    assert found == [["1.2e-05", "-", "3"], ["-", "12.3", "0"]]
+    # A missing number is a dash, an exact zero is 0.
+    assert found == [["1.2e-05", "-", "3"], ["0", "12.3", "0"]]
     assert str(Table([{"score": 0.0}], explain=False)).split()[-1] == "0"
     plain = " ".join(text.split())
     for name in ("floor", "score", "misses"):
@@ -87,7 +90,32 @@ def test_a_terminal_shows_headings_formats_groups_and_meanings_once():
     assert str(Table([{"t": 2.5e-6}], micro)).split() == ["time,", "us", "2.5"]
 
 
-def test_a_simulation_prints_the_errors_of_each_output_and_a_dash_for_zero():
+@pytest.mark.parametrize(
+    ("largest", "unit", "expected"),
+    [
+        (0.01, "m", (1e3, "mm")),
+        (2e-5, "rad/s", (1e6, "µrad/s")),
+        (1.0, "m", (1.0, "m")),
+        # A prefix would be squared, or make another unit.
+        *((0.01, unit, (1.0, unit)) for unit in ("m^2", "min", "mol", "rads", "s")),
+    ],
+)
+def test_prefixes_keep_the_meaning_of_a_unit(largest, unit, expected):
+    assert readable_unit(largest, unit) == expected
+
+
+def test_a_colour_and_a_mark_name_one_method_of_the_package():
+    looks = declared().methods
+    assert set(names("method")) - {"full_order"} <= set(looks)
+    assert len({(look.color, look.mark) for look in looks.values()}) == len(looks)
+
+
+def test_methods_of_other_names_keep_them():
+    names = ("pod_literal", "tripod", "my_pod")
+    assert [method_text(name) for name in names] == ["POD literal", "tripod", "my POD"]
+
+
+def test_a_simulation_prints_the_errors_of_each_output_and_a_zero_as_such():
     run = vm.simulate("double_wishbone", "pod", rank=3)
     run["floor_rms_error"].loc["toe"] = 0.0
     lines = simulation_text(run, ["toe", "spindle_y"], []).splitlines()
@@ -95,7 +123,7 @@ def test_a_simulation_prints_the_errors_of_each_output_and_a_dash_for_zero():
     for output, unit in (("toe", "rad"), ("spindle_y", "m")):
         names = ("rms_error", "floor_rms_error", "max_error", "signal_range")
         numbers = [float(run[name].sel(output=output)) for name in names]
-        assert rows[output][1:] == [f"{n:.1e}" if n else "-" for n in numbers] + [unit]
+        assert rows[output][1:] == [f"{n:.1e}" if n else "0" for n in numbers] + [unit]
 
 
 PLAIN = standard_problems.DEFINITION

@@ -17,6 +17,9 @@ TIMES = np.linspace(0.0, 4.0, 41)
 KEPT = {"outputs": ["lateral_position", "Fz_FL", "u"], "times": [0.5, 1.0, 3.98]}
 
 
+ALL_OUTPUTS = vm.model(CAR).outputs
+
+
 @pytest.fixture(scope="module")
 def reduced():
     """The reduced car that ships: a slow manifold with the full order behind it."""
@@ -42,7 +45,8 @@ def check_alone(model, signals, found, starts=None):
     assert found.run.values.tolist() == [*range(len(signals))]
     for run, signal in enumerate(signals):
         start = starts if starts is None or isinstance(starts, str) else starts[run]
-        alone = model.simulate(signal, start, outputs=[str(name) for name in found.output.values])
+        names = tuple(str(name) for name in found.output.values)
+        alone = model.simulate(signal, start, outputs=None if names == ALL_OUTPUTS else names)
         rows = np.searchsorted(alone.times, found.time.values - 1e-9)
         expected = alone.outputs[rows]
         np.testing.assert_array_equal(found["values"].values[run], expected)

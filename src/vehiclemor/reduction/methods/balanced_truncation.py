@@ -98,6 +98,6 @@ METHOD = Method(
     refusal=no_linear_model,
     fit=fit,
     check=check,
-    learns_from="inputs",
+    learns_from="nothing",
     packages=("pymor",),
 )

@@ -85,6 +85,6 @@ METHOD = Method(
     settings={"structural": CoarseMeshSettings},
     fit=fit,
     check=check,
-    learns_from="inputs",
+    learns_from="nothing",
     own_limits=True,
 )

@@ -70,5 +70,6 @@ METHOD = Method(
     reference="10.2514/3.4741",
     settings={"structural": CraigBamptonSettings},
     fit=fit,
-    learns_from="inputs",
+    learns_from="nothing",
+    band="highest",
 )

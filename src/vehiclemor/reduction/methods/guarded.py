@@ -78,7 +78,7 @@ class FallbackModel(ShortRepr):
         silent = run.message or "the fast model does not judge itself"
         trust = run.trust or Trust(np.inf, 0.0, silent)
         safe = simulated(self.safe, maneuver, start, outputs)
-        why = f"from t = 0 s on by {SAFE}: {trust.reason or run.message}"
+        why = f"{SAFE} did the run: {trust.message or run.message}"
         return replace(
             safe,
             counts={name: count + safe.counts[name] for name, count in run.counts.items()},

@@ -29,6 +29,6 @@ METHOD = Method(
     settings=dict.fromkeys(("ode", "dae"), LinearVehicleSettings),
     refusal=no_steered_vehicle,
     fit=fit,
-    learns_from="inputs",
+    learns_from="nothing",
     packages=("pymor",),
 )

@@ -85,5 +85,5 @@ METHOD = Method(
     settings={"structural": KrylovSettings},
     fit=fit,
     check=check,
-    learns_from="inputs",
+    learns_from="nothing",
 )

@@ -82,5 +82,6 @@ METHOD = Method(
     },
     refusal=no_linear_model,
     fit=fit,
-    learns_from="inputs",
+    learns_from="nothing",
+    band="highest",
 )

@@ -191,14 +191,12 @@ class PathMapModel(ReducedMechanism):
         self._pool.give_back(given, call)
         table = space[:size].reshape(samples, -1)
         indicator, left = space[size : size + REPORTED].tolist()
-        status, message, until, reason = "ok", "", np.inf, ""
+        status, trust = "ok", Trust(indicator)
         if left < samples:
             left = int(left)
-            status, until, reason = "untrusted", float(times[left]), self._outside(inputs[left])
-            message = f"from t = {until:.4g} s on {reason}"
-            if self.stops:
-                status, message = "diverged", f"at t = {until:.6g} s {reason}"
-                table[left:] = np.nan
+            trust = Trust(indicator, float(times[left]), self._outside(inputs[left]))
+            status = "diverged" if self.stops else "untrusted"
+            table[left if self.stops else samples :] = np.nan
         n = len(model.coordinates)
         return Trajectory.of(
             times=times,
@@ -209,16 +207,16 @@ class PathMapModel(ReducedMechanism):
             counts=dict.fromkeys(model.counts, 0),
             seconds=seconds,
             status=status,
-            message=message,
-            trust=Trust(indicator, until, reason),
+            message=trust.message,
+            trust=trust,
             names=model.outputs,
             model=model,
         )
 
     def _outside(self, inputs: np.ndarray) -> str:
         return (
-            f"{_named(self.model, inputs[:, None])} is outside of the training: "
-            f"{_named(self.model, self.ranges)}"
+            f"input {_named(self.model, inputs[:, None])} is outside of training "
+            f"({_named(self.model, self.ranges)})"
         )
 
     def for_model(self, model: AlgebraicModel) -> "PathMapModel":

@@ -6,6 +6,7 @@ that it was not trained on has learned nothing about the model.
 
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -22,10 +23,11 @@ from vehiclemor.sizes import require
 
 @dataclass(frozen=True)
 class ReplayModel(ShortRepr):
-    """Stored training trajectories."""
+    """Stored training trajectories, each with the conditions (runs, k) that it began with."""
 
     model: Model
     recorded: tuple[Trajectory, ...]
+    conditions: np.ndarray
     offline: OfflineCost
 
     def check_sizes(self) -> None:
@@ -33,24 +35,42 @@ class ReplayModel(ShortRepr):
         for name in ("inputs", "coordinates", "speeds", "outputs"):
             columns = len(getattr(self.model, name))
             require(all(getattr(r, name).shape[1] == columns for r in self.recorded), name)
+        conditions = len(_conditions(self.model, self.model.starts[0]))
+        require(self.conditions.shape == (len(self.recorded), conditions), "conditions")
 
     @property
     def order(self) -> int:
         """No coordinates are solved for."""
         return 0
 
+    @cached_property
+    def _ranges(self) -> np.ndarray:
+        """Range of each input and condition over all training runs; infinite where it is zero."""
+        inputs = np.vstack([run.inputs for run in self.recorded])
+        ranges = np.append(np.ptp(inputs, axis=0), np.ptp(self.conditions, axis=0))
+        return np.where(ranges > 0.0, ranges, np.inf)
+
+    def for_model(self, model: Model) -> "ReplayModel":
+        """The same runs, asked for with the online parameters of another model."""
+        return replace(self, model=model)
+
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
-        """The training trajectory whose input is nearest (root mean square) to the maneuver's.
+        """The nearest training run: each of them is given back exactly.
+
+        The distance adds squares: of the RMS difference of each input, and of the difference of
+        each condition.  Each is divided by the range of its quantity over the training runs, so
+        units do not matter, and what is the same in all of them does not count.
 
         Runs of the maneuver's own output times come first.  If there are none, inputs are compared
         over the time that a run and the maneuver share, and the run is read at the maneuver's
         times: between samples linearly, after its end its last value.
         """
-        self.model.start(start)
-        times = maneuver.times
+        times, conditions = maneuver.times, _conditions(self.model, start)
         inputs = maneuver.at(times)
-        alike = [run for run in self.recorded if np.array_equal(run.times, times)]
-        nearest = min(alike or self.recorded, key=lambda run: _distance(run, times, inputs))
+        numbers = range(len(self.recorded))
+        alike = [k for k in numbers if np.array_equal(self.recorded[k].times, times)]
+        distance = partial(self._distance, times, inputs, conditions)
+        nearest = self.recorded[min(alike or numbers, key=distance)]
         paths = nearest.coordinates, nearest.speeds, nearest.outputs
         q, v, outputs = (_resampled(nearest.times, path, times) for path in paths)
         # Of a structure there are no coordinates to make outputs of.
@@ -60,6 +80,7 @@ class ReplayModel(ShortRepr):
             nearest,
             times=times,
             inputs=inputs,
+            model=self.model,
             coordinates=q,
             speeds=v,
             outputs=outputs,
@@ -67,16 +88,27 @@ class ReplayModel(ShortRepr):
             seconds=0.0,
         )
 
+    def _distance(
+        self, times: np.ndarray, inputs: np.ndarray, conditions: np.ndarray, number: int
+    ) -> float:
+        """Distance of a training run, over the time that both cover."""
+        run = self.recorded[number]
+        shared = times <= run.times[-1]
+        difference = _resampled(run.times, run.inputs, times[shared]) - inputs[shared]
+        of_inputs = np.sqrt(np.mean(difference**2, axis=0))
+        apart = np.append(of_inputs, self.conditions[number] - conditions)
+        return float(np.linalg.norm(apart / self._ranges))
+
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""
         del states
 
 
-def _distance(run: Trajectory, times: np.ndarray, inputs: np.ndarray) -> float:
-    """Mean square of the difference of the inputs over the time that both cover."""
-    shared = times <= run.times[-1]
-    difference = _resampled(run.times, run.inputs, times[shared]) - inputs[shared]
-    return float(np.mean(difference**2))
+def _conditions(model: Model, start: Start) -> np.ndarray:
+    """State at the start, speeds among it, and online parameters (k,)."""
+    values = model.parameters.values()
+    online = [np.ravel(values[name]) for name in model.definition.online]
+    return np.concatenate([model.start(start), *online])
 
 
 def _resampled(before: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -87,8 +119,10 @@ def _resampled(before: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.
 
 def fit(model: Model, training: Training, settings: Settings) -> ReplayModel:
     """Record the training runs at the output times."""
-    began, recorded = time.process_time(), tuple(run.recorded() for run in training)
-    return ReplayModel(model, recorded, offline_cost(began, model, recorded))
+    began = time.process_time()
+    recorded = tuple(replace(run.recorded(), model=model) for run in training)
+    conditions = np.array([_conditions(run.model, run.start) for run in training])
+    return ReplayModel(model, recorded, conditions, offline_cost(began, model, recorded))
 
 
 METHOD = Method(

@@ -20,7 +20,7 @@ from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.vector_lanes import LANES, padded
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import extent_of
-from vehiclemor.reduction.trust import inputs_beyond
+from vehiclemor.reduction.trust import by_factor, inputs_beyond
 from vehiclemor.reduction.vehicle.decoding_loops import (
     BESIDES,
     LEVELS,
@@ -50,11 +50,11 @@ FADED = 0.01
 SLOWEST = 1e-6
 # What is told besides ranges, in the order of the loop.
 REASONS = (
-    "it moves sideways for longer, or has longer ago, than any training run",
-    "it moves sideways before what its start excites has decayed",
-    "it starts sideways, as no training run does",
-    "its start leaves more than the slow motion, unlike any training run",
-    "it is steered further or quicker than any training run",
+    "lateral motion lasts longer, or ended longer ago, than in training",
+    "lateral motion begins earlier after such a start than in training",
+    "steering or lateral motion at the start is larger than in training",
+    "fast motion at the start leaves its training range",
+    "steering goes further or changes faster than in training",
 )
 BEYOND = np.array([STILL, MOVING, *np.arange(1, PARTS) / PARTS])
 
@@ -333,9 +333,10 @@ class Decoding(ShortRepr):
         # Of what is left at once the start tells most.
         column = len(first) - 1 - first[::-1].index(left)
         if column < len(watched):
-            reason = f"{watched[column][1]} leaves what the training runs have covered"
+            reason = f"{watched[column][1]} leaves its training range"
         else:
             reason = REASONS[column - len(watched)]
+        reason = by_factor(reason, largest[column])
         return space.states, Trust(max(largest), float(space.times[left]), reason)
 
 

@@ -17,7 +17,7 @@ from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component
 from vehiclemor.report.figures.result_plot import by_method, configuration, model_name
-from vehiclemor.report.figures.theme import COLORS, FULL, Style, panels, styled
+from vehiclemor.report.figures.theme import FULL, Style, panels, styled, styles
 from vehiclemor.report.labels import method_text
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -26,6 +26,8 @@ FRAMES_PER_SECOND, DOTS, DURATIONS, FACTORS = 12, 100, (0.5, 60.0), (0.01, 1000.
 # Half of what is seen of the road from above; and least and most of it from behind (m).
 ALONG, ACROSS, NARROWEST, WIDEST = 16.0, 7.0, 3.0, 6.5
 PLACE = ("longitudinal_position", "lateral_position", "yaw")
+# ISO 8855.
+AXES = "X, forward (m)", "Y, left (m)", "Z, up (m)"
 # Histories (frames,) and parameters by name.
 Values = Mapping[str, Any]
 # For the drawing only: sizes of a car whose parameters have other names, and of bodies (m).
@@ -196,35 +198,46 @@ def animate(
         raise InputError(f"out is {quoted(str(path))}; a film ends with .gif")
     replaceable(path, "film as GIF", begins_with(b"GIF8"))
     seconds = within("duration", number("duration", duration), DURATIONS, " s")
-    runs = [found for each in (run, *beside) for found in _histories(each)]
-    names = list(labels) or [text for text, _ in runs]
+    named = [pair for each in (run, *beside) for pair in _histories(each)]
+    methods, runs = [name for name, _ in named], [quantities for _, quantities in named]
+    texts = list(labels) or [method_text(name) for name in methods]
     if not labels and beside:
-        names[-1] = FULL_ORDER
-    if len(names) != len(runs):
-        raise InputError(f"labels: {len(runs)} runs are drawn, not {len(names)}")
-    found = [quantities for _, quantities in runs]
-    scene, followed = _scene(found), found[-1]
-    if not all(np.array_equal(followed["time"], h["time"]) for h in found):
+        texts[-1] = FULL_ORDER
+    if len(texts) != len(runs):
+        raise InputError(f"labels: {len(runs)} runs are drawn, not {len(texts)}")
+    scene, followed = _scene(runs), runs[-1]
+    if not all(np.array_equal(followed["time"], h["time"]) for h in runs):
         raise InputError("the runs have several times; a film shows runs of one input")
     factor = scene.magnify if magnify is None else number("magnify", magnify)
     values = _parameters(run), within("magnify", factor, FACTORS)
     finite = np.flatnonzero(np.isfinite([followed[n] for n in scene.needed]).all(0))
     if not len(finite):
         raise InputError("the last run has no finite values; the view follows it")
-    frames = max(2, round(FRAMES_PER_SECOND * seconds))
-    rows = np.linspace(finite[0], finite[-1], frames).round().astype(int)
+    count = max(2, round(FRAMES_PER_SECOND * seconds))
+    rows = np.linspace(finite[0], finite[-1], count).round().astype(int)
     with styled():
-        shown = [{name: h[name][rows] for name in h} for h in found]
+        looks = _styles(methods)
+        frames = [{name: h[name][rows] for name in h} for h in runs]
         try:
-            film = _film(scene, shown, names, values)
+            film = _film(scene, frames, texts, looks, values)
         except KeyError as missing:
             raise InputError(f"the drawing needs the parameter {missing} of the model") from None
         writer = PillowWriter(fps=FRAMES_PER_SECOND)
         return write_whole(path, lambda part: film.save(part, writer=writer, dpi=DOTS))
 
 
-def _film(scene: Scene, runs: list[Any], names: Sequence[str], values: Any) -> FuncAnimation:
-    """Two views, and in each of them a line a run that moves."""
+def _styles(methods: Sequence[str]) -> list[Style]:
+    """Style of each run: the colour of its method, the last one of several in grey."""
+    numbered = {str(k): method for k, method in enumerate(methods)}
+    found = styles(numbered, numbered)
+    looks = [found[key] | {"linestyle": "-", "linewidth": 1.2} for key in numbered]
+    return [*looks[:-1], FULL | {"zorder": 1.5, "linewidth": 3.5}] if len(looks) > 1 else looks
+
+
+def _film(
+    scene: Scene, runs: list[Any], names: Sequence[str], looks: Sequence[Style], values: Any
+) -> FuncAnimation:
+    """Two views, and in each of them a line a run that moves, behind a car its path so far."""
     followed, moves = runs[-1], scene.draw is car
     times = followed["time"]
     place, yaw = np.zeros((len(times), 1, 3)), 0.0 * times
@@ -233,38 +246,44 @@ def _film(scene: Scene, runs: list[Any], names: Sequence[str], values: Any) -> F
     figure, grid = panels(2, 1, (5.6, 4.4)) if moves else panels(1, 2, (5.6, 3.2))
     FigureCanvasAgg(figure)
     side, back = grid.ravel()
-    drawn = []
-    for k, (h, name) in enumerate(zip(runs, names, strict=True)):
-        style: Style = {"color": COLORS[k % len(COLORS)], "linewidth": 1.2}
-        style = FULL | {"zorder": 1.5, "linewidth": 3.5} if h is followed and k else style
-        if moves:
-            side.plot(h[PLACE[0]], h[PLACE[1]], **style | {"linewidth": 0.6})
-        space = scene.draw(h, *values)
-        behind = turned(space - place, "Z", -yaw)[..., 1:] * (-1.0, 1.0)
-        for axis, lines in ((side, space[..., scene.columns]), (back, behind)):
-            (curve,) = axis.plot(*lines[0].T, **style, label=name)
-            drawn.append((curve, lines))
-    told = f", motion x {values[1]:g}" if values[1] != 1.0 else ""
-    for axis, title in ((side, scene.view), (back, f"from behind{told}")):
-        every = np.concatenate([lines.reshape(-1, 2) for c, lines in drawn if c.axes is axis])
+    views = [(side, scene.view, scene.columns), (back, "from behind", [1, 2])]
+    spaces = [scene.draw(h, *values) for h in runs]
+    moving, paths = [], []
+    for axis, title, columns in views:
+        relative = [turned(s - place, "Z", -yaw) for s in spaces] if axis is back else spaces
+        shown = [space[..., columns] for space in relative]
+        for lines, look, name in zip(shown, looks, names, strict=True):
+            moving.append((axis.plot(*lines[0].T, **look, label=name)[0], lines))
+        every = np.concatenate([lines.reshape(-1, 2) for lines in shown])
         low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)
         edge = 0.05 * (high - low).max()
         if moves:
             reach = np.clip(abs(every[:, 0]), NARROWEST, WIDEST)
             low[0], high[0] = -np.nanmax(reach), np.nanmax(reach)
-        axis.set(aspect="equal", title=title, xlabel="m", ylabel="m")
+        across, up = (AXES[column] for column in columns)
+        axis.set(aspect="equal", title=title, xlabel=across, ylabel=up)
         axis.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
+    # The left side of a car stands at the left of who drives behind it.
+    back.invert_xaxis()
+    if values[1] != 1.0:
+        back.set_title(f"from behind, motion x {values[1]:g}")
+    for h, look in zip(runs, looks, strict=True) if moves else ():
+        (path,) = side.plot([], [], **look | {"linewidth": 0.6})
+        paths.append((path, np.stack([h[name] for name in PLACE[:2]])))
 
     def show(frame: int) -> None:
-        for curve, lines in drawn:
+        for curve, lines in moving:
             curve.set_data(*lines[frame].T)
+        for path, driven in paths:
+            path.set_data(*driven[:, : frame + 1])
         figure.suptitle(f"t = {times[frame]:.1f} s")
         if moves:
             (x, y, _) = place[frame, 0]
             side.set(xlim=(x - ALONG, x + ALONG), ylim=(y - ACROSS, y + ACROSS))
 
     show(0)
-    figure.legend(handles=[curve for curve, _ in drawn[::2]], loc="outside lower center", ncols=4)
+    handles = [curve for curve, _ in moving if curve.axes is side]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
     figure.draw_without_rendering()
     # The panels stay where they are while the numbers beside them change.
     figure.set_layout_engine("none")
@@ -272,16 +291,16 @@ def _film(scene: Scene, runs: list[Any], names: Sequence[str], values: Any) -> F
 
 
 def _histories(run: Any) -> list[tuple[str, dict[str, np.ndarray]]]:
-    """Name and quantities (samples,) of a run; of a dataset each method's, the full order last."""
+    """Method and quantities (samples,) of a run; of a dataset each one's, the full order last."""
     dataset = run.dataset() if isinstance(run, Trajectory) else run
     if not isinstance(dataset, xr.Dataset) or "outputs" not in dataset:
         raise InputError(f"{quoted(run)} is neither a run nor a dataset with histories")
     dataset = by_method(dataset, "reduced")
     known = [str(label) for label in dataset["label"].values]
     reduced = [label for label in known if not label.startswith("full_order")] or known[:1]
-    found = [(method_text(n), _quantities(dataset.sel(label=n), "outputs")) for n in reduced]
+    found = [(name, _quantities(dataset.sel(label=name), "outputs")) for name in reduced]
     if "reference_outputs" in dataset and not reduced[0].startswith("full_order"):
-        found += [(FULL_ORDER, _quantities(dataset.isel(label=0), "reference_outputs"))]
+        found += [("full_order", _quantities(dataset.isel(label=0), "reference_outputs"))]
     return found
 
 

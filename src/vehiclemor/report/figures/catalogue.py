@@ -14,18 +14,13 @@ from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report import default_studies
-from vehiclemor.report.figures import costs, result_plot, runs, theme
-from vehiclemor.report.result_selection import drawn
+from vehiclemor.report.figures import result_plot, runs, theme
+from vehiclemor.report.result_selection import KINDS, select_point
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import is_study, refuse_doubles, studies_and_files
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.run import run_studies
 
-# What is drawn of a study that has no grid.
-DRAWINGS: Mapping[str, Callable[[xr.Dataset], Figure]] = {
-    "pareto": costs.figure_pareto,
-    "size": costs.figure_size,
-}
 # Figures that every model has, of all registered methods: study, what is drawn of it.
 OF_A_MODEL: Mapping[str, tuple[Callable[[str, Path], str], str]] = {
     "histories": (default_studies.nominal, "histories"),
@@ -45,12 +40,9 @@ class Entry(NamedTuple):
 
     def draw(self, dataset: xr.Dataset) -> Figure:
         """Draw a study at its nominal or first point, its errors over the whole grid."""
-        if self.kind in DRAWINGS:
-            return DRAWINGS[self.kind](dataset)
-        shown, point = drawn(dataset, self.kind, {})
-        if point:
-            shown = shown.assign_attrs(title=f"{shown.attrs['title']}\nat {point}")
-        return result_plot.figure_of(shown, self.kind)
+        if self.kind not in KINDS:
+            return result_plot.PICTURES[self.kind].draw(dataset)
+        return result_plot.figure_of(select_point(dataset, self.kind, {})[0], self.kind)
 
 
 def find(name: str, results: Path) -> list[Entry]:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.theme import Style
+from vehiclemor.report.labels import raised
 from vehiclemor.report.sizes import KINDS, growth, size_rows
 from vehiclemor.report.unseen import method_rows, protocol_of
 from vehiclemor.study.plans.protocol import FULL_ORDER
@@ -58,12 +59,13 @@ def figure_pareto(dataset: xr.Dataset) -> Figure:
     for score in rows["score"][rows["method"] == "replay"]:
         axis.axhline(score, color="#666666", linestyle=":", label="replay (no time)")
     reduced = rows[(rows["role"] != FULL_ORDER) & (rows["method"] != "replay")]
-    looks = zip(cycle(theme.COLORS), cycle(theme.MARKERS))
-    for row in reduced[np.isfinite(reduced["time"])].itertuples():
-        color, marker = next(looks)
-        failed = not np.isfinite(row.score)
+    reduced = reduced[np.isfinite(reduced["time"])]
+    methods = reduced.set_index("label")["method"].to_dict()
+    looks, marks = theme.styles(methods, methods), theme.marks(methods, methods)
+    for row in reduced.itertuples():
+        color, failed = looks[row.label]["color"], not np.isfinite(row.score)
         # Hollow, so that one shows through the other.
-        look = {"color": color, "marker": "x" if failed else marker, "linestyle": "none"}
+        look = {"color": color, "marker": "x" if failed else marks[row.label], "linestyle": "none"}
         look |= {"markersize": 11, "markeredgewidth": 2.4} if row.winner else {"markersize": 7}
         look |= {"xerr": row.bar, "elinewidth": 1.0, "capsize": 2, "markerfacecolor": "none"}
         label = f"{row.label}{' (fails)' * failed}{' (chosen)' * bool(row.winner)}"
@@ -98,8 +100,9 @@ def figure_size(dataset: xr.Dataset) -> Figure:
     meshes = [kind for kind in dict.fromkeys(kinds.tolist()) if kind != "vehicle"]
     for kind, look in zip(meshes, LOOKS, strict=False):
         own, word = kinds == kind, KINDS.get(kind, (kind, ""))[0]
-        slope = f"{word}, full: n^{growth(dataset, kind, FULL):.1f}"
-        left.plot(n[own], full[own], label=slope, **look)
+        exponent = growth(dataset, kind, FULL)
+        slope = raised(f": n^{exponent:.1f}") if np.isfinite(exponent) else ""
+        left.plot(n[own], full[own], label=f"{word}, full{slope}", **look)
         hollow: Style = look | {"markerfacecolor": "none", "linestyle": "--"}
         left.plot(n[own], reduced[own], label=f"{word}, {name}", **hollow)
         right.plot(n[own], full[own] / reduced[own], label=f"{word}, the same mesh", **look)

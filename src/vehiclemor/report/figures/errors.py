@@ -5,6 +5,7 @@ has: curves over one, a map over two where more varies, clouds over samples.
 """
 
 import itertools
+import textwrap
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -20,12 +21,15 @@ from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.runs import legend_of
 from vehiclemor.report.figures.theme import Places, Style, places_of, tick_decades
 from vehiclemor.report.findings import at_point
+from vehiclemor.report.frames import saturated_ranks
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
 # Lines of a panel, and sampled quantities with panels.
 LINES, SAMPLED = 8, 3
+# Letters of an axis' label in a line.
+LETTERS = 38
 # Between marks of two lines above the axes, as a share of their height.
 SHIFT = 0.025
 # What a logarithmic axis can't show: its mark, its height as a share of the axes, its text.
@@ -50,27 +54,38 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
         raise InputError("no errors in this result: it was not compared with full order")
     known = {str(label): labels.method_text(str(label)) for label in dataset["label"].values}
     reduced = {m: text for m, text in known.items() if not m.startswith("full_order")}
-    methods = reduced or known
     if not _varied(dataset):
         return _of_a_point(dataset, reduced)
+    methods = reduced or known
+    saturated = saturated_ranks(dataset)
     axis, *others = _varied(dataset)
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
-    lines = _lines(errors, methods, others)
-    sampled, factors = _is_sample(axis), set(FACTORS) <= {axis, *others}
-    mapped = not sampled and (factors or len(lines) > max(LINES, len(methods)))
-    shown = [axis] if not mapped else list(FACTORS) if factors else [axis, others[0]]
+    lines = _lines(errors, methods, others, saturated)
+    if _is_sample(axis):
+        picture, shown = "cloud", [axis]
+    elif set(FACTORS) <= {axis, *others}:
+        picture, shown = "map", list(FACTORS)
+    elif len(lines) > max(LINES, len(methods)):
+        picture, shown = "map", [axis, others[0]]
+    else:
+        picture, shown = "curves", [axis]
+    notes = [f"{dataset.sizes[axis]} samples"] if picture == "cloud" else []
     rest = [name for name in others if name not in shown]
-    notes = [f"{dataset.sizes[axis]} samples"] if sampled else []
-    if sampled or mapped:
+    if picture != "curves":
         errors = errors.max(rest)
         lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
         notes += [f"the largest error over {_listed(rest)}"] if rest else []
-    if mapped:
+    if picture == "map":
         notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
         figure = _map(dataset, errors, methods, outputs, shown)
     else:
-        places = _sampled(dataset, axis) if sampled else [places_of(dataset, axis)]
+        places = _sampled(dataset, axis) if picture == "cloud" else [places_of(dataset, axis)]
         figure = _panels(dataset, axis, places, outputs, lines)
+    reached = [f"{methods[label]} saturates at {rank}" for label, rank in saturated.items()]
+    for panel in figure.axes if reached else ():
+        for ranks in (panel.xaxis, panel.yaxis):
+            if ranks.get_label_text() == "rank":
+                ranks.set_label_text(textwrap.fill(f"rank; {', '.join(reached)}", LETTERS))
     # A line above the panels, how many runs were trained on, and the legend.
     held = labels.trained_runs(dataset).sel(label=list(methods))
     count = int(held.sum())
@@ -111,8 +126,9 @@ def _varied(dataset: xr.Dataset) -> list[str]:
     names = [name for name, size in sizes.items() if size > 1]
     numbers = [name for name in names if np.issubdtype(dataset[name].dtype, np.number)]
 
-    def order(name: str) -> tuple[bool, bool, bool, int]:
-        return _is_sample(name), name in numbers, name in FACTORS, sizes[name]
+    # A factor goes before a setting with as many values.
+    def order(name: str) -> tuple[bool, bool, int, bool]:
+        return _is_sample(name), name in numbers, sizes[name], name in FACTORS
 
     return sorted(names, key=order, reverse=True)
 
@@ -122,7 +138,12 @@ def _listed(dimensions: Sequence[str]) -> str:
     return f"{', '.join(head)} and {last}" if head else last
 
 
-def _lines(errors: xr.DataArray, methods: Mapping[str, str], others: Sequence[str]) -> Lines:
+def _lines(
+    errors: xr.DataArray,
+    methods: Mapping[str, str],
+    others: Sequence[str],
+    saturated: Mapping[str, int],
+) -> Lines:
     """A line for each combination of what a method's errors depend on."""
     found: dict[str, tuple[str, xr.DataArray]] = {}
     for label, text in methods.items():
@@ -134,6 +155,8 @@ def _lines(errors: xr.DataArray, methods: Mapping[str, str], others: Sequence[st
             for name, value in zip(own, place, strict=True):
                 unit = str(errors[name].attrs.get("units", "")).removesuffix("1")
                 shown = value if isinstance(value, str) else f"{value:g}"
+                if name == "rank" and float(value) > saturated.get(label, np.inf):
+                    shown += f" (saturates at {saturated[label]})"
                 parts.append(f"{_listed([name])} {shown} {unit}".rstrip())
             chosen = line.sel(dict(zip(own, place, strict=True)))
             found[", ".join([label, *parts])] = ", ".join([text, *parts]), chosen
@@ -160,10 +183,11 @@ def _draw_panel(
 ) -> None:
     """Lines of one output; over perturbations the published error."""
     cloud = _is_sample(dimension)
-    looks = theme.styles(lines)
-    for marker, (name, (text, errors)) in zip(itertools.cycle(theme.MARKERS), lines.items()):
+    methods = theme.methods_of(dataset)
+    looks, marks = theme.styles(lines, methods), theme.marks(lines, methods)
+    for name, (text, errors) in lines.items():
         values = errors.sel(output=output).values.ravel()
-        look: Style = {**looks[name], "marker": marker, "markersize": 3.5}
+        look: Style = {**looks[name], "marker": marks[name], "markersize": 3.5}
         # Names and samples have no order that a line could follow.
         look |= {"linestyle": "none"} if places.names or cloud else {}
         if cloud:
@@ -276,12 +300,13 @@ def _of_a_point(dataset: xr.Dataset, methods: Mapping[str, str]) -> Figure:
     names = [str(output) for output in dataset["output"].values]
     figure, grid = theme.panels(1, 1, (6.7, 1.6 + 0.19 * len(names)))
     axis, places = grid[0, 0], np.arange(len(names))
-    texts, looks = legend_of(dataset, methods), theme.styles(methods)
-    for marker, (label, text) in zip(itertools.cycle(theme.MARKERS), texts.items()):
+    texts, known = legend_of(dataset, methods), theme.methods_of(dataset)
+    looks, marks = theme.styles(methods, known), theme.marks(methods, known)
+    for label, text in texts.items():
         run = at_point(dataset, label)
         share = 100.0 * (run["rms_error"] / run["signal_range"])
         share = share.where(np.isfinite(share) & (share > 0.0))
-        look: Style = {"color": looks[label]["color"], "marker": marker, "markersize": 5}
+        look: Style = {"color": looks[label]["color"], "marker": marks[label], "markersize": 5}
         exact = " (error 0)" if bool((run["rms_error"] == 0.0).all()) else ""
         axis.semilogx(share, places, label=text + exact, linestyle="none", **look)
     tick_decades(axis.xaxis, *axis.get_xlim())

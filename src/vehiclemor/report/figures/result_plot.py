@@ -3,25 +3,56 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import xarray as xr
 from matplotlib.figure import Figure
 
 from vehiclemor.exceptions import InputError
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
+from vehiclemor.report.figures.costs import figure_pareto, figure_size
 from vehiclemor.report.figures.errors import figure_errors
-from vehiclemor.report.figures.runs import figure_histories, figure_paths
+from vehiclemor.report.figures.runs import PATH, figure_histories, figure_paths
 from vehiclemor.report.figures.theme import save_figure, styled, tell_empty
 from vehiclemor.report.labels import main_outputs, tabled_outputs
 
 # At most so many outputs have panels.
 PANELS = 3
-DRAWINGS: dict[str, Callable[[xr.Dataset], Figure]] = {
-    "histories": lambda dataset: figure_histories(dataset, outputs=shown_outputs(dataset)),
-    "paths": figure_paths,
-    "errors": lambda dataset: figure_errors(dataset, outputs=shown_outputs(dataset)),
+
+
+class Picture(NamedTuple):
+    """A kind of picture: what stands above it on a page, and what draws it."""
+
+    caption: str
+    draw: Callable[[xr.Dataset], Figure]
+
+
+# Those of `labels.Kind` are of a run or a point of a grid, the others of a study as it is.
+PICTURES = {
+    "histories": Picture(
+        "Outputs over the time, differences from full order below",
+        lambda data: figure_histories(
+            data, outputs=shown_outputs(data), inputs=_input_meanings(data)
+        ),
+    ),
+    "paths": Picture("Paths in the plane, distances from full order below", figure_paths),
+    "errors": Picture("RMS errors", lambda data: figure_errors(data, outputs=shown_outputs(data))),
+    "pareto": Picture("Worst error over bound, over time", figure_pareto),
+    "size": Picture("Times over the size of the model", figure_size),
 }
+
+
+def pictures_of(dataset: xr.Dataset) -> list[str]:
+    """Kinds of pictures that the result of a study has the data for."""
+    if "mesh" in dataset.dims:
+        return ["size"]
+    if "scenario_set" in dataset.coords:
+        return ["pareto"]
+    if not dataset.sizes.get("time"):
+        return ["errors"]
+    path = ["paths"] if set(PATH) <= set(dataset["output"].values) else []
+    return ["histories", *path, "errors"]
 
 
 def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "histories") -> Figure:
@@ -45,7 +76,7 @@ def figure_of(dataset: xr.Dataset, kind: str) -> Figure:
     if not dataset.sizes.get("output"):
         raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     dataset = by_method(dataset)
-    figure = DRAWINGS[kind](dataset)
+    figure = PICTURES[kind].draw(dataset)
     lines = filter(None, (_title(dataset), figure.get_suptitle()))
     figure.suptitle("\n".join(lines), fontsize="medium", wrap=True)
     tell_empty(figure)
@@ -65,7 +96,8 @@ def model_name(dataset: xr.Dataset) -> str:
 def by_method(dataset: xr.Dataset, unnamed: str = "run") -> xr.Dataset:
     """A result on the dimension `label`, which that of one run does not have."""
     if "label" not in dataset.coords:
-        dataset = dataset.assign_coords(label=configuration(dataset).get("method", unnamed))
+        method = dataset.attrs.get("method") or configuration(dataset).get("method", unnamed)
+        dataset = dataset.assign_coords(label=method)
     return dataset if "label" in dataset.dims else dataset.expand_dims("label")
 
 
@@ -82,11 +114,24 @@ def _title(dataset: xr.Dataset) -> str:
 def shown_outputs(dataset: xr.Dataset) -> list[str]:
     """Outputs that the model shows; of a model that is not installed here, the first."""
     known = [str(output) for output in dataset["output"].values]
-    try:
-        definition = component("model", model_name(dataset))
+    shown: list[str] = []
+    if definition := _definition(dataset):
         main = main_outputs(definition)
         shown = list(dict.fromkeys((*main, *tabled_outputs(definition))))[: max(2, len(main))]
-    except InputError:
-        shown = []
     # Of outputs that a user has chosen none may be among them.
     return ([output for output in shown if output in known] or known)[:PANELS]
+
+
+def _input_meanings(dataset: xr.Dataset) -> dict[str, str]:
+    """Meaning of each input, without its remarks."""
+    definition = _definition(dataset)
+    inputs = definition.inputs if definition else ()
+    return {quantity.name: quantity.long_name.partition(",")[0] for quantity in inputs}
+
+
+def _definition(dataset: xr.Dataset) -> ModelDefinition | None:
+    """The model of a result, if it is installed here."""
+    try:
+        return component("model", model_name(dataset))
+    except InputError:
+        return None

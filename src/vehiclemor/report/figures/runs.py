@@ -1,6 +1,7 @@
 """Runs of any model: histories and paths of full order and reduced models, and their errors."""
 
 import itertools
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -17,6 +18,8 @@ from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 
+# Lines of inputs.
+INPUTS = ("-", *theme.DASHES)
 # Outputs that make a path in the plane.
 PATH = ("longitudinal_position", "lateral_position")
 DISTANCE = "distance from full order at the same time"
@@ -25,7 +28,9 @@ RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
 # the largest value below which the full order stands still.
 REACH, STILL = 0.6, 1e-4
 # Height of a panel in inches; letters of a label beside it in one line.
-HISTORY, ERROR, LINE = 2.2, 1.7, 26
+HISTORY, ERROR, LINE = 2.5, 1.8, 26
+# Letters in a line of an input's meaning.
+MEANING = 20
 
 
 class Curve(NamedTuple):
@@ -82,33 +87,61 @@ def runs_of(dataset: xr.Dataset, texts: Mapping[str, str]) -> Runs:
     if several:
         raise InputError(f"choose a point of the grid first: {', '.join(several)}")
     with_full = (p for p in points.values() if bool(p["reference_outputs"].notnull().any()))
-    looks = theme.styles(texts)
+    looks = theme.styles(texts, theme.methods_of(dataset))
     curves = [Curve(label, text, looks[label], points[label]) for label, text in texts.items()]
     return Runs(next(with_full, next(iter(points.values()))), curves)
 
 
-def figure_histories(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
-    """Outputs over the time, side by side, at a point of a study; their errors below."""
+def figure_histories(
+    dataset: xr.Dataset, *, outputs: Sequence[str], inputs: Mapping[str, str]
+) -> Figure:
+    """Outputs over the time, side by side, at a point of a study; their errors below.
+
+    The inputs, with their meanings by name, stand at the right, if the result has them.
+    """
     texts = legend_of(dataset)
     runs = runs_of(dataset, texts)
     rows = [draw_history]
     if runs.compared:
         rows.append(draw_largest_errors if len(texts) > 1 else draw_errors)
     heights = [HISTORY, ERROR][: len(rows)]
-    columns = len(outputs)
+    columns = len(outputs) + ("inputs" in runs.full)
     size = (6.7 if columns < 3 else 9.5, sum(heights) + 1.2)
     ratios = {"height_ratios": heights}
     figure, axes = theme.panels(len(rows), columns, size, sharex=True, gridspec_kw=ratios)
-    cells = itertools.product(rows, outputs)
-    for number, (axis, (draw, output)) in enumerate(zip(axes.flat, cells, strict=True)):
+    lowest = list(axes[-1, : len(outputs)])
+    if "inputs" in runs.full:
+        for axis in axes[1:, -1]:
+            axis.remove()
+        draw_inputs(axes[0, -1], runs.full, inputs)
+        axes[0, -1].tick_params(labelbottom=True)
+        lowest.append(axes[0, -1])
+    for number, axis in enumerate(figure.axes):
         axis.set_title(theme.letter(number))
-        draw(axis, runs, output)
+    for row, draw in zip(axes, rows, strict=True):
+        for axis, output in zip(row, outputs, strict=False):
+            draw(axis, runs, output)
     time = dataset["time"].values
-    for axis in axes[-1]:
+    for axis in lowest:
         axis.set_xlabel("time (s)")
         axis.set_xlim(float(time[0]), float(time[-1]))
-    theme.legend_below(figure, axes.flat)
+    theme.legend_below(figure, figure.axes)
     return figure
+
+
+def draw_inputs(axis: Axes, run: xr.Dataset, meanings: Mapping[str, str]) -> None:
+    """Inputs that change, or the first, over the time; of several units those of the first."""
+    inputs = run["inputs"].transpose("input", "time").values
+    names, units = run["input"].values.tolist(), run["input_unit"].values.tolist()
+    moving = np.flatnonzero(np.ptp(inputs, axis=1) > 0.0).tolist() or [0]
+    shown = [k for k in moving if units[k] == units[moving[0]]]
+    for k, dashes in zip(shown, itertools.cycle(INPUTS), strict=False):
+        label = f"input {names[k]}".replace("_", " ") if len(shown) > 1 else ""
+        look: Style = {"color": "black", "linewidth": 1.0, "linestyle": dashes}
+        axis.plot(run["time"], inputs[k], label=label, **look)
+    text = meanings.get(names[shown[0]], names[shown[0]]) if len(shown) == 1 else "inputs"
+    unit = labels.raised(units[shown[0]])
+    axis.set_ylabel(textwrap.fill(f"{text} ({unit})", MEANING))
 
 
 def draw_history(axis: Axes, runs: Runs, output: str) -> None:
@@ -164,10 +197,10 @@ def _errors(runs: Runs, output: str) -> list[xr.DataArray]:
 
 def draw_errors(axis: Axes, runs: Runs, output: str) -> None:
     """Errors over the time, and the RMS error of the best approximation by the first method."""
-    found, own_unit = _errors(runs, output), labels.unit_of(runs.full, output)
-    largest = np.fmax.reduce([float(abs(error).max()) for error in found])
-    factor, unit = labels.readable_unit(float(largest), own_unit)
-    for curve, error in zip(runs.curves, found, strict=True):
+    errors = _errors(runs, output)
+    largest = np.fmax.reduce([float(abs(error).max()) for error in errors])
+    factor, unit = labels.readable_unit(float(largest), labels.unit_of(runs.full, output))
+    for curve, error in zip(runs.curves, errors, strict=True):
         axis.plot(error["time"], factor * error, label=curve.text, **curve.style)
     held = [c.run["floor_rms_error"] for c in runs.curves if "floor_rms_error" in c.run]
     floors = [factor * floor.sel(output=output).item() for floor in held]
@@ -177,7 +210,8 @@ def draw_errors(axis: Axes, runs: Runs, output: str) -> None:
         axis.axhspan(-best, best, **shade)
     rms = runs.curves[0].run["rms_error"].sel(output=output).item()
     if len(runs.curves) == 1 and np.isfinite(rms):
-        axis.set_title(f"{axis.get_title(loc='left')} RMS error {rms:.2g} {own_unit}")
+        text = f"RMS error {factor * rms:.3g} {labels.raised(unit)}"
+        axis.set_title(f"{axis.get_title(loc='left')} {text}")
     axis.set_ylabel(labels.error_label(runs.full, "error", output, unit))
 
 
@@ -216,7 +250,8 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> None:
     tick_decades(axis.yaxis, *axis.get_ylim())
     label = f"largest error of {labels.label_of(output).symbol}"
     label = label if len(label) <= LINE else label.replace(" of ", "\nof ", 1)
-    axis.set_ylabel(f"{label}\nin each {period:.2g} s ({labels.unit_of(runs.full, output)})")
+    unit = labels.raised(labels.unit_of(runs.full, output))
+    axis.set_ylabel(f"{label}\nin each {period:.2g} s ({unit})")
 
 
 def figure_paths(dataset: xr.Dataset) -> Figure:

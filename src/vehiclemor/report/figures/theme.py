@@ -1,24 +1,27 @@
 """One look for all figures: lines, panels, axes, legends, and the files they are written to."""
 
 import string
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from itertools import cycle
+from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib.style
 import numpy as np
 import xarray as xr
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
 from vehiclemor.arguments import count, quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import NO_FILE, begins_with, replaceable, write_whole
-from vehiclemor.report.labels import MARK, TRAINED
+from vehiclemor.report.labels import MARK, TRAINED, MethodLook, declared, raised
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
 Style = dict[str, Any]
@@ -32,11 +35,10 @@ METADATA: dict[str, dict[str, None]] = {
     "svg": {"Date": None, "Creator": None},
     "png": {"Software": None},
 }
-# Colour-blind safe (M. Okabe, K. Ito).
+# Colour-blind safe (M. Okabe, K. Ito); and the colours of more lines than these.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+RAMP = "viridis"
 FULL: Style = {"color": "black", "linewidth": 2.6, "alpha": 0.45}
-# Gaps of an upper line show the lower one where both coincide.
-OTHER: Style = {"color": "#009E73", "linestyle": (0, (5, 1, 1, 1, 1, 1))}
 # Lines differ where they are printed in grey too.
 DASHES = ("--", (0, (8, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2, 2, 2)))
 # Without the marks of what has failed, and of an error 0 on a logarithmic axis.
@@ -44,16 +46,6 @@ MARKERS = "os^D<>phP*d"
 CROSS: Style = {"marker": "x", "markersize": 6, "markeredgewidth": 1.6, "linestyle": "none"}
 ZERO: Style = {"marker": 7, "markersize": 6, "linestyle": "none"}
 THIN: Style = {"color": "black", "linewidth": 0.8}
-# Label of a method in a study -> its style.
-STYLES: dict[str, Style] = {
-    "full_order": FULL,
-    "replay": {"color": "#666666", "linestyle": ":", "linewidth": 2.0, "zorder": 2.6},
-    "pod": {"color": "#0072B2", "linestyle": (0, (3, 3)), "zorder": 2.5},
-    "pod_literal": {"color": "#D55E00", "linestyle": "-."},
-    "pod_state": OTHER,
-    "pod_r3": OTHER,
-    "fixed_basis": OTHER,
-}
 # Of a legend in inches: what stands beside a text, and a letter of it.
 HANDLE, LETTER = 0.55, 0.068
 UNITS = {"control_period": "s"}
@@ -63,18 +55,53 @@ UNITS = {"control_period": "s"}
 WIDE, LETTERS, FEW_DECADES, SMALL = 30.0, 60, 2.5, 1e-4
 
 
-def styles(methods: Iterable[str]) -> dict[str, Style]:
-    """Style of each method by its label: its own, or a colour and dashes that no other line has."""
-    methods = list(methods)
-    own = {STYLES[method]["color"]: method for method in reversed(methods) if method in STYLES}
-    free = cycle([color for color in COLORS if color not in own] or list(COLORS))
-    dashes = cycle(DASHES)
-    return {
-        method: STYLES[method]
-        if method in own.values()
-        else {"color": next(free), "linestyle": next(dashes)}
-        for method in methods
-    }
+def look_of(label: str, methods: Mapping[str, str]) -> MethodLook | None:
+    """Look of a label, or of the method that it is of; none of what the package does not have."""
+    known = declared().methods
+    return known.get(label) or known.get(methods.get(label, ""))
+
+
+def method_style(look: MethodLook) -> Style:
+    """Colour and dashes, whose gaps show a line below."""
+    return {"color": look.color, "linestyle": (0, tuple(look.dashes))}
+
+
+def styles(labels: Iterable[str], methods: Mapping[str, str]) -> dict[str, Style]:
+    """Style of each label: that of its method, of further ones what no other line has."""
+    known: dict[str, Style] = {}
+    rest: list[str] = []
+    for label in labels:
+        look = look_of(label, methods)
+        style = method_style(look) if look else FULL
+        if (look or label == "full_order") and style not in known.values():
+            known[label] = style
+        else:
+            rest.append(label)
+    taken = {style["color"] for style in known.values()}
+    colors = [color for color in COLORS if color not in taken]
+    if len(rest) > len(colors):
+        colors = [to_hex(color) for color in colormaps[RAMP](np.linspace(0.0, 0.95, len(rest)))]
+    for label, color, dashes in zip(rest, colors, cycle(DASHES), strict=False):
+        known[label] = {"color": color, "linestyle": dashes}
+    return known
+
+
+def marks(labels: Iterable[str], methods: Mapping[str, str]) -> dict[str, str]:
+    """Mark of each label: that of its method, for further ones the marks in turn."""
+    known: dict[str, str] = {}
+    free = cycle(MARKERS)
+    for label in labels:
+        look = look_of(label, methods)
+        taken = known.values()
+        known[label] = look.mark if look and look.mark not in taken else next(free)
+    return known
+
+
+def methods_of(dataset: xr.Dataset) -> dict[str, str]:
+    """Label -> method, as far as a result tells."""
+    if "method" not in dataset.coords or dataset["method"].dims != ("label",):
+        return {}
+    return dataset["method"].to_series().to_dict()
 
 
 def panels(
@@ -136,7 +163,7 @@ def places_of(dataset: xr.Dataset, name: str) -> Places:
     if not np.issubdtype(values.dtype, np.number):
         return Places(np.arange(len(values)), text, [str(value) for value in values])
     unit = str(dataset[name].attrs.get("units", UNITS.get(name, "1")))
-    return Places(values, text if unit == "1" else f"{text} ({unit})")
+    return Places(values, text if unit == "1" else f"{text} ({raised(unit)})")
 
 
 def tick_decades(axis: Axis, low: float, high: float) -> None:
@@ -169,7 +196,8 @@ def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
 
     fitting = (n for n in range(len(shown), 1, -1) if width(n) <= figure.get_figwidth())
     # As few columns as the rows need, so that none stands almost empty.
-    columns = -(-len(shown) // -(-len(shown) // next(fitting, 1)))
+    rows = ceil(len(shown) / next(fitting, 1))
+    columns = ceil(len(shown) / rows)
     title = f"{MARK} {TRAINED}" if any(MARK in text for text in shown) else None
     where = "outside lower center"
     figure.legend(shown.values(), shown, loc=where, ncols=columns, title=title)

@@ -22,7 +22,7 @@ from vehiclemor.simulation.integrators.structures import Control
 # Step sizes (s) for which operators are stored.  Where a step and the nearest of them differ more,
 # its error grows and steps are rejected.
 STEP_GRID = 2.0 ** (0.125 * np.arange(-128, 25))
-# A run that needs more evaluations of its right-hand side than this is going nowhere.
+# A run that needs more evaluations of its right-hand side than this for a second goes nowhere.
 MOST_CALLS = 100_000
 
 

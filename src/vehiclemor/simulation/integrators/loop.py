@@ -62,6 +62,8 @@ def integrate(
     x = vector(buffer, 0, n)
     for i in range(n):
         x[i] = start[i]
+    second = vector(buffer, scratch_end(n, inputs) - 2, 2)
+    second[0], second[1] = spans.edges[0], 0.0
     samples, path, counts = output.samples, output.path, output.counts
     sample, window, segment, h = 0, -1, -1, control.first
     dim = subspaces.ranks[0]
@@ -100,7 +102,7 @@ def integrate(
 def scratch_end(n, inputs):
     """First place of the buffer that `on_span` leaves to the integrator."""
     half = n // 2
-    return 3 * n + inputs + 2 * half * (half + 1)
+    return 3 * n + inputs + 2 * half * (half + 1) + 2
 
 
 def on_span(equations, signal, subspaces, segment, window, sizes, buffer):
@@ -120,6 +122,7 @@ def on_span(equations, signal, subspaces, segment, window, sizes, buffer):
         vector(buffer, 2 * n, n),
         matrix(buffer, first, half, half + 1),
         matrix(buffer, first + half * (half + 1), half, half + 1),
+        vector(buffer, scratch_end(n, inputs) - 2, 2),
     )
 
 
@@ -145,7 +148,7 @@ def over_span(problem, times, h, method, control, work, output, sample):
     tried = h
     before, rejected = control.memory_start, False
     while t < end - 1e-12 * (1.0 + abs(end)):
-        if counts[RHS_CALLS] > control.most_calls:
+        if calls_of_this_second(problem, t, counts) > control.most_calls:
             return TOO_MANY_CALLS, t, tried, sample
         h = longest_step(min(tried, control.longest), method, control, work)
         if t + 1.0001 * h > end:
@@ -192,6 +195,14 @@ def over_span(problem, times, h, method, control, work, output, sample):
         # A step that was cut at the end of the span says nothing against longer ones.
         tried = h * factor if whole else max(tried, h * factor)
     return FINISHED, t, tried, sample
+
+
+def calls_of_this_second(problem, t, counts):
+    """Evaluations of the right-hand side since the present second of the run began."""
+    second = problem.second
+    if t >= second[0] + 1.0:
+        second[0], second[1] = t, counts[RHS_CALLS]
+    return counts[RHS_CALLS] - second[1]
 
 
 def next_point(output, sample):

@@ -85,7 +85,7 @@ class Control(NamedTuple):
         In s: shortest first guess of a step, longest step, longest first step after a break point
         of the inputs, first step to try (0 if it is to be guessed).
     most_calls
-        Evaluations of the right-hand side after which a run is given up.
+        Evaluations of the right-hand side within a second of the run after which it ends.
     """
 
     exponent: Float
@@ -153,7 +153,7 @@ class Problem(NamedTuple):
 
     A segment of the signal, the mean (n,) of the window, trial and test basis (R, n) by rows.
     Scratch: state (n,), inputs, rates (n,); mass matrix and forces (n / 2, n / 2 + 1), and their
-    projection.
+    projection; when the present second of the run began, and how many calls there had been.
     """
 
     segment: int
@@ -167,6 +167,7 @@ class Problem(NamedTuple):
     dx: Vector
     second_order: Matrix
     small: Matrix
+    second: Vector
 
 
 class Work(NamedTuple):

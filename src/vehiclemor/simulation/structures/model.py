@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.arguments import number, within
 from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError, blamed
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
@@ -16,7 +17,6 @@ from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import Structure
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import (
-    check_positive,
     checked_inputs,
     left_validity,
     lifted_wheels,
@@ -41,6 +41,7 @@ FIRST_STEP = 1e-3
 TRIED = 0.75
 # Largest errors of outputs, as part of their ranges: of full-order references, and by default.
 TIGHT, USUAL = 1e-3, 3e-3
+TOLERANCES = 1e-13, 0.1
 REASONS = {
     compiled.NOT_FINITE: "a coordinate is not finite",
     compiled.NO_CONVERGENCE: "no convergence of the port forces",
@@ -289,7 +290,7 @@ class StructuralModel(Model):
         """Full-order trajectory at the output times, or at some of them, see `Model.simulate`."""
         choice("solver", SOLVER if solver is None else solver, (SOLVER,))
         tolerance = TIGHT if tolerance is None else tolerance
-        check_positive("tolerance", tolerance)
+        within("tolerance", number("tolerance", tolerance), TOLERANCES)
         self.start(start)
         found = self.run(maneuver, None, tolerance, outputs)
         if found.status != "ok":

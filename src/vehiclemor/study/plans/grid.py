@@ -138,7 +138,9 @@ def _of_method(
         training = entry.training or point.get("training", study.training)
         training = tuple(training) if isinstance(training, list) else (training,)
         learner = entry.method if "protocol" in training else ""
-        learned = _training(model, learner, training, test, factors)
+        # A method may learn from something else than the study's set.
+        of_entry = () if entry.training and "set" not in training else factors
+        learned = _training(model, learner, training, test, of_entry)
         experiment = make_experiment(model, entry.method, settings, learned, (test,), study.keep)
         if not fits:
             found = refusal(model, experiment)

@@ -89,6 +89,11 @@ class Protocol:
         name = Path(self.definition.extends or self.path).stem
         return f"{name}-{self.definition.version}, seed {self.seed}"
 
+    def timed_runs(self, runs: int) -> list[int]:
+        """Numbers of the runs of a set that are timed: all, or so many evenly spread over it."""
+        timed = min(self.definition.timed or runs, runs)
+        return np.linspace(0, runs - 1, timed).round().astype(int).tolist()
+
 
 def protocol_names() -> dict[str, str]:
     """Model -> name of the study with bounds that the package has of it."""
@@ -146,6 +151,12 @@ def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protoc
         choice("maneuver of a test, in straight", straight.maneuver, sorted(driven))
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
+        if definition.extends and target.against not in known:
+            base = ", ".join(read_study(study_path(definition.extends)).labelled)
+            raise InputError(
+                f"a target is against {target.against!r}, a row of {definition.extends}: "
+                f"rows is needed and must name its method, of {base}"
+            )
         choice("row that a target is against", target.against, known)
     return Protocol(name, path, definition, model, sets, entries, seed)
 

@@ -40,9 +40,6 @@ from vehiclemor.study.plans.study_file import DRAWN
 from vehiclemor.study.store import combined_path, run_path, stored
 from vehiclemor.study.workers import Engine, Workers
 
-# Runs that are timed: the first of a set.
-TIMED = 24
-
 
 def run_protocol(
     protocol: Protocol, folder: Path, jobs: int = 1, elsewhere: Engine | None = None
@@ -74,8 +71,10 @@ def run_protocol(
         )
     # A run whose result in the test set is a failure is not timed.
     judged = judged_set(sets)
-    ends = np.array([row["status"].values[:TIMED] for row in found[judged]])
-    timed = _timed(protocol, rows, sets[judged], np.isin(ends, FINISHED), path)
+    sample = protocol.timed_runs(len(sets[judged]))
+    ends = np.array([row["status"].values[sample] for row in found[judged]])
+    tests = tuple(sets[judged][run] for run in sample)
+    timed = _timed(protocol, rows, tests, np.isin(ends, FINISHED), path)
     keys = sorted(workers.asked)
     parts = [layout_digest(), protocol.definition.model_dump_json(), timed.attrs["timing"], *keys]
     return stored(
@@ -121,9 +120,8 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
     """The rows, one of them marked as chosen among the contenders, by validation alone.
 
     Of those that leave room to the bounds (`choice.MARGIN_OF_CHOSEN`) the one whose whole calls
-    take the least time, by our clock, on the first scenarios of the validation set, of times that
-    are nearly the same (`choice.TIE_OF_TIMES`) the more accurate; if there is none, the one of the
-    smallest score.
+    take the least time, by our clock, on the validation set, of times that are nearly the same
+    (`choice.TIE_OF_TIMES`) the more accurate; if there is none, the one of the smallest score.
     """
     racing = [row for row in rows if row.entry.role == CONTENDER]
     # What gives no run at all is not chosen.
@@ -134,7 +132,10 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
         row for row in racing if row.result.score <= MARGIN_OF_CHOSEN and row.result.stable == 1.0
     ]
     if len(fitting) > 1:
-        timed = _timed(protocol, fitting, protocol.sets["validation"], None, path)
+        validation = protocol.sets["validation"]
+        sample = protocol.timed_runs(len(validation))
+        tests = tuple(validation[run] for run in sample)
+        timed = _timed(protocol, fitting, tests, None, path)
         seconds = timed["seconds"].mean("scenario").values
         near = np.flatnonzero(seconds <= (1.0 + TIE_OF_TIMES) * seconds.min())
         best = min((fitting[k] for k in near), key=lambda row: row.result.score)
@@ -150,15 +151,14 @@ def _timed(
     finished: np.ndarray | None,
     path: Path,
 ) -> xr.Dataset:
-    """Stored timing of rows on the first scenarios of a set, measured first if it is missing.
+    """Stored timing of rows on some scenarios, measured first if it is missing.
 
-    `finished` says which runs are timed (rows, scenarios); without it all of the validation set
-    are.
+    `finished` says which test runs are timed (rows, scenarios); without it the scenarios are those
+    of the validation set.
     """
     what, name = ("test", "") if finished is not None else ("validation", "validation-")
-    sample = scenarios[:TIMED]
     experiments = {
-        row.label: row.entry.experiment(protocol.model, row.candidate, sample) for row in rows
+        row.label: row.entry.experiment(protocol.model, row.candidate, scenarios) for row in rows
     }
     content = [[label, experiment.key] for label, experiment in experiments.items()]
     return timing.stored_timing(

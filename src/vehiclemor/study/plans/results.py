@@ -136,8 +136,8 @@ def protocol_dataset(
 ) -> xr.Dataset:
     """Results of all rows on the dimensions `label`, `scenario` and `output`.
 
-    Given by set are the results of the rows, and why scenarios are not judged; `timed` are the
-    first scenarios of what is judged.
+    Given by set are the results of the rows, and why scenarios are not judged; `timed` has
+    those of the scenarios that are judged which the protocol times.
     """
     parts: list[xr.Dataset] = []
     for name, datasets in found.items():
@@ -170,11 +170,11 @@ def protocol_dataset(
     dataset = dataset.assign_coords(label=[row.label for row in rows])
     for name in ("label", "scenario"):
         dataset[name].attrs["long_name"] = meaning_of(name)
-    places = np.flatnonzero(dataset["scenario_set"].values == judged_set(found))
-    places = places[: timed.sizes["scenario"]]
+    judged = np.flatnonzero(dataset["scenario_set"].values == judged_set(found))
+    columns = judged[protocol.timed_runs(len(judged))]
     for name in (n for n, variable in timed.data_vars.items() if "scenario" in variable.dims):
         online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
-        online[:, places] = timed[name].values
+        online[:, columns] = timed[name].values
         dataset[name] = (("label", "scenario"), online, dict(timed[name].attrs))
     # Of the first run.
     dataset.attrs.clear()

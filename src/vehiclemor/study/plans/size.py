@@ -43,8 +43,8 @@ FULL = "full order"
 # Groups of outputs, of which the worst error counts: strains are what coarse meshes are worst at.
 GROUPS = ("motion", "strain")
 ROUNDS = 5
-# A whole run, or its beginning, and how many times as long the whole run is.
-Call = tuple[Callable[[], Any], float]
+# What runs a maneuver, the maneuver or its beginning, and how many times as long the whole is.
+Call = tuple[Callable[[Maneuver], Any], Maneuver, float]
 
 
 def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
@@ -79,11 +79,13 @@ def _measured(name: str, study: StudyFile, size: Size, folder: Path) -> xr.Datas
             for column, entry in enumerate(study.methods, start=1)
             if (reduced := _fit(study, size, entry, model))
         }
-        calls = {place: (partial(model.simulate, chosen), 1.0) for place, model in models.items()}
+        calls = {place: (model.simulate, chosen, 1.0) for place, model in models.items()}
         calls |= {(row, 0): _full(model, chosen, size) for row, model in enumerate(meshes)}
         for row, (full, reduced) in zip(vehicles, beside, strict=True):
             models[row, 1] = reduced
-            calls |= {(row, 0): (full.simulate, 1.0), (row, 1): (reduced.simulate, 1.0)}
+            steering = component("maneuver", full.model.definition.maneuver)
+            calls[row, 0] = full.simulate, steering, 1.0
+            calls[row, 1] = reduced.simulate, steering, 1.0
         timed = _timed(name, calls, (len(rows), len(labels)))
     outputs = {(row, 0): reference["outputs"].values for row, reference in enumerate(references)}
     order, offline = np.full((2, len(rows), len(labels)), np.nan)
@@ -160,20 +162,20 @@ def _fit(study: StudyFile, size: Size, entry: MethodEntry, model: Any) -> Reduce
 def _full(model: Any, maneuver: Maneuver, size: Size) -> Call:
     """The full order of a mesh: of a large one its beginning."""
     if model.size <= size.whole:
-        return partial(model.run, maneuver, step=size.step), 1.0
+        return partial(model.run, step=size.step), maneuver, 1.0
     samples = round(size.window / maneuver.duration * (maneuver.samples - 1)) + 1
     begun = replace(maneuver, duration=size.window, samples=samples)
-    return partial(model.run, begun, step=size.step), maneuver.duration / size.window
+    return partial(model.run, step=size.step), begun, maneuver.duration / size.window
 
 
 def _timed(name: str, calls: Mapping[tuple[int, int], Call], shape: tuple[int, int]) -> np.ndarray:
     """Seconds of whole runs (rounds, meshes, labels); NaN where there is none."""
     seconds = np.full((ROUNDS, *shape), np.nan)
     for turn in range(ROUNDS):
-        for done, (place, (call, factor)) in enumerate(
-            (place, calls[place]) for place in sorted(calls)
-        ):
+        for done, place in enumerate(sorted(calls)):
             tell(f"{name}: round {turn + 1} of {ROUNDS}", done, len(calls))
-            found = called(call, 2)
-            seconds[turn, *place] = np.nan if isinstance(found, Failure) else factor * found[0]
+            simulate, maneuver, factor = calls[place]
+            measured = called(simulate, (maneuver,), 2, again=False)
+            if not isinstance(measured, Failure):
+                seconds[turn, *place] = factor * measured.whole
     return seconds

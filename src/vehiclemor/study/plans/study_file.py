@@ -32,8 +32,8 @@ DRAWN = ("drawn", "drawn_outside")
 # Keys that go without bounds alone, and with bounds alone; and of a method.
 OF_GRIDS = ("grid", "sampling", "maneuver", "start", "training_set", "keep")
 OF_TESTS = (
-    *(*SETS[1:], *DRAWN, "version", "seed", "reported", "sensitive"),
-    *("targets", "failure_rate", "flagged_misses", "straight"),
+    *(*SETS[1:], *DRAWN, "version", "seed", "timed", "reported"),
+    *("sensitive", "targets", "failure_rate", "flagged_misses", "straight"),
 )
 OF_SIZES = {"title", "model", "maneuver", "training", "size", "methods"}
 OF_ENTRIES = ("candidates", "role")
@@ -144,6 +144,9 @@ class StudyFile(FileSchema):
     )
     methods: list[MethodEntry] = list_of("each is run in every scenario")
     bounds: dict[str, Bound] = table_of("of a test: output -> largest allowed error")
+    timed: int | None = Field(
+        None, ge=1, description="so many runs of the test set, evenly spread, are timed; else all"
+    )
     reported: list[str] = list_of("outputs whose RMS errors are printed beside the bounded")
     validation: list[Group] = list_of("what candidates are chosen by")
     test: list[Group] = list_of("listed test runs; judged if none are drawn")

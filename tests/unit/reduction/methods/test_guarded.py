@@ -63,7 +63,7 @@ def test_the_safe_model_does_the_run_wherever_the_fast_one_leaves(until):
     np.testing.assert_array_equal(run.times, full.times)
     np.testing.assert_array_equal(run.outputs, full.outputs)
     assert (run.status, run.message) == ("ok", "")
-    assert run.remark.startswith("from t = 0 s on by full_order: the steering is beyond")
+    assert run.remark.startswith("full_order did the run: the steering is beyond")
     assert (run.trust.indicator, run.trust.until) == (2.0, until)
     assert run.counts["rhs_calls"] > full.counts["rhs_calls"]
 
@@ -79,7 +79,7 @@ def test_a_fast_run_that_fails_without_a_warning_is_trusted_nowhere():
     fast = LeavesAt(3.0, status="diverged", told=False)
     run = guarded(fast).simulate(STEER, "dropped")
     np.testing.assert_array_equal(run.outputs, whole().outputs)
-    assert run.remark.startswith("from t = 0 s on by full_order: why")
+    assert run.remark.startswith("full_order did the run: why, from t = 0 s on")
 
 
 def test_what_the_safe_model_tells_of_itself_is_kept():

@@ -80,7 +80,7 @@ def test_a_run_tells_how_far_it_has_gone(reduced):
         if column.max() > 1.0
     }
     assert any(run.trust.reason.startswith(text) for text in named)
-    assert run.message.startswith(f"from t = {run.trust.until:.4g} s on ")
+    assert run.message.endswith(f", from t = {run.trust.until:.4g} s on")
 
 
 def known(reduced, start):

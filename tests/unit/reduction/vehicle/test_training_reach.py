@@ -78,7 +78,7 @@ def test_the_least_motion_lasts_no_longer_than_training_runs_and_none_for_ever(r
     assert 1.0 < run.trust.until - longest < 3.5
     for start in reduced.model.starts:
         straight = reduced.simulate(little.perturbed(1.0, 0.0), start).trust
-        assert "sideways" not in straight.reason
+        assert "lateral" not in straight.reason
 
 
 def test_training_runs_are_known(reduced):
@@ -93,7 +93,7 @@ def test_training_runs_are_known(reduced):
 @pytest.mark.parametrize("begin", [0.0, 1.0])
 def test_who_steers_before_the_car_has_settled_is_told(reduced, begin):
     run = reduced.simulate(held(reduced, 1.0, begin), "dropped")
-    told = ("heave and pitch", "it moves sideways before")
+    told = ("heave and pitch", "lateral motion begins earlier")
     if begin == 0.0:
         assert run.trust.reason.startswith(told)
     # The rough fit of the other car does not know the drop itself.
@@ -107,7 +107,7 @@ def test_a_drop_has_settled_when_training_runs_were_steered(reduced):
     assert reduced.reach.settled(excited) >= 0.99 * reduced.reach.faded > 0.5
     assert reduced.reach.settled(excited * [[[1.0]], [[1e-3]]]) < 0.1
     trust = reduced.simulate(held(reduced, 1.0, 0.3), "dropped").trust
-    told = ("heave and pitch", "it moves sideways before")
+    told = ("heave and pitch", "lateral motion begins earlier")
     assert trust.until < 0.5
     assert trust.reason.startswith(told)
 

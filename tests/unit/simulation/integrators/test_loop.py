@@ -171,15 +171,37 @@ def test_the_calls_that_are_counted_are_those_that_are_made(solver):
 
 @pytest.mark.parametrize("solver", INTEGRATORS)
 def test_the_calls_that_are_counted_are_the_calls_that_are_allowed(model, monkeypatch, solver):
-    monkeypatch.setattr(catalogue, "MOST_CALLS", 100)
+    monkeypatch.setattr(catalogue, "MOST_CALLS", 10)
     # Limits of a run are kept for further runs.
     catalogue.control_of.cache_clear()
     found = integrate(model, DRIVEN, solver, 1e-9, DRIVEN.times)
     catalogue.control_of.cache_clear()
     assert found.status == "diverged"
-    assert "more than 100000 evaluations of the right-hand side" in found.message
+    assert "more than 100000 evaluations of the right-hand side in 1 s" in found.message
     # A step is finished that was begun.
-    assert 100 < found.counts["rhs_calls"] <= 120
+    assert 10 < found.counts["rhs_calls"] <= 30
+
+
+def test_calls_are_limited_in_each_second_however_long_the_run(monkeypatch):
+    monkeypatch.setattr(catalogue, "MOST_CALLS", 500)
+    catalogue.control_of.cache_clear()
+    calls_until_stiff = []
+
+    def pendulum(x, u):
+        if not u[1]:
+            calls_until_stiff.append(1)
+        return [x[1], u[0] - math.sin(x[0]) - 1e9 * u[1] * x[1]]
+
+    def stiff_at_the_end(times, *_):
+        return np.column_stack([1.0 - np.cos(times), times >= 60.0])
+
+    late = Maneuver("late", "", stiff_at_the_end, ("a", "b"), 61.0, 62, lambda _: (60.0,))
+    system = python_system(pendulum, [0.0, 0.0], 2)
+    how = whole_space(2), Solver("dopri5", 1e-7)
+    run = system.run(late, np.array([1.0, 0.0]), *how)
+    catalogue.control_of.cache_clear()
+    assert run.failure.endswith("at t = 60 s")
+    assert len(calls_until_stiff) > 2000 > 3 * (run.counts[0] - len(calls_until_stiff))
 
 
 # Windows
