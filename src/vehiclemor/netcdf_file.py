@@ -124,7 +124,8 @@ def opened(
         digest = _sealed(path)
         if digest not in _KNOWN and not (digest and trusted):
             _read_elsewhere(path)
-            _KNOWN.update([digest] if digest else [])
+            if digest:
+                _KNOWN.add(digest)
         with netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
             if INTEGRITY in file.groups and not digest:

@@ -49,11 +49,9 @@ def convert(
         raise InputError(f"{to} needs the package {engine}: pip install 'vehiclemor[convert]'")
     name = str(file_path("study", study))
     path = Path(f"{Path(name).stem}.{to}") if out is None else file_path("out", out)
-    if not path.name:
-        raise InputError(f"out: {path} is a folder, not a new file")
-    columns = path.with_suffix(".columns.csv")
     if os.path.lexists(path):
         raise FileError(f"{path}: exists already; move it away")
+    columns = path.with_suffix(".columns.csv")
     if not path.parent.is_dir():
         raise FileError(f"{path}: there is no such folder")
     dataset = stored_result(name, file_path("results", results))

@@ -116,7 +116,7 @@ def decoded(content: bytes, key: str) -> StoredRun:
             raise CorruptError("what it holds is not what was written")
         found, arrays = json.loads(header["dataset"]), load(content)
         run = StoredRun({}, list(found["coordinates"]), dict(found["attributes"]))
-        texts = [*run.coordinates, *run.attributes, *run.attributes.values()]
+        texts = [*run.coordinates, *run.attributes.values()]
         for name, entry in found["variables"].items():
             if "text" in entry:
                 arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
@@ -140,7 +140,7 @@ def _check_layout(run: StoredRun) -> None:
         if not (once and fit and attributes.keys() <= ATTRIBUTES):
             raise ValueError(name)
     ends = [run.variables[name][1].dtype for name in ("status", "message")]
-    named = all(map(str.isidentifier, [*run.variables, *sizes]))
+    named = all(map(str.isidentifier, [*run.variables, *sizes, *run.attributes]))
     if ends != [object, object] or not (named and {*run.coordinates} <= run.variables.keys()):
         raise ValueError("status")
 
