@@ -32,7 +32,7 @@ import math, sys, netCDF4
 with netCDF4.Dataset(sys.argv[1]) as file:
     size = sum(8 * math.prod(variable.shape) for variable in file.variables.values())
     if size > int(sys.argv[2]):
-        sys.exit(1)
+        sys.exit(3)
     for owner in (file, *file.variables.values()):
         owner.__dict__
     for variable in file.variables.values():
@@ -163,5 +163,7 @@ def _read_elsewhere(path: Path) -> None:
         ended = subprocess.run(command, capture_output=True, timeout=limit, check=False)  # noqa: S603
     except subprocess.TimeoutExpired:
         raise ValueError(f"damaged: reading it does not end in {limit:g} s") from None
+    if ended.returncode == 3:
+        raise ValueError(f"its variables have more than {MOST_BYTES} bytes")
     if ended.returncode:
         raise ValueError(DAMAGED)

@@ -31,7 +31,7 @@ def refused(call, *words):
         call()
     text = str(error.value)
     assert text.isprintable()
-    assert len(text) < 550
+    assert len(text) < 600
     for word in words:
         assert word in text, text
 
