@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, number, quoted, real_array
+from vehiclemor.arguments import file_path, flag, number, quoted, real_array
 from vehiclemor.exceptions import InputError, UnreachableError, VehiclemorError
 from vehiclemor.registry import component, names
 
@@ -62,7 +62,7 @@ def studies() -> dict[str, str]:
 
 
 def describe(
-    name: str,
+    name: str | Path,
     parameters: Mapping[str, object] | None = None,
     parameter_file: str | Path | None = None,
 ) -> dict[str, object]:
@@ -84,7 +84,7 @@ def describe(
     from vehiclemor.report.description import description
 
     path = None if parameter_file is None else file_path("parameter_file", parameter_file)
-    return description(name, parameters, path)
+    return description(str(file_path("name", name)), parameters, path)
 
 
 def model(
@@ -231,8 +231,7 @@ def simulate(
     from vehiclemor.study.plans.training import training_set as training_of
 
     ready = model if isinstance(model, Model) else kept_build(model)
-    if not isinstance(errors, bool | np.bool_):
-        raise InputError(f"errors is {quoted(errors)}, neither True nor False")
+    flag("errors", errors)
     if rtol is not None:
         if "tolerance" in settings:
             raise InputError("rtol and tolerance are the same setting: give one of them")

@@ -11,8 +11,8 @@ import numpy as np
 from vehiclemor.exceptions import InputError
 from vehiclemor.short_repr import shortened
 
-# Numbers of a range that are listed.
-LONGEST_RANGE = 10_000_000
+# Processes, names in a list, and numbers of a range.
+MOST_JOBS, MOST_NAMES, MOST_NUMBERS = 1024, 10_000, 100_000_000
 
 
 def quoted(value: object) -> str:
@@ -29,8 +29,12 @@ def line_of_text(name: str, value: object) -> str:
 
 def real_array(value: Any) -> np.ndarray:
     """Floats of a number or nested lists of numbers; `TypeError` of text, dates and the like."""
-    endless = isinstance(value, range) and value[LONGEST_RANGE:]
-    array = None if endless or np.ma.is_masked(value) else np.asarray(value)
+    try:
+        # A range takes no memory before it becomes an array.
+        large = isinstance(value, range) and value[MOST_NUMBERS:]
+        array = None if large or np.ma.is_masked(value) else np.asarray(value)
+    except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError):
+        array = None
     if array is None or array.dtype.kind not in "iuf":
         raise TypeError(f"{quoted(value)} is not a number or a list of numbers")
     return array.astype(float, copy=False)
@@ -58,38 +62,44 @@ def within(name: str, value: float, bounds: tuple[float, float], unit: str = "")
     return value
 
 
-MOST_JOBS = 1024
-
-
 def count(name: str, value: object, least: int = 1, most: int | None = None) -> int:
     """A whole number within bounds, or `InputError`."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)
     if not whole or int(value) < least or (most and int(value) > most):  # type: ignore[arg-type]
         bounds = f"at least {least}" + (f", at most {most}" if most else "")
         raise InputError(f"{name} is {quoted(value)}; it must be a whole number, {bounds}")
     return int(value)  # type: ignore[arg-type]
 
 
+def flag(name: str, value: object) -> bool:
+    """True or False, or `InputError`."""
+    if not isinstance(value, bool | np.bool_):
+        raise InputError(f"{name} is {quoted(value)}, neither True nor False")
+    return bool(value)
+
+
 def file_path(name: str, value: object) -> Path:
     """Path of a file or folder; `InputError` if it is none, or an empty one."""
-    # Control characters, "\0" among them, would break an error into several lines.
-    if not isinstance(value, str | os.PathLike) or min(str(value), default="\0") < " ":
-        raise InputError(f"{name}: {quoted(value)} is not a path")
-    path = Path(value)
     try:
+        text = os.fspath(value)  # type: ignore[call-overload]
+        # Results name the files that they are made from, in UTF-8 and in one line.
+        if not (isinstance(text, str) and text.encode()) or min(text) < " ":
+            raise TypeError
+        path = Path(text)
         path.exists()
     except OSError as error:
         raise InputError(f"{name}: {quoted(value)} is not a path ({error.strerror})") from None
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: {quoted(value)} is not a path") from None
     return path
 
 
 def study_names(name: str, value: Any) -> list[str]:
-    """Names of studies, or paths of their files, of which one may stand alone."""
+    """Names of studies, or paths of their files, of which one may stand alone; or `InputError`."""
     entries = [value] if isinstance(value, str | os.PathLike) else value
-    listed = isinstance(entries, Sequence)
-    if not listed or not all(isinstance(entry, str | os.PathLike) for entry in entries):
+    if not isinstance(entries, Sequence) or entries[MOST_NAMES:]:
         raise InputError(f"{name} is {quoted(value)}, not a list of names or files of studies")
-    return [os.fspath(entry) for entry in entries]
+    return [str(file_path(name, entry)) for entry in entries]
 
 
 def loop_array(values: Any) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Errors that a user can mend: each carries one clear line."""
 
 import difflib
+import dis
 import errno
 from collections.abc import Iterable
 from contextlib import suppress
@@ -12,13 +13,26 @@ MANY = 40
 # What of the system's errors is the machine's doing, whoever has asked for it.
 MACHINE_ERRORS = {
     getattr(errno, name)
-    for name in ("ENOSPC", "EDQUOT", "EIO", "ENOMEM", "EMFILE", "ENFILE")
+    for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "ENOMEM", "EMFILE", "ENFILE")
     if hasattr(errno, name)
 }
+# Characters of a message; of a longer one the middle is left out.
+LONGEST = 1000
+
+
+def printable(text: str) -> str:
+    """A text in one line that is not too long, without what would act on a terminal."""
+    line = " ".join(text.split())
+    if len(line) > LONGEST:
+        line = f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
 
 
 class VehiclemorError(Exception):
     """Base of all errors that reach a user as one line; exit status 2 if not said otherwise."""
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(printable(message))
 
 
 class InputError(VehiclemorError):
@@ -85,12 +99,6 @@ def machine_reason(error: BaseException) -> str:
     return ""
 
 
-def printable(text: str) -> str:
-    """A text in one line, without what would act on a terminal."""
-    line = " ".join(text.split())
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
-
-
 def one_line(error: BaseException) -> str:
     """Kind and text of an error in one line; a plug-in's may have no text."""
     text = ""
@@ -107,10 +115,10 @@ def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
     code
         The function, class or object that was used, or the name of a module.
     """
-    if isinstance(error, KeyboardInterrupt):
-        raise error
     of = code if isinstance(code, str) else getattr(code, "__module__", type(code).__module__)
     package = of.partition(".")[0]
+    if isinstance(error, KeyboardInterrupt) and not _is_raised(error, package):
+        raise error
     places = [
         f" ({frame.f_code.co_filename}:{line})"
         for frame, line in walk_tb(error.__traceback__)
@@ -118,8 +126,15 @@ def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
     ]
     place = places[-1] if places else ""
     if reason := machine_reason(error):
-        return MachineError(printable(f"{whose}: {reason}{place}"))
-    return PlugInError(printable(f"{whose}: {one_line(error)}{place}"))
+        return MachineError(f"{whose}: {reason}{place}")
+    return PlugInError(f"{whose}: {one_line(error)}{place}")
+
+
+def _is_raised(error: BaseException, package: str) -> bool:
+    """Whether a `raise` of a package raises an error; Ctrl-C strikes at other instructions."""
+    *_, (frame, _) = walk_tb(error.__traceback__)
+    module, instruction = frame.f_globals.get("__name__", ""), frame.f_code.co_code[frame.f_lasti]
+    return module.partition(".")[0] == package and instruction == dis.opmap["RAISE_VARARGS"]
 
 
 class blamed:  # noqa: N801

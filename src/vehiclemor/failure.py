@@ -39,13 +39,13 @@ def attempt(run: Callable[[], Result], whose: str = "") -> Result | Failure:
     try:
         return run()
     except UnreachableError as error:
-        return Failure("unreachable", _line(error))
+        return Failure("unreachable", str(error))
     except ConvergenceError as error:
-        return Failure("diverged", whose + _line(error))
+        return Failure("diverged", f"{whose}{error}")
     except PlugInError as error:
-        return Failure("error", whose + _line(error))
+        return Failure("error", f"{whose}{error}")
     except InputError as error:
-        return Failure("rejected", _line(error))
+        return Failure("rejected", str(error))
     except (KeyboardInterrupt, VehiclemorError):
         raise
     except BaseException as error:
@@ -61,12 +61,8 @@ def attempt_apart(name: str, failed: dict[str, str], run: Callable[[], Result]) 
     except MachineError:
         raise
     except VehiclemorError as error:
-        found = Failure("error", _line(error))
+        found = Failure("error", str(error))
     if isinstance(found, Failure):
         failed[name] = found.message
         return []
     return [found]
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())

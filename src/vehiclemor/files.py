@@ -1,4 +1,4 @@
-"""Writing files whole: under a temporary name first, then moved into place."""
+"""Files: what is read, what may be replaced, and writing under a temporary name first."""
 
 import os
 import secrets
@@ -14,6 +14,7 @@ from vehiclemor.exceptions import FileError, MachineError, machine_reason
 
 # Beginning of temporary names; and age (s) of a file that nobody is writing any more.
 TEMPORARY, OLD = ".partial-", 3600.0
+NO_FILE = "it is a folder, pipe or device, not a file"
 
 
 def make_folder(folder: Path) -> None:
@@ -35,6 +36,41 @@ def probe_folder(folder: Path) -> None:
         raise not_written(folder, error) from None
 
 
+def read_regular(path: Path, most: int) -> bytes:
+    """Bytes of a file; `ValueError` if it is a folder, pipe or device, or has more than `most`."""
+    status = path.stat()
+    # Of a pipe or a device there may never be an end.
+    if not stat.S_ISREG(status.st_mode):
+        raise ValueError(NO_FILE)
+    if status.st_size > most:
+        raise ValueError(f"it has {status.st_size} bytes, more than {most}")
+    return path.read_bytes()
+
+
+def begins_with(beginning: bytes, at: int = 0) -> Callable[[Path], bool]:
+    """Whether a file has these bytes at its begin, as `replaceable` asks."""
+
+    def is_kind(path: Path) -> bool:
+        with path.open("rb") as file:
+            return file.read(at + len(beginning))[at:] == beginning
+
+    return is_kind
+
+
+def replaceable(path: Path, kind: str, is_kind: Callable[[Path], bool]) -> Path:
+    """The path; `FileError` if something stands there that is not of this kind.
+
+    Devices, pipes, sockets and links that lead nowhere are of no kind.
+    """
+    try:
+        known = path.is_file() or path.is_dir()
+        if os.path.lexists(path) and not (known and is_kind(path)):
+            raise FileError(f"{path} exists and is no {kind}: it is not replaced; move it away")
+    except OSError as error:
+        raise not_written(path, error) from None
+    return path
+
+
 def not_written(path: Path, error: Exception) -> FileError | MachineError:
     """The error that tells why a path can't be written."""
     machine = machine_reason(error)
@@ -42,29 +78,14 @@ def not_written(path: Path, error: Exception) -> FileError | MachineError:
     return (MachineError if machine else FileError)(f"{path}: can't be written ({reason})")
 
 
-def read_regular(path: Path, most: int) -> bytes:
-    """Content of a regular file of at most so many bytes; `FileError` for anything else there.
-
-    Pipes would wait for ever, and devices have no end.
-    """
-    described = path.stat()
-    # Reading a folder fails by itself.
-    if not (stat.S_ISREG(described.st_mode) or stat.S_ISDIR(described.st_mode)):
-        raise FileError(f"{path}: a device or pipe, not a file")
-    if described.st_size > most:
-        raise FileError(f"{path}: has {described.st_size} bytes, more than {most}")
-    return path.read_bytes()
-
-
 def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None = None) -> Path:
     """Let `write` fill a temporary file or folder, beside `path` by default; then move it there.
 
     The temporary path ends like `path`, on the same disk: a reader sees the old content or the new
-    one, never a part.  `FileError` if the folder can't be written, or a device or pipe is there,
-    `MachineError` if the disk fails.
+    one, never a part.  `FileError` if the folder can't be written or the path is a device or the
+    like, `MachineError` if the disk fails.
     """
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise FileError(f"{path}: a device or pipe, not a file: it is not replaced")
+    replaceable(path, "file or folder", Path.exists)
     whole = path.absolute()
     temporary = temporary_path((folder or whole.parent) / whole.name)
     old = temporary.with_name(f"{temporary.name}.old")

@@ -1,7 +1,8 @@
 """Datasets as whole netCDF-4 files: combined results, single runs, saved models.
 
 Each ends with the hash of its bytes, which is checked before the library reads them: of damaged
-ones it may never come back.  Other files are first read in a process that can be ended.
+ones it may never come back.  Anybody can write such a hash, so what is neither data of the package,
+nor stored in a results folder, nor known to this process is first read in one that can be ended.
 """
 
 from __future__ import annotations
@@ -10,12 +11,12 @@ import hashlib
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
-from vehiclemor.files import write_whole
+from vehiclemor.files import NO_FILE, read_regular, write_whole
 
 if TYPE_CHECKING:
     import netCDF4
@@ -24,16 +25,23 @@ if TYPE_CHECKING:
 # Group of a file that ends with the hash of its bytes, and what stands before that hash: behind the
 # data, where no reader of netCDF looks.
 INTEGRITY, SEAL = "integrity", b"\nvehiclemor sha256 "
-# What reads a file of others, and the seconds that it may take.
+# What reads a file of others.  Bytes that a file and its variables may have; seconds that reading
+# any may take, and bytes that are read in a further one.
 READ = """
-import sys, netCDF4
+import math, sys, netCDF4
 with netCDF4.Dataset(sys.argv[1]) as file:
+    size = sum(8 * math.prod(variable.shape) for variable in file.variables.values())
+    if size > int(sys.argv[2]):
+        sys.exit(3)
     for owner in (file, *file.variables.values()):
         owner.__dict__
     for variable in file.variables.values():
         variable[...]
 """
-LIMIT, DAMAGED = 10.0, "damaged, or no netCDF-4 file"
+MOST_BYTES, LIMIT, SPEED = 8_000_000_000, 10.0, 2e7
+DAMAGED = "damaged, or no netCDF-4 file"
+# Of files that this process has written or read elsewhere.
+_KNOWN: set[bytes] = set()
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
@@ -47,7 +55,9 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
                 dataset.dump_to_store(NetCDF4DataStore(file))
                 file.createGroup(INTEGRITY)
             with temporary.open("ab") as file:
-                file.write(SEAL + _digest(temporary.read_bytes()))
+                digest = _digest(temporary.read_bytes())
+                file.write(SEAL + digest)
+                _KNOWN.add(digest)
         except (OSError, RuntimeError):
             # The library hides the reason; plain writing of as much as there is tells it.
             temporary.write_bytes(bytes(dataset.nbytes + (1 << 16)))
@@ -59,16 +69,17 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
         raise FileError(f"{path}: can't be written ({error})") from None
 
 
-def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
+def read_dataset(path: Path, attribute: str, expected: str, stored: bool = False) -> xr.Dataset:
     """A result file of this package, whose global `attribute` has the `expected` value.
 
-    `FileError` if it is missing; `CorruptError` if it is corrupt, or not the expected one.
+    It is `stored` if it is a results folder's.  `FileError` if it is missing; `CorruptError` if it
+    is corrupt, or not the expected one.
     """
     import xarray as xr
     from xarray.backends import NetCDF4DataStore
 
     mend = "; move it away and run again"
-    with opened(path, "result file", mend) as file:
+    with opened(path, "result file", mend, stored) as file:
         if getattr(file, attribute, None) != expected:
             reason = f"not the result that belongs here ({attribute} is not {expected})"
             raise CorruptError(reason, path, mend)
@@ -76,38 +87,48 @@ def read_dataset(path: Path, attribute: str, expected: str) -> xr.Dataset:
         return xr.open_dataset(NetCDF4DataStore(file)).load()
 
 
-def global_attributes(path: Path) -> dict[str, Any]:
+def global_attributes(path: Path, stored: bool = False) -> dict[str, Any]:
     """Attributes of a file of this package that is whole; of no other."""
-    import netCDF4
-
-    try:
-        if not (path.is_file() and _sealed(path)):
-            return {}
-        with netCDF4.Dataset(path) as file:
+    with suppress(FileError), opened(path, "result file", "", stored) as file:
+        if INTEGRITY in file.groups:
             return {name: file.getncattr(name) for name in file.ncattrs()}
-    except (OSError, ValueError):
-        return {}
+    return {}
+
+
+def is_result(path: Path) -> bool:
+    """Whether a path is a result file of this package, as `replaceable` asks."""
+    attributes = global_attributes(path)
+    return attributes.get("source") == "vehiclemor" and "saved_model" not in attributes
+
+
+def is_saved_model(path: Path) -> bool:
+    """Whether a path is a reduced model that this package has saved."""
+    return "saved_model" in global_attributes(path)
 
 
 @contextmanager
-def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
+def opened(
+    path: Path, kind: str, mend: str = "", trusted: bool = False
+) -> Iterator[netCDF4.Dataset]:
     """A netCDF file that is as it was written; of others, one that the library can read.
 
-    An error calls it a `kind`, and tells how to `mend` it.
+    An error calls it a `kind`, and tells how to `mend` it.  What is `trusted` is read at once.
     """
     import netCDF4
 
     if not path.is_file():
         if path.exists():
-            raise CorruptError(f"is a folder or device, not a {kind}", path)
+            raise CorruptError(f"not a {kind}: {NO_FILE}", path)
         raise FileError(f"{path}: no such {kind}")
     try:
-        sealed = _sealed(path)
-        if not sealed:
+        digest = _sealed(path)
+        if digest not in _KNOWN and not (digest and trusted):
             _read_elsewhere(path)
+            if digest:
+                _KNOWN.add(digest)
         with netCDF4.Dataset(path) as file:
             file.set_auto_maskandscale(False)
-            if INTEGRITY in file.groups and not sealed:
+            if INTEGRITY in file.groups and not digest:
                 raise ValueError("not what was written")
             yield file
     except (OSError, ValueError, RuntimeError, KeyError, AttributeError, IndexError) as error:
@@ -120,14 +141,14 @@ def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
         raise CorruptError(f"not a readable {kind} ({detail})", path, mend) from None
 
 
-def _sealed(path: Path) -> bool:
-    """Whether a file ends with the hash of its bytes; `ValueError` if with another one."""
-    whole, seal, digest = path.read_bytes().rpartition(SEAL)
+def _sealed(path: Path) -> bytes:
+    """The hash that a file ends with, if it does; `ValueError` if it is not that of its bytes."""
+    whole, seal, digest = read_regular(path, MOST_BYTES).rpartition(SEAL)
     if not seal or len(digest) != len(_digest(b"")):
-        return False
+        return b""
     if digest != _digest(whole):
         raise ValueError("what it holds is not what was written")
-    return True
+    return digest
 
 
 def _digest(content: bytes) -> bytes:
@@ -136,10 +157,13 @@ def _digest(content: bytes) -> bytes:
 
 def _read_elsewhere(path: Path) -> None:
     """Raise `ValueError` if the library can't read a file, crashes, or does not come to an end."""
-    command = [sys.executable, "-P", "-c", READ, str(path.absolute())]
+    command = [sys.executable, "-P", "-c", READ, str(path.absolute()), str(MOST_BYTES)]
+    limit = LIMIT + path.stat().st_size / SPEED
     try:
-        ended = subprocess.run(command, capture_output=True, timeout=LIMIT, check=False)  # noqa: S603
+        ended = subprocess.run(command, capture_output=True, timeout=limit, check=False)  # noqa: S603
     except subprocess.TimeoutExpired:
-        raise ValueError(f"damaged: reading it does not end in {LIMIT:g} s") from None
+        raise ValueError(f"damaged: reading it does not end in {limit:g} s") from None
+    if ended.returncode == 3:
+        raise ValueError(f"its variables have more than {MOST_BYTES} bytes")
     if ended.returncode:
         raise ValueError(DAMAGED)

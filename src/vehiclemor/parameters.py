@@ -179,7 +179,7 @@ def parameter_and_axis(
     else:
         has = "is a number" if declared.size == 1 else f"has the components {', '.join(AXES)}"
         hint = f"{whole} {has}"
-    raise InputError(f"{name!r} is not a parameter of {model}; {hint}")
+    raise InputError(f"{quoted(name)} is not a parameter of {model}; {hint}")
 
 
 def _number_or_list(value: object, name: str) -> float | list[float]:

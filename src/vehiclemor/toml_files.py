@@ -9,17 +9,21 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from vehiclemor.exceptions import FileError
 from vehiclemor.files import read_regular
+from vehiclemor.short_repr import shortened
 
-# Bytes of a file; the largest of the package have 40 kB.
-MOST_BYTES, MOST_PARTS = 1_000_000, 50
-DEEP_KEY = re.compile(rf"(?:[\w'\"-]+\s*\.\s*){{{MOST_PARTS}}}")
-
+# Bytes of a file, characters of a line in it, and parts of a key: the parser takes a time that
+# grows with their square.
+MOST_BYTES, LONGEST, MOST_PARTS = 1_000_000, 1000, 8
+PART = r"""\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
+LONG_KEY = re.compile(f"(?:{PART}){{{MOST_PARTS}}}")
 Schema = TypeVar("Schema", bound="FileSchema")
 
 
 def _line(text: str) -> str:
     if not (text.strip() and text.isprintable()):
-        raise ValueError(f"{text!r} is not a line of text")
+        raise ValueError(f"{shortened(repr(text))} is not a line of text")
+    if len(text) > LONGEST:
+        raise ValueError(f"a text of {len(text)} characters; the longest has {LONGEST}")
     return text
 
 
@@ -40,10 +44,9 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
 def toml_content(path: Path) -> dict[str, Any]:
     """What a TOML file says; `FileError` if it is missing or unreadable."""
     try:
-        text = read_regular(path, MOST_BYTES).decode("utf-8")
-        # Time to read a key grows with the square of its parts.
-        if DEEP_KEY.search(text):
-            raise FileError(f"{path}: a key has more than {MOST_PARTS} parts")
+        text = read_regular(path, MOST_BYTES).decode()
+        if LONG_KEY.search(text):
+            raise ValueError(f"a key has more than {MOST_PARTS} parts")
         return tomllib.loads(text)
     except RecursionError:
         raise FileError(f"{path}: tables or lists are nested too deeply") from None

@@ -231,7 +231,15 @@ def raising(error):
 
 
 @pytest.mark.parametrize(
-    "error", [MachineError("killed"), MemoryError("7 TiB"), OSError(errno.ENOSPC, "No space")]
+    "error",
+    [
+        MachineError("killed"),
+        MemoryError("7 TiB"),
+        OSError(errno.ENOSPC, "No space"),
+        OSError(errno.EFBIG, "File too large"),
+        OSError("no shared object"),
+        ImportError("no shared object"),
+    ],
 )
 def test_what_the_machine_does_is_one_line_and_status_1(capsys, error):
     assert ended(lambda: raising(error)) == 1

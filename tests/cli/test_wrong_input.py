@@ -23,6 +23,12 @@ WRONG = [
     (f"{POD} errors=3", "errors"),
     (f"{TRAVEL} --amplitude big", "big"),
     (f"{TRAVEL} --colour red", "--colour"),
+    (f"{TRAVEL} --co\x1b[31mlour red", r"\x1b[31m"),
+    (f"sim\x1b[31mulate {'x' * 100_000}", r"\x1b[31m"),
+    (f"{TRAVEL} --amplitude \x1b[31m", r"\x1b[31m"),
+    (f"{TRAVEL} --start {'x' * 100_000}", "unknown start 'xxx"),
+    ("run bad\udcff/s.toml", r"bad\udcff"),
+    (f"run {'n' * 245}.toml", "its name has more than 180"),
     ("run figure-12 --out elsewhere", "--results"),
     (f"{TRAVEL} --out run.txt", "run.txt"),
     (f"{TRAVEL} --out none/run.nc", "none/run.nc"),
@@ -44,6 +50,8 @@ def fails(capsys):
         assert main([str(a) for a in arguments]) == 2
         captured = capsys.readouterr()
         assert captured.err.count("\n") == 1, captured.err
+        assert captured.err.removesuffix("\n").isprintable()
+        assert len(captured.err) < 1100
         assert "Traceback" not in captured.err
         assert captured.out == ""
         for word in words:
@@ -73,7 +81,7 @@ def test_output_that_is_something_else_is_kept(fails, tmp_path):
     out.write_text("my notes")
     simulate, study = [*TRAVEL.split(), "--out"], ["run", "figures-6-7", "--results"]
     fails([*simulate, out], "result.nc", "move it away")
-    fails([*simulate, tmp_path], "folder")
+    fails([*simulate, tmp_path], "ends with .nc")
     fails([*simulate, f"{long}.nc"], "too long")
     fails([*study, out], "not a folder")
     fails([*study, long], "too long")

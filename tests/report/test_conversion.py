@@ -60,7 +60,7 @@ def test_zarr_holds_the_whole_dataset(study, tmp_path):
     [
         ("mine.toml", {"to": "xls"}, "unknown format 'xls'"),
         ("mine.toml", {"to": "csv", "out": "there.csv"}, "exists already"),
-        ("mine.toml", {"to": "csv", "out": "/"}, "is a folder"),
+        ("mine.toml", {"to": "csv", "out": "/"}, "exists already"),
         ("mine.toml", {"to": "csv", "results": "elsewhere"}, "no such result"),
         ("paper", {"to": "csv"}, "is a collection"),
     ],

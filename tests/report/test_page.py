@@ -6,7 +6,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+import vehiclemor as vm
 from vehiclemor.cli import main
+from vehiclemor.exceptions import InputError
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.report.unseen import method_rows, protocol_of, target_rows
 
@@ -51,8 +53,8 @@ def value(cell):
 def made(tmp_path_factory, small_protocol):
     """Folder of results, and the text of the report of all of them."""
     folder = tmp_path_factory.mktemp("page")
-    (folder / "hostile.toml").write_text(STUDY)
-    names = [str(folder / "hostile.toml"), str(small_protocol)]
+    (folder / "my hostile.toml").write_text(STUDY)
+    names = [str(folder / "my hostile.toml"), str(small_protocol)]
     out = ["--results", str(folder), "--out", str(folder / "a.html")]
     assert main(["report", *names, *out]) == 0
     return folder, (folder / "a.html").read_text(encoding="utf-8")
@@ -71,11 +73,25 @@ def test_the_file_is_whole_and_loads_nothing(read):
     every = list(read.iter())
     links = [element.get("href")[1:] for element in every if element.get("href")]
     assert links == [element.get("id") for element in every if element.get("id")]
+    assert not any(re.search(r"\s", link) for link in links)
     pictures = [element.get("src") for element in every if element.get("src")]
     assert len(pictures) == 2
     assert all(picture.startswith("data:image/svg+xml;base64,") for picture in pictures)
     (policy,) = [element.get("content") for element in every if element.get("http-equiv")]
     assert policy == "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+
+
+@pytest.mark.parametrize("call", [vm.write_report, vm.figures])
+def test_two_files_of_one_name_are_refused(tmp_path, monkeypatch, call):
+    monkeypatch.chdir(tmp_path)
+    files = [tmp_path / folder / "figure-11.toml" for folder in "ab"]
+    for file in files:
+        file.parent.mkdir()
+        file.write_text(STUDY)
+    for several in (files, [files[0], "figure-11"]):
+        with pytest.raises(InputError, match="have one name, figure-11"):
+            call(several)
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_hostile_titles_are_texts(read):
@@ -85,7 +101,7 @@ def test_hostile_titles_are_texts(read):
 
 
 def test_every_run_is_listed_with_its_error_status_and_cell(made, read):
-    dataset = dataset_of(made[0], "hostile")
+    dataset = dataset_of(made[0], "my hostile")
     rows = {(row["label"], row["frequency factor"]): row for row in table(read, "cell")}
     assert len(rows) == 6
     for method in dataset["label"].values:
@@ -102,7 +118,7 @@ def test_every_run_is_listed_with_its_error_status_and_cell(made, read):
 
 
 def test_provenance_and_settings_stand_there(made, read):
-    dataset = dataset_of(made[0], "hostile")
+    dataset = dataset_of(made[0], "my hostile")
     assert json.loads(texts(read, "pre")[0]) == json.loads(dataset.attrs["configuration"])
     for name in ("versions", "kernel_hash"):
         assert str(dataset.attrs[name]) in texts(read, "dd")

@@ -357,6 +357,27 @@ def test_a_full_disk_is_called_so_whatever_the_library_says(run, monkeypatch, tm
     assert run("pod") == ["ok", "ok"]
 
 
+def test_a_pool_never_holds_more_than_it_hands_on(monkeypatch):
+    monkeypatch.setattr(workers, "IDLE", 0.01)
+    running, most, idle = [], [], []
+
+    def submit(_, batch):
+        running.append((future := Future(), batch))
+        most.append(len(running))
+        return future
+
+    def end():
+        idle.append(len(running))
+        future, batch = running.pop(0)
+        future.set_result(Done(batch))
+
+    groups = [[number] for number in range(10)]
+    pool = SimpleNamespace(submit=submit)
+    found = list(workers.in_batches(pool, None, groups, 2, 3, idle=end))
+    assert sorted(key for done in found for key in done.finished) == [*range(10)]
+    assert (max(most), len(idle)) == (3, 5)
+
+
 def test_workers_that_are_killed_again_and_again_end_the_run(run, monkeypatch):
     tries = []
 
@@ -445,3 +466,22 @@ def test_what_ends_a_batch_is_one_line_or_tried_again(error, ends):
     with ends:
         (done,) = workers.on_cluster([[]], client=client)
         assert done == Done([], KILLED)
+
+
+def test_a_scheduler_without_workers_is_told(monkeypatch, caplog):
+    monkeypatch.setattr(workers, "IDLE", 0.01)
+    future: Future[Done] = Future()
+    looks = []
+
+    def nthreads():
+        """Workers, which come at the third look and end the run."""
+        looks.append(len(looks))
+        if len(looks) < 3:
+            return {}
+        future.set_result(Done([]))
+        return {"tcp://": 1}
+
+    pool = SimpleNamespace(submit=lambda *_: future, shutdown=lambda **_: None)
+    client = SimpleNamespace(get_executor=lambda **_: pool, nthreads=nthreads)
+    assert list(workers.on_cluster([[]], client=client)) == [Done([])]
+    assert ["no worker" in message for message in caplog.messages] == [True]

@@ -1,14 +1,18 @@
 """What is stored comes back as it was, or is quarantined, named and computed again."""
 
+import hashlib
 import json
 import logging
+import os
 import shutil
+from pathlib import Path
 
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
+import vehiclemor as vm
 from tests.study.small import TIMED, small_study
 from vehiclemor import netcdf_file
 from vehiclemor.exceptions import CorruptError, InputError
@@ -35,11 +39,12 @@ def a_run():
 def test_any_dataset_comes_back_as_it_was(shape):
     values = np.arange(np.prod([*shape.values()], dtype=int)).reshape(tuple(shape.values()))
     kinds = [np.dtype(kind) for kind in ("f8", "f4", "i8", "i4", "u1", "?", "U5", "O")]
-    arrays = {kind.str: values.astype("U5").astype(kind) for kind in kinds}
-    arrays["<f8"] = np.where(values > 1, np.nan, -np.inf * (1 + values))
-    attributes = {"units": "m/s²", "nan": float("nan"), "none": [], "many": [1.5, 2], "yes": True}
+    arrays = {f"a{kind.num}": values.astype("U5").astype(kind) for kind in kinds}
+    arrays["a12"] = np.where(values > 1, np.nan, -np.inf * (1 + values))
+    arrays |= dict.fromkeys(("status", "message"), arrays["a17"])
+    attributes = {"units": "m/s²", "long_name": "", "clock": "\x1b"}
     found = {name: (list(shape), array, attributes) for name, array in arrays.items()}
-    dataset = xr.Dataset(found, attrs=attributes).set_coords(["<f4", "|O"])
+    dataset = xr.Dataset(found, attrs=attributes).set_coords(["a11", "a17"])
     dataset = dataset.assign_coords({name: np.arange(size) for name, size in shape.items()})
     again = decoded(encoded(dataset, KEY), KEY).dataset()
     xr.testing.assert_identical(dataset, again)
@@ -68,6 +73,45 @@ def test_every_flipped_bit_and_every_part_of_a_file_is_noticed():
     for content in damaged:
         with pytest.raises(CorruptError):
             decoded(content, KEY)
+
+
+SPECIAL = Path.mkdir, os.mkfifo, lambda path: path.symlink_to("/dev/zero")
+
+
+def with_described(whole, change):
+    """The content of a file with something else said of it, and the hash of that."""
+    size = int.from_bytes(whole[:8], "little")
+    header, arrays = json.loads(whole[8 : 8 + size]), whole[8 + size :]
+    described = json.loads(header["__metadata__"]["dataset"])
+    change(described["variables"], described)
+    header["__metadata__"] |= {"dataset": json.dumps(described), "sha256": store.ZEROS}
+    head = json.dumps(header, separators=(",", ":")).encode()
+    changed = len(head).to_bytes(8, "little") + head + arrays
+    digest = hashlib.sha256(changed).hexdigest().encode()
+    return changed.replace(store.ZEROS.encode(), digest, 1)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda variables, _: variables["error"].update(dimensions=[{}, "time"]),
+        lambda variables, _: variables["error"].update(dimensions=["time", "time"]),
+        lambda variables, _: variables["error"].update(dimensions=["run", "time"]),
+        lambda variables, _: variables["error"].update(attributes={"long_name": True}),
+        lambda variables, _: variables["error"].update(attributes={"_FillValue": "0"}),
+        lambda variables, _: variables["message"].update(text=[["a"], "b", "c"]),
+        lambda variables, _: variables["message"].update(text=3),
+        lambda variables, _: variables.update({"a/b": variables["message"]}),
+        lambda variables, _: variables.pop("message"),
+        lambda _, described: described.update(coordinates=["yaw"]),
+        lambda _, described: described.update(attributes={"cell": None}),
+    ],
+)
+def test_a_run_that_is_none_counts_as_damaged_whatever_its_hash(change):
+    whole = encoded(a_run(), KEY)
+    assert decoded(with_described(whole, lambda *_: None), KEY).ends
+    with pytest.raises(CorruptError):
+        decoded(with_described(whole, change), KEY)
 
 
 # Studies on a folder with damage
@@ -111,24 +155,46 @@ def reread(place):
         lambda *_: b"",
         lambda _, other: other,
         lambda whole, _: whole.replace(store.SCHEMA.encode(), store.SCHEMA[::-1].encode(), 1),
-        None,
+        *(lambda *_, special=special: special for special in SPECIAL),
     ],
-    ids=["cut", "empty", "foreign", "version", "folder"],
+    ids=["cut", "empty", "foreign", "version", "folder", "pipe", "device"],
 )
 def test_a_corrupt_run_is_quarantined_and_computed_again(done, place, computed, caplog, change):
     first, second = sorted((place / "out" / "cells").glob("??/*"))
     quarantined = place / "out" / "cells" / QUARANTINE
     for name in (first.name, f"{first.stem}-2{first.suffix}"):
-        content = change(first.read_bytes(), second.read_bytes()) if change else None
+        made = change(first.read_bytes(), second.read_bytes())
         first.unlink()
-        first.write_bytes(content) if change else first.mkdir()
+        made(first) if callable(made) else first.write_bytes(made)
+        number = first.lstat().st_ino
         (place / "out" / "studies" / "small.nc").unlink()
         xr.testing.assert_identical(run(place / "small.toml", place / "out"), reread(done))
         aside = quarantined / name
-        assert aside.read_bytes() == content if change else aside.is_dir()
+        assert aside.lstat().st_ino == number
         assert all(str(path) in caplog.messages[-1] for path in (first, aside))
     assert computed == [first.stem] * 2
     assert len(caplog.messages) == 2
+
+
+@pytest.mark.parametrize("special", SPECIAL, ids=["folder", "pipe", "device"])
+def test_what_stands_in_the_place_of_a_combined_dataset_is_moved(place, done, caplog, special):
+    path = place / "out" / "studies" / "small.nc"
+    path.unlink()
+    special(path)
+    assert vm.status(place / "small.toml", place / "out")["small"].result is None
+    xr.testing.assert_identical(run(place / "small.toml", place / "out"), reread(done))
+    assert (path.parent / QUARANTINE / path.name).is_file() is False
+    assert len(caplog.messages) == 1
+
+
+def test_runs_that_do_not_fit_together_are_named(place):
+    path = max((place / "out" / "cells").glob("??/*"))
+    (place / "out" / "studies" / "small.nc").unlink()
+    path.write_bytes(
+        with_described(path.read_bytes(), lambda variables, _: variables.pop("warned"))
+    )
+    with pytest.raises(CorruptError, match="move it away"):
+        run(place / "small.toml", place / "out")
 
 
 def test_a_combined_dataset_with_any_damage_is_made_again(done, place, computed, caplog):
@@ -159,6 +225,7 @@ def test_a_combined_dataset_with_any_damage_is_made_again(done, place, computed,
 def test_files_of_others_are_read_if_the_library_can_and_ours_by_others(tmp_path, monkeypatch):
     dataset, path = a_run(), tmp_path / "a.nc"
     write_dataset(dataset, path)
+    whole = path.read_bytes()
     with xr.open_dataset(path) as read:
         xr.testing.assert_identical(read, dataset)
     # The netCDF library drops the hash; what it writes is not ours.
@@ -169,10 +236,17 @@ def test_files_of_others_are_read_if_the_library_can_and_ours_by_others(tmp_path
     dataset.to_netcdf(path)
     xr.testing.assert_identical(read_dataset(path, "source", "vehiclemor"), dataset)
     monkeypatch.setattr(netcdf_file, "LIMIT", 1.0)
+    monkeypatch.setattr(netcdf_file, "_KNOWN", set())
+    sealed = tmp_path / "sealed.nc"
+    sealed.write_bytes(whole)
     for code in ("while True: pass", "import os; os.abort()"):
         monkeypatch.setattr(netcdf_file, "READ", code)
-        with pytest.raises(CorruptError, match=str(path)):
-            read_dataset(path, "source", "vehiclemor")
+        # Anybody can write the hash of a file.
+        for other in (path, sealed):
+            with pytest.raises(CorruptError, match=str(other)):
+                read_dataset(other, "source", "vehiclemor")
+        assert not netcdf_file.is_result(sealed)
+    xr.testing.assert_identical(read_dataset(sealed, "source", "vehiclemor", stored=True), dataset)
 
 
 # Whose results these are

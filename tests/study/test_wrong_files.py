@@ -43,6 +43,10 @@ STUDIES = {
     'title = "for the tests"': [
         ("x = " + 2000 * "[" + 2000 * "]", "nested too deeply"),
         ("x = " + 5000 * "9", "not a valid TOML file"),
+        (".".join(["a"] * 50_000) + " = 1", "a key has more than 8 parts"),
+        ("x . 'y'\t.\"z\"" + ".a" * 50_000 + " = 1", "a key has more than 8 parts"),
+        ("#" * 1_000_001, "bytes, more than 1000000"),
+        (f"title = '{'x' * 900_000}'", "a text of 900000 characters"),
     ],
     'model = "double_wishbone"': [
         ('model = "double_wishbone"\nmaneuver = "lane_change"', "gives inputs delta"),

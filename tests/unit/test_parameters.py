@@ -88,7 +88,7 @@ def test_a_wrong_file_is_named(load, tmp_path, old, new, words):
 def test_files_that_are_none_or_of_another_model(tmp_path: Path):
     path = tmp_path / "toy.toml"
     path.write_bytes(b"\xff\xfe\x00")
-    for place, words in (("none", "no such file"), (".", "can't be read"), (path.name, "UTF-8")):
+    for place, words in (("none", "no such file"), (".", "not a file"), (path.name, "UTF-8")):
         with pytest.raises(FileError, match=words):
             load_parameters("toy", EXPECTED, tmp_path / place)
     path.write_text(VALID)

@@ -79,6 +79,7 @@ def plug_in(tmp_path, monkeypatch):
         ("raise SystemExit(3)", "SystemExit: 3"),
         ("raise OSError(5, 'x')", "x ("),
         ("raise ValueError('one\\ntwo')", "ValueError: one two"),
+        ("raise KeyboardInterrupt", "KeyboardInterrupt"),
     ],
 )
 def test_a_broken_plug_in_is_named_and_harmless(plug_in, text, words):

@@ -12,7 +12,13 @@ from vehiclemor.cli.names import cite, list_components, new_plugin, show
 from vehiclemor.cli.options import FAILED, strict
 from vehiclemor.cli.runs import dataset, export, judge, plot, simulate
 from vehiclemor.cli.studies import compare, convert, figures, report, run, status
-from vehiclemor.exceptions import MachineError, PlugInError, VehiclemorError, machine_reason
+from vehiclemor.exceptions import (
+    MachineError,
+    PlugInError,
+    VehiclemorError,
+    machine_reason,
+    printable,
+)
 
 # Wrong input; and what the number of a signal is added to.
 WRONG_INPUT, STOPPED = 2, 128
@@ -65,20 +71,21 @@ def ended(run: Callable[[], int | None]) -> int:
         return 0
     except (MachineError, PlugInError) as error:
         text, status = str(error), FAILED
-    except UnknownOptionError as error:
-        names = sorted({argument.name for argument in error.argument_collection})
-        known = f" Known: {', '.join(names)}" * bool(names and "Did you mean" not in str(error))
-        text, status = f"{error}{known}", WRONG_INPUT
     except (CycloptsError, VehiclemorError) as error:
         text, status = str(error), WRONG_INPUT
-    except (MemoryError, OSError) as error:
-        reason = machine_reason(error)
-        text, status = reason or str(error), FAILED if reason else WRONG_INPUT
+        if isinstance(error, UnknownOptionError) and "Did you mean" not in text:
+            names = sorted({argument.name for argument in error.argument_collection})
+            text = f"{text} Known: {', '.join(names)}"
+    except (ImportError, MemoryError, OSError) as error:
+        text = machine_reason(error) or str(error)
+        # An error of the system has a number; what has none is of a library that can't be loaded.
+        wrong_input = isinstance(error, OSError) and error.errno and not machine_reason(error)
+        status = WRONG_INPUT if wrong_input else FAILED
     except KeyboardInterrupt as error:
         text = "stopped; finished runs of a study are stored, run again to resume"
         status = STOPPED + (error.args[0] if error.args else signal.SIGINT)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    print("vehiclemor: " + " ".join(text.split()), file=sys.stderr)
+    print(f"vehiclemor: {printable(text)}", file=sys.stderr)
     return status

@@ -1,6 +1,7 @@
 """What is registered, what a name declares, and a package of your own to begin with."""
 
 import json
+import os
 import re
 from importlib.util import find_spec
 from keyword import iskeyword
@@ -140,13 +141,10 @@ def new_plugin(name: str, *, out: Path | None = None) -> None:
         for double in {name, f"{name}_road", f"{name}_modes"} & taken:
             raise InputError(f"{name}: there is a {kind} {double} already")
     folder = Path(f"{name}_plugin") if out is None else out
-    try:
-        if folder.exists() or folder.is_symlink():
-            raise FileError(f"{folder} exists: it is not replaced")
-        if not folder.absolute().parent.is_dir():
-            raise FileError(f"{folder}: the folder {folder.parent} does not exist")
-    except OSError as error:
-        raise FileError(f"{folder}: can't be written ({error.strerror})") from None
+    if os.path.lexists(folder):
+        raise FileError(f"{folder} exists: it is not replaced")
+    if not folder.absolute().parent.is_dir():
+        raise FileError(f"{folder}: the folder {folder.parent} does not exist")
     write_whole(folder, lambda temporary: _write(temporary, name))
     print(f"written: {folder}, a package that works as it stands; to install and try it:\n")
     print(f"  pip install -e {folder} pytest")

@@ -6,7 +6,9 @@ from typing import Annotated, Any, get_args
 
 from cyclopts import Parameter, Token, convert
 
+from vehiclemor.arguments import file_path, quoted
 from vehiclemor.exceptions import InputError
+from vehiclemor.files import replaceable
 
 # A bound is missed, where that is asked for; a simulation, a study, a plug-in or the machine has
 # failed.
@@ -42,9 +44,9 @@ def strict(wanted: Any, tokens: Sequence[Token]) -> Any:
     for token in tokens:
         name, text = token.keyword or "argument", token.value
         if int in (wanted, *get_args(wanted)) and not text.strip().removeprefix("-").isdecimal():
-            raise InputError(f"{name}: {text!r} is not a whole number")
-        if Path in (wanted, *get_args(wanted)) and (not text or "\0" in text):
-            raise InputError(f"{name}: {text!r} is not a path")
+            raise InputError(f"{name}: {quoted(text)} is not a whole number")
+        if Path in (wanted, *get_args(wanted)):
+            file_path(name, text)
     return convert(wanted, tokens)
 
 
@@ -72,13 +74,8 @@ def _parsed(text: str) -> object:
 
 def new_file(option: str, path: Path, endings: Sequence[str]) -> Path:
     """A file that can be written, by its ending and its folder; `InputError` if it can't."""
-    try:
-        if path.is_dir():
-            raise InputError(f"{option} {path}: is a folder, not a file")
-        if not path.parent.is_dir():
-            raise InputError(f"{option} {path}: the folder {path.parent} does not exist")
-    except OSError as error:
-        raise InputError(f"{option} {path}: can't be written ({error.strerror})") from None
+    if not file_path(option, path).parent.is_dir():
+        raise InputError(f"{option} {path}: the folder {path.parent} does not exist")
     if path.suffix.lower() not in endings:
         raise InputError(f"{option} {path}: the file ends with {' or '.join(endings)}")
     return path
@@ -86,15 +83,13 @@ def new_file(option: str, path: Path, endings: Sequence[str]) -> Path:
 
 def result_file(option: str, path: Path) -> Path:
     """As `new_file`, of a result: one that stands there is replaced, but nothing else."""
-    from vehiclemor.netcdf_file import read_dataset
+    from vehiclemor.netcdf_file import is_result
 
-    if new_file(option, path, (".nc",)).exists():
-        read_dataset(path, "source", "vehiclemor")
-    return path
+    return replaceable(new_file(option, path, (".nc",)), "result of vehiclemor", is_result)
 
 
 def picture_file(option: str, path: Path) -> Path:
-    """As `new_file`, of a picture."""
-    from vehiclemor.report.figures.theme import FORMATS
+    """As `new_file`, of a picture: one that stands there is replaced, but nothing else."""
+    from vehiclemor.report.figures.theme import FORMATS, picture_path
 
-    return new_file(option, path, [f".{ending}" for ending in FORMATS])
+    return picture_path(new_file(option, path, [f".{ending}" for ending in FORMATS]))

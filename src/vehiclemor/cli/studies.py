@@ -4,7 +4,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -200,7 +200,7 @@ def shown_progress() -> Iterator[dict[str, int]]:
     from vehiclemor.progress import listening
 
     console = Console(stderr=True)
-    bar = Progress(console=console, disable=not console.is_terminal)
+    bar = Progress(console=console)
     tasks: dict[str, TaskID] = {}
     totals: dict[str, int] = {}
     began = printed = time.monotonic()
@@ -220,5 +220,6 @@ def shown_progress() -> Iterator[dict[str, int]]:
             print(f"{work}: {done} of {total}, {now - began:.0f} s", file=sys.stderr)
             printed = now
 
-    with bar, listening(update):
+    # Where there is no terminal, older versions of rich would print an empty line.
+    with bar if console.is_terminal else nullcontext(), listening(update):
         yield totals

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from vehiclemor.arguments import file_path, number, quoted, within
+from vehiclemor.arguments import file_path, flag, number, quoted, within
 from vehiclemor.exceptions import InputError
-from vehiclemor.files import make_folder, write_whole
+from vehiclemor.files import begins_with, make_folder, replaceable, write_whole
 from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
@@ -26,6 +28,12 @@ ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi"}
 STEP = 1e-3
 # Shortest and longest: below, rounding is all; above, no model of a vehicle is stable.
 STEPS = 1e-7, 1.0
+# What an export may replace: one of its kind.
+IS_EXPORT: dict[str, Callable[[Path], bool]] = {
+    "c": lambda path: (path / OURS).is_file(),
+    "fmu": begins_with(b"modelDescription.xml", at=30),
+    "casadi": begins_with(b"jhpnnagiieaha"),
+}
 # What is always written.
 FILES = ("c", "fmu")
 # A folder with this file is one of ours.
@@ -106,20 +114,12 @@ def destination(name: str, to: str, out: str | Path | None, overwrite: bool) -> 
 
     `InputError` if what is there must not be replaced, or nothing can be written there.
     """
-    found = Path(f"{name}{ENDINGS[to]}") if out is None else file_path("out", out)
-    try:
-        folder, there = found.is_dir(), found.exists()
-        if not found.absolute().parent.is_dir():
-            raise InputError(f"{found}: the folder {found.parent} does not exist")
-    except OSError as error:
-        raise InputError(f"{found}: can't be written ({error.strerror})") from None
-    if there and not overwrite:
-        raise InputError(f"{found} exists; overwrite=True (--overwrite) replaces it")
-    if there and folder != (to == "c"):
-        raise InputError(f"{found} is {'a folder' if folder else 'a file'}: it is not replaced")
-    if folder and not (found / OURS).is_file():
-        raise InputError(f"{found} holds something else than an export: it is not replaced")
-    return found
+    path = file_path("out", Path(f"{name}{ENDINGS[to]}") if out is None else out)
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist")
+    if not flag("overwrite", overwrite) and os.path.lexists(path):
+        raise InputError(f"{path} exists; overwrite=True (--overwrite) replaces it")
+    return replaceable(path, f"export to {to}", IS_EXPORT[to])
 
 
 def name_of(model: str, method: str | None) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 
 from vehiclemor.arguments import number, quoted, real_array
 from vehiclemor.exceptions import FileError, InputError, one_line
+from vehiclemor.files import NO_FILE
 from vehiclemor.registry import choice
 
 # What may stand between columns in the place of the separator that is expected.
@@ -32,6 +33,8 @@ def csv_samples(
     """
     import pandas as pd
 
+    if not isinstance(time, str):
+        raise InputError(f"time is {quoted(time)}, not the name of a column")
     for name, mark in {"separator": separator, "decimal": decimal}.items():
         if not isinstance(mark, str) or len(mark) != 1:
             raise InputError(f"{name} is {quoted(mark)}, not a character")
@@ -39,6 +42,8 @@ def csv_samples(
         raise InputError(f"separator and decimal are both {separator!r}: set separator=';'")
     read = partial(pd.read_csv, path, sep=separator, decimal=decimal, skipinitialspace=True)
     try:
+        if path.exists() and not path.is_file():
+            raise ValueError(NO_FILE)
         with path.open(encoding="utf-8-sig") as file:
             _check_separator(path, separator, file.readline(), file.readline())
         # A longer row, of which an index would be made, is refused here; names are not yet altered.
@@ -53,8 +58,8 @@ def csv_samples(
     if names.dropna().duplicated().any():
         raise FileError(f"{path}: columns have the same name")
     table.columns = table.columns.astype(str)
-    chosen = inputs or [name for name in table if name != time]
-    columns = chosen if isinstance(chosen, Mapping) else {name: name for name in listed(chosen)}
+    columns = inputs if isinstance(inputs, Mapping) else {name: name for name in listed(inputs)}
+    columns = columns or {name: name for name in table if name != time}
     for name in listed([time, *columns.values()]):
         if name not in table:
             option = "time" if name == time else "inputs"

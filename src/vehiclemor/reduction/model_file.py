@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -16,10 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, quoted
+from vehiclemor.arguments import file_path, flag, quoted
 from vehiclemor.exceptions import FileError, InputError, VehiclemorError, one_line
+from vehiclemor.files import replaceable
 from vehiclemor.multibody.quantities import Quantity
-from vehiclemor.netcdf_file import INTEGRITY, global_attributes, opened, write_dataset
+from vehiclemor.netcdf_file import INTEGRITY, is_saved_model, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.parts import Reader, Writer
@@ -27,6 +29,7 @@ from vehiclemor.reduction.training import training_summary
 from vehiclemor.reduction.trust import BANDS, InputRange
 from vehiclemor.reduction.validation import checked_fit, checked_settings, validated
 from vehiclemor.registry import component
+from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -53,10 +56,9 @@ def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
     import xarray as xr
 
     path = file_path("path", path)
-    if path.is_dir() or (path.exists() and not overwrite):
+    if not flag("overwrite", overwrite) and os.path.lexists(path):
         raise InputError(f"{path} is there already; overwrite=True replaces a saved model")
-    if path.exists() and "saved_model" not in global_attributes(path):
-        raise InputError(f"{path} is no saved model: it is not replaced")
+    replaceable(path, "saved model", is_saved_model)
     model, state, writer = rom.model, rom.__getstate__(), Writer(rom.model)
     try:
         parts = {name: writer.part(state[name], name) for name in PARTS}
@@ -113,7 +115,7 @@ def read(path: Any) -> dict[str, Any]:
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
         raise _unfit(path, one_line(error)) from None
     except (SyntaxError, ValueError, VehiclemorError) as error:
-        raise _unfit(path, " ".join(str(error).split())) from None
+        raise _unfit(path, str(error)) from None
 
 
 def training_of(path: Path, inputs: Sequence[Quantity]) -> dict[str, str]:
@@ -178,7 +180,8 @@ def _model(name: str, parameters: Mapping[str, Any]) -> Model:
 
 def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """Variables and attributes of a file that is whole and of this format, else `FileError`."""
-    with opened(path, "saved model") as file:
+    shipped = data_folder() in path.absolute().parents
+    with opened(path, "saved model", trusted=shipped) as file:
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         if "saved_model" not in attrs or INTEGRITY not in file.groups:
             raise FileError(f"{path}: not a saved model")

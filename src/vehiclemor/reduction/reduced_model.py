@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import number
+from vehiclemor.arguments import number, real_array
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction import model_file
@@ -321,9 +321,13 @@ class ReducedOrderModel(ShortRepr):
 
     def _samples(self, state: Any, inputs: Any) -> tuple[np.ndarray, np.ndarray, bool]:
         """States and inputs by sample, and whether it is but one."""
-        if np.ndim(state) < 2:
+        try:
+            states = real_array(state)
+        except TypeError as error:
+            raise InputError(f"state: {error}") from None
+        if states.ndim < 2:
             return self._state(state)[None], self._inputs(inputs)[None], True
-        states = checked_path(state, self._dim, "states")
+        states = checked_path(states, self._dim, "states")
         if not len(states):
             raise InputError("states are none: one sample is needed at least")
         return states, checked_path(inputs, len(self.inputs), "inputs", len(states)), False

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from vehiclemor.arguments import quoted
-from vehiclemor.exceptions import InputError, PlugInError, blamed, printable
+from vehiclemor.exceptions import InputError, PlugInError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction.interface import FitOther, FittedModel, Method, OfflineCost
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
@@ -47,7 +47,7 @@ def validated(
         except ValidationError as error:
             first = error.errors()[0]
             name = first["loc"][0] if first["loc"] else "settings"
-            raise InputError(printable(f"{method.name}: {name} {_wrong(first)}")) from None
+            raise InputError(f"{method.name}: {name} {_wrong(first)}") from None
 
 
 def checked_settings(method: Method, model: Model, settings: Any) -> None:

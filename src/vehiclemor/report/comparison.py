@@ -1,7 +1,6 @@
 """Comparisons: with the paper, on unseen inputs, of every model, of any study; and costs."""
 
 import math
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings, make_experiment
-from vehiclemor.study.plans.loading import load_studies
+from vehiclemor.study.plans.loading import is_study, load_studies
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.store import combined_path
@@ -39,7 +38,10 @@ Row = dict[str, Any]
 
 
 def compare(
-    what: str = PAPER, results: str | Path = "results", jobs: int = 1, seed: int | None = None
+    what: str | Path = PAPER,
+    results: str | Path = "results",
+    jobs: int = 1,
+    seed: int | None = None,
 ) -> pd.DataFrame:
     """A comparison as a table; studies and timings that are missing are run first.
 
@@ -66,15 +68,15 @@ def compare(
         and `replay`, the same number of the training-trajectory baseline.  The others are described
         at `model_comparison` and `study_comparison` in `vehiclemor.report.comparison`.
     """
-    folder, jobs = file_path("results", results), count("jobs", jobs)
-    what = os.fspath(what) if isinstance(what, os.PathLike) else what
+    what, folder = str(file_path("what", what)), file_path("results", results)
+    jobs = count("jobs", jobs)
     if seed is not None and (what == PAPER or what in names("model")):
         raise InputError(f"seed: comparison {what!r} samples no test runs of its own")
     if what == PAPER:
         return paper_comparison(folder, jobs)
     if what in names("model"):
         return model_comparison(what, folder, jobs)
-    if isinstance(what, str) and (what in data_names("studies") or what.endswith(".toml")):
+    if is_study(what):
         return study_comparison(what, folder, jobs, seed)
     known = [PAPER, *names("model"), *data_names("studies"), "FILE.toml"]
     raise unknown("comparison", what, known)

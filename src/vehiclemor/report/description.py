@@ -1,14 +1,11 @@
 """What a name stands for: model, method, maneuver, study, or the schema of a file."""
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
-from vehiclemor.arguments import quoted
-from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import FACTORS
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.multibody.quantities import Quantity
@@ -19,7 +16,7 @@ from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build_derived
-from vehiclemor.study.plans.loading import load_studies, read_study, study_path
+from vehiclemor.study.plans.loading import is_study, load_studies, read_study, study_path
 from vehiclemor.study.plans.study_file import SETS, StudyFile
 from vehiclemor.study.plans.study_runs import values
 from vehiclemor.toml_files import read_toml
@@ -43,9 +40,6 @@ def description(
     name: str, parameters: Mapping[str, object] | None = None, parameter_file: Path | None = None
 ) -> Description:
     """What a name stands for; lists of dictionaries are the rows of tables."""
-    name = os.fspath(name) if isinstance(name, os.PathLike) else name
-    if not isinstance(name, str):
-        raise InputError(f"name is {quoted(name)}, not a text")
     if name in names("model"):
         return _model(name, parameters, parameter_file)
     known = {
@@ -55,7 +49,7 @@ def description(
         **dict.fromkeys(SCHEMAS, schema_description),
     }
     known |= {name: _maneuver} if name.partition(":")[0] in names("maneuver") else {}
-    describe = _study if name.endswith(".toml") else known.get(name)
+    describe = _study if is_study(name) else known.get(name)
     if describe is None:
         raise unknown("name", name, {*known, *names("model")})
     return describe(name)

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.failure import attempt_apart
-from vehiclemor.files import write_text
+from vehiclemor.files import begins_with, replaceable, write_text
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
 from vehiclemor.report.comparison import paper_comparison, result_rows
@@ -27,8 +27,14 @@ from vehiclemor.report.labels import TRAINED, Column, trained_runs, unit_of
 from vehiclemor.report.printing import Table
 from vehiclemor.report.result_selection import KINDS, select_point
 from vehiclemor.report.screens import Part, claim_parts, paper_parts, study_parts
+from vehiclemor.study.plans.loading import refuse_doubles
 from vehiclemor.study.run import run_studies
 
+# Of a report.
+BEGINNING = b"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta name="generator" content="vehiclemor">"""
 # More runs of a study are not listed.
 MOST_ROWS = 200
 COUNTS = ("effective_rank", "rhs_calls", "iterations", "steps")
@@ -45,7 +51,7 @@ class Section(NamedTuple):
 
 
 def write_report(
-    studies: str | Sequence[str] = (),
+    studies: str | Path | Sequence[str | Path] = (),
     out: str | Path = "report.html",
     results: str | Path = "results",
     jobs: int = 1,
@@ -58,7 +64,7 @@ def write_report(
         Names of studies or collections, TOML files, run first where results are missing, or models,
         of which their studies by default are meant.  None: all that is stored, as it is.
     out
-        The file.
+        The file, which ends with .html; an older report there is replaced, nothing else.
     results
         Results folder.
     jobs
@@ -75,8 +81,9 @@ def write_report(
         If a name is wrong, nothing is stored, or the file can't be written.
     """
     path, folder = file_path("out", out), file_path("results", results)
-    if path.suffix not in (".html", ".htm"):
+    if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"out: {path} does not end in .html")
+    replaceable(path, "report of vehiclemor", begins_with(BEGINNING))
     studies = study_names("studies", studies)
     left_out: dict[str, str] = {}
     sections: list[Section] = []
@@ -86,6 +93,7 @@ def write_report(
             of_model = (kind(name, folder) for kind in (nominal, perturbed, unseen))
             chosen += of_model if name in names("model") else [name]
         jobs = count("jobs", jobs, most=MOST_JOBS)
+        refuse_doubles(chosen)
         every = [d for n in chosen for d in run_studies(n, folder, jobs).values()]
         # Two studies may have one name, but not one file.
         found = {Path(d.encoding.get("source", d.attrs["study"])).stem: d for d in every}
@@ -109,7 +117,7 @@ def _stored(folder: Path, left_out: dict[str, str]) -> dict[str, xr.Dataset]:
     found: dict[str, xr.Dataset] = {}
     for path in sorted((folder / "studies").glob("*.nc")):
         try:
-            found[path.stem] = read_dataset(path, "source", "vehiclemor")
+            found[path.stem] = read_dataset(path, "source", "vehiclemor", stored=True)
         except FileError as error:
             left_out[str(path)] = str(error).removeprefix(f"{path}: ")
     # Timings and references have no study file.

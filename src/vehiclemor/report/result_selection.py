@@ -15,8 +15,7 @@ from vehiclemor.metrics import errors
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import unknown
 from vehiclemor.report.labels import Kind
-from vehiclemor.resources import data_names
-from vehiclemor.study.plans.loading import content_hash, load_studies
+from vehiclemor.study.plans.loading import content_hash, is_study, load_studies
 from vehiclemor.study.plans.study_runs import FACTORS
 from vehiclemor.study.store import combined_path, result_path
 
@@ -32,10 +31,11 @@ MOST_NAMED = 12
 
 def stored_result(name: str, results: Path) -> xr.Dataset:
     """A netCDF file, or the stored result of a study, by its name or by that of the result."""
-    path = Path(name)
-    if path.suffix != ".nc":
-        path = results / "studies" / f"{name}.nc"
-        if name.endswith(".toml") or name in data_names("studies") or not path.exists():
+    path = file_path("result", name)
+    stored = path.suffix != ".nc"
+    if stored:
+        path = file_path("result", results / "studies" / f"{name}.nc")
+        if is_study(name) or not path.exists():
             members = load_studies(name)
             if len(members) > 1:
                 raise InputError(f"{name} is a collection: name one of {', '.join(members)}")
@@ -45,7 +45,7 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
                 path = combined_path(results, study)
                 raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
             path = found
-    return read_dataset(path, "source", "vehiclemor")
+    return read_dataset(path, "source", "vehiclemor", stored)
 
 
 def select_point(

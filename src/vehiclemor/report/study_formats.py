@@ -1,5 +1,6 @@
 """Combined datasets in other formats: Zarr as they are, Parquet and CSV as their frames."""
 
+import os
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import Literal, get_args
 
 from vehiclemor.arguments import file_path
 from vehiclemor.exceptions import FileError, InputError
-from vehiclemor.files import write_text, write_whole
+from vehiclemor.files import begins_with, replaceable, write_text, write_whole
 from vehiclemor.registry import choice
 
 Format = Literal["zarr", "parquet", "csv"]
@@ -48,11 +49,9 @@ def convert(
         raise InputError(f"{to} needs the package {engine}: pip install 'vehiclemor[convert]'")
     name = str(file_path("study", study))
     path = Path(f"{Path(name).stem}.{to}") if out is None else file_path("out", out)
-    if not path.name:
-        raise InputError(f"out: {path} is a folder, not a new file")
-    columns = path.with_suffix(".columns.csv")
-    if path.exists():
+    if os.path.lexists(path):
         raise FileError(f"{path}: exists already; move it away")
+    columns = path.with_suffix(".columns.csv")
     if not path.parent.is_dir():
         raise FileError(f"{path}: there is no such folder")
     dataset = stored_result(name, file_path("results", results))
@@ -65,8 +64,7 @@ def convert(
         return write_whole(path, partial(written.to_zarr, mode="w", consolidated=False))
     described = column_meanings(dataset).to_csv(index=False)
     # Those of another format of the same result are the same.
-    if columns.exists() and columns.read_bytes() != described.encode():
-        raise FileError(f"{columns}: exists already; move it away")
+    replaceable(columns, "table of the same columns", begins_with(described.encode()))
     write_text(columns, described)
     rows = frame(dataset)
     write = rows.to_csv if to == "csv" else rows.to_parquet

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
@@ -146,7 +147,8 @@ class Model(ShortRepr):
             return self._state(name, "start").copy()
         name = self.starts[0] if name is None else name
         if name not in self.initial:
-            raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(self.starts)}")
+            known = ", ".join(self.starts)
+            raise InputError(f"unknown start {quoted(name)}; {self.name} has {known}")
         return self.initial[name].copy()
 
     @abstractmethod

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Sequence
 from functools import partial
 from itertools import chain
@@ -63,7 +64,7 @@ def dataset(model: str | Path, out: str | Path | None = None) -> Path:
     """
     name = str(file_path("model", model))
     path = Path(f"{Path(name).stem}-dataset") if out is None else file_path("out", out)
-    if path.exists():
+    if os.path.lexists(path):
         raise FileError(f"{path}: exists already; move it away")
     protocol = load_protocol(protocol_names().get(name, name))
     with one_thread():

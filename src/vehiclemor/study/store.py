@@ -41,6 +41,9 @@ ENDING, SCHEMA = ".safetensors", "vehiclemor run 4"
 # Bytes that say how long the header is; and where the hash stands, for which there are zeros while
 # it is computed.
 PREFIX, HASH, ZEROS = 8, '"sha256":"{}"', "0" * 64
+MEND = "; move it away and run again"
+# Of a variable.
+ATTRIBUTES = {"units", "long_name", "clock"}
 # What comes of a text that is none of ours.
 WRONG = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
 _LOG = logging.getLogger("vehiclemor")
@@ -58,6 +61,12 @@ class StoredRun(NamedTuple):
         """(status, message) -> number of its scenarios."""
         texts = (self.variables[name][1].ravel().tolist() for name in ("status", "message"))
         return Counter(zip(*texts, strict=True))
+
+    @property
+    def layout(self) -> dict[str, tuple[list[str], tuple[int, ...], str]]:
+        """Name -> dimensions, shape and kind of a variable."""
+        entries = self.variables.items()
+        return {name: (found[0], found[1].shape, found[1].dtype.kind) for name, found in entries}
 
     @property
     def broken(self) -> bool:
@@ -105,14 +114,35 @@ def decoded(content: bytes, key: str) -> StoredRun:
         digest = header["sha256"]
         if hashlib.sha256(_with_hash(content, digest, ZEROS)).hexdigest() != digest:
             raise CorruptError("what it holds is not what was written")
-        found, arrays, variables = json.loads(header["dataset"]), load(content), {}
+        found, arrays = json.loads(header["dataset"]), load(content)
+        run = StoredRun({}, list(found["coordinates"]), dict(found["attributes"]))
+        texts = [*run.coordinates, *run.attributes.values()]
         for name, entry in found["variables"].items():
             if "text" in entry:
                 arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
-            variables[name] = entry["dimensions"], arrays[name], dict(entry["attributes"])
-        return StoredRun(variables, found["coordinates"], dict(found["attributes"]))
+            dimensions, attributes = list(entry["dimensions"]), dict(entry["attributes"])
+            run.variables[name] = dimensions, arrays[name], attributes
+            texts += [*dimensions, *attributes.values(), *entry.get("text", [])]
+        # Of anything but texts it raises an error.
+        "".join(texts).encode()
+        _check_layout(run)
+        return run
     except (*WRONG, SafetensorError):
         raise CorruptError("damaged, or no result of this package") from None
+
+
+def _check_layout(run: StoredRun) -> None:
+    """Raise `ValueError` if variables don't make a dataset, or there is no end of the run."""
+    sizes: dict[str, int] = {}
+    for name, (dimensions, array, attributes) in run.variables.items():
+        once = len({*dimensions}) == array.ndim and (array.ndim < 2 or name not in dimensions)
+        fit = [*map(sizes.setdefault, dimensions, array.shape)] == [*array.shape]
+        if not (once and fit and attributes.keys() <= ATTRIBUTES):
+            raise ValueError(name)
+    ends = [run.variables[name][1].dtype for name in ("status", "message")]
+    named = all(map(str.isidentifier, [*run.variables, *sizes, *run.attributes]))
+    if ends != [object, object] or not (named and {*run.coordinates} <= run.variables.keys()):
+        raise ValueError("status")
 
 
 def _with_hash(content: bytes, old: str, new: str) -> bytes:
@@ -155,8 +185,8 @@ def read_run(folder: Path, key: str) -> StoredRun:
         return decoded(read_regular(path, MOST_BYTES), key)
     except CorruptError as error:
         raise CorruptError(error.reason, path, "; run again") from None
-    except IsADirectoryError:
-        raise CorruptError("is a folder, not a result file", path, "; run again") from None
+    except ValueError as error:
+        raise CorruptError(f"not a result file: {error}", path, "; run again") from None
     except FileNotFoundError:
         raise FileError(f"{path}: no such result file; run again") from None
     except OSError as error:
@@ -177,7 +207,7 @@ def finished_runs(folder: Path, keys: Iterable[str]) -> set[str]:
     finished = set()
     for key in keys:
         path = run_path(folder, key)
-        if path.exists():
+        if os.path.lexists(path):
             try:
                 if not read_run(folder, key).broken:
                     finished.add(key)
@@ -210,7 +240,8 @@ def combined_path(folder: Path, study: str) -> Path:
 def result_path(folder: Path, study: str, content: str) -> Path | None:
     """As `combined_path`, if there is one, of the study file of this content."""
     path = combined_path(folder, study)
-    return path if global_attributes(path).get("content") == content else None
+    attributes = global_attributes(path, stored=True)
+    return path if attributes.get("content") == content else None
 
 
 def stored(
@@ -227,15 +258,15 @@ def stored(
     The global `attribute` holds the key, `content` is the hash of a study file.  It is made again
     if one of the files that it is made from is missing, or a bug has ended a run.
     """
-    held = global_attributes(path)
+    held = global_attributes(path, stored=True)
     if held.get(attribute) == key and all(source.exists() for source in sources()):
-        dataset = read_dataset(path, "source", "vehiclemor")
+        dataset = read_dataset(path, "source", "vehiclemor", stored=True)
         # What a bug has ended is tried again.
         if "status" not in dataset or "error" not in dataset["status"].values:
             dataset.encoding["source"] = str(path)
             return dataset
     make_folder(path.parent)
-    if path.exists() and held.get("source") != "vehiclemor":
+    if os.path.lexists(path) and held.get("source") != "vehiclemor":
         quarantine(path, path.parent, "not as it was written, or no result of this package")
     dataset = make().assign_attrs({attribute: key})
     if content:

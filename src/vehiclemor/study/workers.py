@@ -41,8 +41,8 @@ Groups = Sequence[Sequence[Experiment]]
 TRIES, LOOK = 3, 0.5
 # Batches for each worker, so that all end together; and most experiments of a batch.
 EACH, LARGEST = 32, 100
-# Seconds to reach a scheduler.
-REACH = 10.0
+# Seconds to reach a scheduler, and after which it is asked whether it has workers.
+REACH, IDLE = 10.0, 30.0
 KILLED = "a worker process was killed, perhaps for lack of memory"
 _LOG = logging.getLogger("vehiclemor")
 
@@ -156,20 +156,31 @@ def in_batches(
     work: Callable[[list[Experiment]], Done],
     groups: Groups,
     size: int,
+    at_once: int | None = None,
     killed: type[Exception] | tuple[()] = (),
+    idle: Callable[[], object] = bool,
 ) -> Generator[Done, None, None]:
-    """What some work gives for each batch of so many groups in a pool.
+    """What some work gives for each batch of so many groups in a pool, which has some `at_once`.
 
-    `killed` is raised of a batch whose worker was killed, while the pool lives on.
+    `killed` is raised of a batch whose worker was killed, while the pool lives on.  While nothing
+    ends `idle` is called now and then.
     """
-    from concurrent.futures import as_completed
+    from concurrent.futures import FIRST_COMPLETED, Future, wait
 
     batches = [[*chain(*groups[at : at + size])] for at in range(0, len(groups), size)]
-    for future in as_completed([pool.submit(work, batch) for batch in batches]):
-        try:
-            yield future.result()
-        except killed:
-            yield Done([], KILLED)
+    running: set[Future[Done]] = set()
+    while batches or running:
+        free = len(batches) if at_once is None else at_once - len(running)
+        running |= {pool.submit(work, batch) for batch in batches[:free]}
+        del batches[:free]
+        done, running = wait(running, IDLE, FIRST_COMPLETED)
+        if not done:
+            idle()
+        for future in done:
+            try:
+                yield future.result()
+            except killed:
+                yield Done([], KILLED)
 
 
 def batch_size(groups: Groups, places: int) -> int:
@@ -195,7 +206,8 @@ def in_processes(groups: Groups, folder: Path, jobs: int) -> Generator[Done, Non
     try:
         work = partial(evaluate_and_store, folder=folder)
         size = batch_size(groups, jobs)
-        yield from in_batches(pool, work, groups, size)
+        # No more than the pool hands on: what it still held when it is ended would break it.
+        yield from in_batches(pool, work, groups, size, 2 * jobs)
     except BrokenProcessPool:
         yield Done([], KILLED)
     except BaseException:
@@ -230,7 +242,7 @@ def cluster(scheduler: str) -> Iterator[Engine]:
             # Its types are those of awaited calls too.
             client: Any = Client(scheduler, timeout=REACH, set_as_default=False)
         except (OSError, TypeError, ValueError) as error:
-            reason = " ".join(str(error).split())
+            reason = str(error)
             # What is half made closes itself when it is collected: now, as within the next call
             # of dask it would wait for a lock that this call holds.
             error.__traceback__ = None
@@ -252,10 +264,14 @@ def on_cluster(groups: Groups, alone: bool = False, *, client: Any) -> Generator
 
     from distributed import KilledWorker
 
+    def told() -> None:
+        if not client.nthreads():
+            _LOG.warning("the scheduler has no worker: runs wait for one")
+
     pool = client.get_executor(pure=False)
     size = 1 if alone else batch_size(groups, sum(client.nthreads().values()))
     try:
-        yield from in_batches(pool, on_worker, groups, size, KilledWorker)
+        yield from in_batches(pool, on_worker, groups, size, killed=KilledWorker, idle=told)
     except CancelledError:
         raise MachineError(
             "the scheduler is lost; what is finished is stored: run again to resume"

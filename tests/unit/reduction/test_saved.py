@@ -201,7 +201,7 @@ def test_a_path_that_is_taken_is_refused_unless_asked(car, saved):
     with pytest.raises(InputError, match="is there already"):
         car.save(saved)
     assert saved.read_bytes() == before
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(FileError, match="no saved model"):
         car.save(saved.parent, overwrite=True)
     assert car.save(saved, overwrite=True) == saved
     with pytest.raises(InputError, match="is not a path"):

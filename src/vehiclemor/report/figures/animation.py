@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from vehiclemor.arguments import file_path, number, quoted, within
 from vehiclemor.exceptions import InputError
-from vehiclemor.files import write_whole
+from vehiclemor.files import begins_with, replaceable, write_whole
 from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component
@@ -196,6 +196,7 @@ def animate(
     path = file_path("out", out)
     if path.suffix.lower() != ".gif":
         raise InputError(f"out is {quoted(str(path))}; a film ends with .gif")
+    replaceable(path, "film as GIF", begins_with(b"GIF8"))
     seconds = within("duration", number("duration", duration), DURATIONS, " s")
     named = [pair for each in (run, *beside) for pair in _histories(each)]
     methods, runs = [name for name, _ in named], [quantities for _, quantities in named]

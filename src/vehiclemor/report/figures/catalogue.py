@@ -17,7 +17,7 @@ from vehiclemor.report import default_studies
 from vehiclemor.report.figures import result_plot, runs, theme
 from vehiclemor.report.result_selection import KINDS, select_point
 from vehiclemor.resources import data_folder, data_names
-from vehiclemor.study.plans.loading import studies_and_files
+from vehiclemor.study.plans.loading import is_study, refuse_doubles, studies_and_files
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.run import run_studies
 
@@ -50,7 +50,7 @@ def find(name: str, results: Path) -> list[Entry]:
 
     Studies of a model that declares none are written to the results folder.
     """
-    if name.endswith(".toml") or name in data_names("studies"):
+    if is_study(name):
         members = studies_and_files(name).items()
         return [entry for member, found in members for entry in _of_a_study(member, *found)]
     kind, _, model = name.partition("-")
@@ -75,7 +75,7 @@ def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
 
 
 def figures(
-    only: Sequence[str] = (),
+    only: str | Path | Sequence[str | Path] = (),
     out: str | Path | None = None,
     results: str | Path = "results",
     jobs: int = 1,
@@ -120,6 +120,7 @@ def figures(
     theme.styled(style, dpi)
     jobs = count("jobs", jobs, most=MOST_JOBS)
     wanted = only or ["paper"]
+    refuse_doubles(name for name in wanted if is_study(name))
     chosen = {entry.name: entry for name in wanted for entry in find(name, folder)}
     make_folder(target)
     data: dict[str, xr.Dataset] = {}

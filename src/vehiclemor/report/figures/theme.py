@@ -20,13 +20,15 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, 
 
 from vehiclemor.arguments import count, quoted
 from vehiclemor.exceptions import InputError
-from vehiclemor.files import write_whole
+from vehiclemor.files import NO_FILE, begins_with, replaceable, write_whole
 from vehiclemor.report.labels import MARK, TRAINED, MethodLook, declared, raised
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
 Style = dict[str, Any]
 FORMATS = ("pdf", "svg", "png")
 OWN_STYLE = Path(__file__).with_name("style.mplstyle")
+# How their files begin.
+BEGINNINGS = {"pdf": b"%PDF", "svg": b"<?xml", "png": b"\x89PNG"}
 # Without a date and a version, two regenerations give the same bytes.
 METADATA: dict[str, dict[str, None]] = {
     "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
@@ -214,8 +216,10 @@ def tell_empty(figure: Figure) -> None:
 def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[None]:
     """The package's style, with a style of Matplotlib (name or file) on top, and dots an inch."""
     dots = {} if dpi is None else {"savefig.dpi": count("dpi", dpi, 10, 2400)}
-    changes = [OWN_STYLE, *([style] if style else []), dots]
     try:
+        if style and Path(style).exists() and not Path(style).is_file():
+            raise ValueError(NO_FILE)
+        changes = [OWN_STYLE, *([style] if style else []), dots]
         with matplotlib.style.context(changes):
             pass
     except (OSError, TypeError, ValueError):
@@ -224,11 +228,17 @@ def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[No
     return matplotlib.style.context(changes)
 
 
-def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure whole; its format is the file's suffix."""
+def picture_path(path: Path) -> Path:
+    """A path that a picture may be written to: nothing stands there, or one of its format."""
     suffix = path.suffix.removeprefix(".").lower()
     if suffix not in FORMATS:
         raise InputError(f"{path}: a figure is one of {', '.join(FORMATS)}")
+    return replaceable(path, f"picture as {suffix.upper()}", begins_with(BEGINNINGS[suffix]))
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure whole; its format is the file's suffix."""
+    suffix = picture_path(path).suffix.removeprefix(".").lower()
     metadata = METADATA[suffix]
     write_whole(path, lambda part: figure.savefig(part, format=suffix, metadata=metadata))
     return path

@@ -2,9 +2,11 @@
 
 import hashlib
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from vehiclemor.arguments import file_path
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import write_text
 from vehiclemor.registry import choice
@@ -14,12 +16,22 @@ from vehiclemor.toml_files import FileSchema, fitting, toml_content
 
 # Between entries of a long list.
 LINE = ",\n  "
+# Bytes of the name of a study: those of its results and pictures are longer.
+LONGEST_NAME = 180
+
+
+def is_study(name: str) -> bool:
+    """Whether a name is that of a study: a TOML file, or a name from the package's data."""
+    return name.endswith(".toml") or name in data_names("studies")
 
 
 def study_path(study: str) -> Path:
     """Path of a study: a name from the package's data, or a TOML file."""
+    path = file_path("study", study)
     if study.endswith(".toml"):
-        return Path(study)
+        if len(path.stem.encode()) > LONGEST_NAME:
+            raise InputError(f"study {path}: its name has more than {LONGEST_NAME} characters")
+        return path
     return data_folder() / "studies" / f"{choice('study', study, data_names('studies'))}.toml"
 
 
@@ -70,6 +82,16 @@ def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
         double = file.stem in members
         members[f"{file.stem}-{content_hash(content)}" if double else file.stem] = file, content
     return members
+
+
+def refuse_doubles(studies: Iterable[str]) -> None:
+    """Raise `InputError` if two files have one name: results of one would stand for the other."""
+    files: dict[str, Path] = {}
+    for study in studies:
+        for name, (path, _) in studies_and_files(study).items():
+            other = files.setdefault(name, path)
+            if other.resolve() != path.resolve():
+                raise InputError(f"{other} and {path} have one name, {name}: rename one of them")
 
 
 def content_hash(definition: FileSchema) -> str:

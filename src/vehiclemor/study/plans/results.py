@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from vehiclemor.exceptions import CorruptError
 from vehiclemor.parameters import AXES, parameter_and_axis
 from vehiclemor.provenance import attributes, layout_digest, versions
 from vehiclemor.simulation.model import Model
@@ -21,7 +22,7 @@ from vehiclemor.study.plans.protocol import Protocol
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.plans.study_runs import PARAMETER
 from vehiclemor.study.result import meaning_of, variables
-from vehiclemor.study.store import read_run
+from vehiclemor.study.store import MEND, read_run, run_path
 
 # Dimensions of a run's errors; each has the units of its labels beside it.
 QUANTITIES = ("output", "coordinate", "speed")
@@ -41,7 +42,8 @@ def combined(grid: Grid, folder: Path) -> xr.Dataset:
     found, numbers = np.unique(keys, return_inverse=True)
     order = np.argsort(numbers, axis=None, kind="stable")
     ends = np.cumsum(np.bincount(numbers.ravel(), minlength=len(found)))
-    template = read_run(folder, found[0].decode()).dataset()
+    first = read_run(folder, found[0].decode())
+    template = first.dataset()
     # Texts of any length.
     arrays = {
         str(name): np.empty(keys.shape + v.shape, object if v.dtype.kind in "OU" else v.dtype)
@@ -49,9 +51,11 @@ def combined(grid: Grid, folder: Path) -> xr.Dataset:
     }
     for key, flat in zip(found.astype(str), np.split(order, ends[:-1]), strict=True):
         places = np.unravel_index(flat, keys.shape)
-        run = read_run(folder, key).variables
+        run = read_run(folder, key)
+        if run.layout != first.layout:
+            raise CorruptError("not a run of the same model", run_path(folder, key), MEND)
         for name, array in arrays.items():
-            array[places] = run[name][1][()]
+            array[places] = run.variables[name][1][()]
     whole = {
         name: (names + template[name].dims, array, template[name].attrs)
         for name, array in arrays.items()

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
 
-from vehiclemor.arguments import quoted
+from vehiclemor.arguments import MOST_NAMES, quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.maneuver import Maneuver
@@ -37,7 +37,7 @@ def training_set(
     if given is None:
         given = "protocol" if _of_protocol(model.name, method) else "nominal"
     entries = [given] if isinstance(given, Entry) else given
-    if not isinstance(entries, Sequence) or isinstance(entries, range) or not entries:
+    if not isinstance(entries, Sequence) or not entries or entries[MOST_NAMES:]:
         raise InputError(f"training is {quoted(given)}: give names, maneuvers or scenarios")
     if bool(factors) != any(isinstance(entry, str) and entry == "set" for entry in entries):
         raise InputError("training 'set' needs training_set, pairs of factors; nothing else does")
