@@ -156,7 +156,7 @@ def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
     return address, ctypes.CFUNCTYPE(None, *pointers)(address), code
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Derivation(ShortRepr):
     """What is left of a program: kernels by name; `constants` gives those of the parameters."""
 

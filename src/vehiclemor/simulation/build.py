@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import real_array
 from vehiclemor.codegen.kernels import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
-from vehiclemor.exceptions import GeometryError, InputError, blamed
+from vehiclemor.exceptions import GeometryError, InputError, VehiclemorError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.parameters import ParameterSet, load_parameters, overridden, parameter_path
 from vehiclemor.progress import first_use
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.structures.model import StructuralModel
     from vehiclemor.symbolic.program import Program
 
+# Integrators freeze the Jacobian of the model whose parameters are rounded: a number to the usual one
+# and multiples of this part of it, a point to the usual one and multiples of so many metres.
+ROUNDED, ROUNDED_POINT, SMALLEST = 0.25, 0.02, 1e-9
 # Largest gap (m or rad) between the joints of a mechanism that counts as assembled.
 CLOSED = 1e-9
 # Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
@@ -94,9 +97,49 @@ def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:
         from vehiclemor.simulation.structures.system import STRUCTURAL_LOOPS
 
         return _standing, STRUCTURAL_LOOPS
+    return _moving, LOOP_SOURCES
+
+
+def _moving(
+    definition: ModelDefinition, equations: Derivation, parameters: ParameterSet, *fields: Any
+) -> DynamicModel:
+    """A model of motion, and that of rounded parameters beside it."""
     from vehiclemor.simulation.dynamic import DynamicModel
 
-    return DynamicModel, LOOP_SOURCES
+    rounded = _rounded(definition, parameters.flat())
+    near = rounded and _rounded_model(definition, rounded, equations, fields[0])
+    return DynamicModel(definition, equations, parameters, *fields, near or None)
+
+
+def _rounded(definition: ModelDefinition, flat: np.ndarray) -> bytes:
+    """Components of the rounded parameters; empty if they are round, or nothing is usual."""
+    try:
+        usual, steps = _usual_parameters(definition)
+    except VehiclemorError:
+        return b""
+    rounded = usual + steps * np.rint((flat - usual) / steps)
+    return b"" if np.array_equal(rounded, flat) else rounded.tobytes()
+
+
+@lru_cache(maxsize=64)
+def _usual_parameters(definition: ModelDefinition) -> tuple[np.ndarray, np.ndarray]:
+    """Components of the model's own parameters, and the steps to which others are rounded."""
+    declared = definition.parameters
+    usual = load_parameters(definition.name, declared, definition.parameter_file).flat()
+    points = np.repeat([d.size > 1 for d in declared.values()], [d.size for d in declared.values()])
+    steps = np.where(points, ROUNDED_POINT, np.maximum(ROUNDED * np.abs(usual), SMALLEST))
+    return usual, steps
+
+
+@lru_cache(maxsize=16)
+def _rounded_model(definition: ModelDefinition, rounded: bytes, *derived: Any) -> Any:
+    """The model of rounded parameters; none where there is no such model."""
+    overrides = values_of(definition, np.frombuffer(rounded))
+    name, declared, path = definition.name, definition.parameters, definition.parameter_file
+    try:
+        return _made(definition, load_parameters(name, declared, path, overrides), derived)
+    except VehiclemorError:
+        return None
 
 
 def _assembled(*fields: Any) -> AlgebraicModel:
