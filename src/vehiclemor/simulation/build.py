@@ -131,7 +131,7 @@ def _usual_parameters(definition: ModelDefinition) -> tuple[np.ndarray, np.ndarr
     return usual, steps
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=8)
 def _rounded_model(definition: ModelDefinition, rounded: bytes, *derived: Any) -> Any:
     """The model of rounded parameters; none where there is no such model."""
     overrides = values_of(definition, np.frombuffer(rounded))
