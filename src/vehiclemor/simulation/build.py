@@ -24,6 +24,7 @@ from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
 if TYPE_CHECKING:
     from vehiclemor.simulation.algebraic import AlgebraicModel
+    from vehiclemor.simulation.dynamic import DynamicModel
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.structures.model import StructuralModel
     from vehiclemor.symbolic.program import Program
@@ -67,6 +68,7 @@ def _made(
     """A model of equations that may have been derived already, see `compiled`."""
     name, flat = definition.name, parameters.flat()
     make, loops = _kind(definition.kind)
+    near: list[DynamicModel | None] = []
     values, initial = values_of(definition, flat), {DESIGN_START: np.zeros(0)}
     with blamed(f"model {name!r}: check", definition.check):
         definition.check(values)
@@ -81,9 +83,10 @@ def _made(
     if definition.kind in ("ode", "dae"):
         with blamed(f"model {name!r}: starts", definition.starts):
             initial = {start: real_array(x) for start, x in definition.starts(values).items()}
+        near = [_near(definition, flat, equations, digest)]
     _check_states(definition, initial)
     constants = hoisted_constants(equations, flat, solved)
-    return make(definition, equations, parameters, digest, constants, initial)
+    return make(definition, equations, parameters, digest, constants, initial, *near)
 
 
 def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:
@@ -97,28 +100,21 @@ def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:
         from vehiclemor.simulation.structures.system import STRUCTURAL_LOOPS
 
         return _standing, STRUCTURAL_LOOPS
-    return _moving, LOOP_SOURCES
-
-
-def _moving(
-    definition: ModelDefinition, equations: Derivation, parameters: ParameterSet, *fields: Any
-) -> DynamicModel:
-    """A model of motion, and that of rounded parameters beside it."""
     from vehiclemor.simulation.dynamic import DynamicModel
 
-    rounded = _rounded(definition, parameters.flat())
-    near = rounded and _rounded_model(definition, rounded, equations, fields[0])
-    return DynamicModel(definition, equations, parameters, *fields, near or None)
+    return DynamicModel, LOOP_SOURCES
 
 
-def _rounded(definition: ModelDefinition, flat: np.ndarray) -> bytes:
-    """Components of the rounded parameters; empty if they are round, or nothing is usual."""
+def _near(definition: ModelDefinition, flat: np.ndarray, *derived: Any) -> Any:
+    """The model of rounded parameters; none if these are round, or there are no usual ones."""
     try:
         usual, steps = _usual_parameters(definition)
     except VehiclemorError:
-        return b""
+        return None
     rounded = usual + steps * np.rint((flat - usual) / steps)
-    return b"" if np.array_equal(rounded, flat) else rounded.tobytes()
+    if np.array_equal(rounded, flat):
+        return None
+    return _rounded_model(definition, rounded.tobytes(), *derived)
 
 
 @lru_cache(maxsize=64)

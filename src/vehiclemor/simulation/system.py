@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
@@ -73,9 +73,10 @@ class System(ShortRepr):
 
     def with_constants(self, constants: np.ndarray) -> System:
         """The system of other constants; operators, packed arguments and workspaces serve both."""
-        other = replace(self, constants=constants)
-        for name in ("frame", "frozen_jacobian", "turning_jacobian", "_ready", "_pool"):
-            vars(other)[name] = getattr(self, name)
+        # What is made of the Jacobian is made by this one, before it is shared.
+        _ = self.frame, self.turning_jacobian, self._ready, self._pool
+        other = object.__new__(System)
+        vars(other).update(vars(self), constants=constants, _address=constants.ctypes.data)
         return other
 
     @cached_property
