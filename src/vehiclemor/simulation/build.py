@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from vehiclemor.simulation.structures.model import StructuralModel
     from vehiclemor.symbolic.program import Program
 
-# Integrators freeze the Jacobian of the model whose parameters are rounded: a number to the usual one
-# and multiples of this part of it, a point to the usual one and multiples of so many metres.
+# Integrators freeze the Jacobian of the model of rounded parameters, which many cars share.  They
+# are rounded to the model's own ones and steps of this part of them; points to steps of so many m.
 ROUNDED, ROUNDED_POINT, SMALLEST = 0.25, 0.02, 1e-9
 # Largest gap (m or rad) between the joints of a mechanism that counts as assembled.
 CLOSED = 1e-9

@@ -155,7 +155,7 @@ def exponential_tables(jacobian: np.ndarray, grid: Sequence[float]) -> np.ndarra
     """Tables (step sizes, 7, n, n) of the loops, each matrix transposed.
 
     J; phi_1(z/2) / 2 and phi_2(z/2); phi_1, 2 phi_2, 2 phi_2 - 4 phi_3, 4 phi_3 - phi_2 of
-    z = h J.  Step sizes grow by a factor, a root of 2: each part of the grid doubles the one before.
+    z = h J.  Step sizes grow by a root of 2: each octave of the grid doubles the one before.
     """
     steps = np.asarray(grid)
     octave = int((steps < 1.99 * steps[0]).sum())
