@@ -105,16 +105,16 @@ def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:
     return DynamicModel, LOOP_SOURCES
 
 
-def _near(definition: ModelDefinition, flat: np.ndarray, *derived: Any) -> Any:
-    """The model of rounded parameters; none if these are round, or there are no usual ones."""
+def _near(definition: ModelDefinition, flat: np.ndarray, *derived: Any) -> DynamicModel | None:
+    """The model of rounded parameters; none if these are round, or there is no such model."""
     try:
         usual, steps = _usual_parameters(definition)
+        rounded = usual + steps * np.rint((flat - usual) / steps)
+        if np.array_equal(rounded, flat):
+            return None
+        return _rounded_model(definition, rounded.tobytes(), *derived)
     except VehiclemorError:
         return None
-    rounded = usual + steps * np.rint((flat - usual) / steps)
-    if np.array_equal(rounded, flat):
-        return None
-    return _rounded_model(definition, rounded.tobytes(), *derived)
 
 
 @lru_cache(maxsize=64)
@@ -129,13 +129,9 @@ def _usual_parameters(definition: ModelDefinition) -> tuple[np.ndarray, np.ndarr
 
 @lru_cache(maxsize=8)
 def _rounded_model(definition: ModelDefinition, rounded: bytes, *derived: Any) -> Any:
-    """The model of rounded parameters; none where there is no such model."""
     overrides = values_of(definition, np.frombuffer(rounded))
     name, declared, path = definition.name, definition.parameters, definition.parameter_file
-    try:
-        return _made(definition, load_parameters(name, declared, path, overrides), derived)
-    except VehiclemorError:
-        return None
+    return _made(definition, load_parameters(name, declared, path, overrides), derived)
 
 
 def _assembled(*fields: Any) -> AlgebraicModel:
