@@ -24,6 +24,7 @@ from pydantic import Field
 import vehiclemor as vm
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.settings import Settings
+from vehiclemor.simulation.run_timer import clock
 
 
 class PolynomialSettings(Settings):
@@ -40,11 +41,11 @@ class Polynomials:
     order: int = 2
 
     def simulate(self, maneuver, start):
-        times, began = maneuver.times, time.process_time()
+        times, began = maneuver.times, clock()
         inputs = maneuver.at(times)
         terms = polyvander2d(*(inputs / self.largest).T, [self.degree] * 2)
         nothing = [0] * len(self.model.counts)
-        seconds = time.process_time() - began
+        seconds = clock() - began
         return self.model.trajectory(times, inputs, terms @ self.coefficients, nothing, seconds)
 
     def best_approximation(self, states):

@@ -89,18 +89,18 @@ def drive(controller, plant, duration=5.0):
     state, steering = plant.state(), np.zeros(1)
     names = ("longitudinal_position", "lateral_position", "yaw")
     seen = [plant.output_names.index(name) for name in names]
-    told = {"place": [], "steering": [], "evaluations": [], "ms": []}
+    record = {"place": [], "steering": [], "evaluations": [], "ms": []}
     for _ in range(round(duration / PERIOD)):
-        told["place"].append(plant.outputs(state, steering)[seen])
+        record["place"].append(plant.outputs(state, steering)[seen])
         measured = controller.car.state(plant.full_state(state, steering), steering)
         began = time.thread_time()
         plan = controller.plan(measured, steering.item())
-        told["ms"].append(1e3 * (time.thread_time() - began))
-        told["evaluations"].append(plan.nfev)
+        record["ms"].append(1e3 * (time.thread_time() - began))
+        record["evaluations"].append(plan.nfev)
         steering = plan.x[:1]
-        told["steering"].append(steering.item())
+        record["steering"].append(steering.item())
         state = plant.step(state, steering, PERIOD)
-    return {name: np.array(values) for name, values in told.items()}
+    return {name: np.array(values) for name, values in record.items()}
 
 
 def clearance(places):
@@ -113,6 +113,8 @@ if __name__ == "__main__":
     reduced = vm.rom(MODEL)
     run = drive(Controller(reduced), vm.reduce(MODEL, "full_order"))
     print(f"{run['evaluations'].mean():.1f} predictions a plan")
+    usual, longest = np.median(run["ms"]), run["ms"].max()
+    print(f"{usual:.0f} ms a plan (median), {longest:.0f} at most, {1e3 * PERIOD:.0f} a period")
     print(f"clearance {clearance(run['place']):.2f}, where 1 touches the ellipse")
     figure, axes = plt.subplots(2, figsize=(6.7, 4.6))
     round_ = np.linspace(0.0, 2.0 * np.pi, 200)

@@ -38,6 +38,7 @@ from vehiclemor.report.printed_numbers import TIMING
 ROOT = FILE.parents[1]
 # Last part of a name -> its unit; an error has that of its output.
 UNITS = {"us": "us", "offline_us": "us", "ns_per_sample": "ns", "median": "s"}
+UNITS |= {"worst_m": "m", "worst_deg": "deg"}
 UNITS |= {"growth_rate": "1/s", "growth_largest": "1/s"}
 UNITS |= {"largest_lateral_position_without_steering": "m"}
 ERRORS = ("rms_error", "floor", "smallest", "largest", "natural")

@@ -48,8 +48,9 @@ COUNTS = ("rhs_calls", "iterations", "growth_rate")
 JUDGED = ["misses", "score", "seconds", "loop_seconds"]
 BESIDE = ["misses", "silent", "flagged", "score", "seconds", "offline_seconds"]
 TESTED = [*BESIDE, "loop_seconds", "ratio_equal", "ratio_equal_loop", "runs", "rank"]
+TESTED += ["misses_at_ten", "worst_m", "worst_deg"]
 TESTED += [f"outside_{name}" for name in ("runs", "misses", "silent", "flagged")]
-MOST_ERRORS = 12
+MOST_ERRORS, MEASURED = 12, ("worst_rms_", "worst_max_", "worst_relative_")
 OPERATIONS = ("total", "trigonometric", "divide")
 WORK = ("residual_evaluations", "iterations", "rhs_calls")
 SPEEDS = {"speed_up": "same", "speed_up_strongest": "fastest"}
@@ -220,7 +221,7 @@ def protocol(dataset: xr.Dataset) -> Iterator[Entry]:
     methods, head = rows[rows["kind"] == "method"], f"{kind}.{model}"
     methods = pd.concat([methods, methods[methods["winner"].eq(True)].assign(label="chosen")])
     full = methods["role"] == "full order"
-    worst = [name for name in methods if name.startswith("worst_")]
+    worst = [name for name in methods if name.startswith(MEASURED)]
     worst = worst if len(worst) <= MOST_ERRORS else []
     yield from cells(head, methods[full].set_index("label")[JUDGED])
     columns = TESTED + worst if kind == "predictive" else BESIDE + worst[:2]

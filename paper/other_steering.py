@@ -159,7 +159,7 @@ def main() -> None:
     """Draw, simulate, and write."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
-    parser.add_argument("--runs", type=int, default=150, help="of each kind")
+    parser.add_argument("--runs", type=int, default=60, help="of each kind")
     parser.add_argument("--seed", type=int, default=7)
     wanted = parser.parse_args()
     values = {}

@@ -62,6 +62,7 @@ def claims(results: Path) -> Iterator[dict[str, Any]]:
                     "variant": row["variant"],
                     "value": float(f"{row['reproduced']:.4g}"),
                     "verdict": row["verdict"],
+                    "reason": row["reason"],
                 }
                 for row in rows
                 if np.isfinite(row["reproduced"])

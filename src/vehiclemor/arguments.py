@@ -2,6 +2,7 @@
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,15 @@ def file_path(name: str, value: object) -> Path:
     except OSError as error:
         raise InputError(f"{name}: {quoted(value)} is not a path ({error.strerror})") from None
     return path
+
+
+def study_names(name: str, value: Any) -> list[str]:
+    """Names of studies, or paths of their files, of which one may stand alone."""
+    entries = [value] if isinstance(value, str | os.PathLike) else value
+    listed = isinstance(entries, Sequence)
+    if not listed or not all(isinstance(entry, str | os.PathLike) for entry in entries):
+        raise InputError(f"{name} is {quoted(value)}, not a list of names or files of studies")
+    return [os.fspath(entry) for entry in entries]
 
 
 def loop_array(values: Any) -> np.ndarray:

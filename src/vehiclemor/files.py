@@ -1,8 +1,10 @@
 """Writing files whole: under a temporary name first, then moved into place."""
 
+import errno
 import os
 import secrets
 import shutil
+import stat
 import tempfile
 import time
 from collections.abc import Callable
@@ -41,13 +43,30 @@ def not_written(path: Path, error: Exception) -> FileError | MachineError:
     return (MachineError if machine else FileError)(f"{path}: can't be written ({reason})")
 
 
+def read_regular(path: Path, most: int) -> bytes:
+    """Content of a regular file of at most so many bytes; `FileError` for anything else there.
+
+    Pipes would wait for ever, and devices have no end.
+    """
+    described = path.stat()
+    if stat.S_ISDIR(described.st_mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if not stat.S_ISREG(described.st_mode):
+        raise FileError(f"{path}: a device or pipe, not a file")
+    if described.st_size > most:
+        raise FileError(f"{path}: has {described.st_size} bytes, more than {most}")
+    return path.read_bytes()
+
+
 def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None = None) -> Path:
     """Let `write` fill a temporary file or folder, beside `path` by default; then move it there.
 
     The temporary path ends like `path`, on the same disk: a reader sees the old content or the new
-    one, never a part.  `FileError` if the folder can't be written, `MachineError` if the disk
-    fails.
+    one, never a part.  `FileError` if the folder can't be written, or a device or pipe is there,
+    `MachineError` if the disk fails.
     """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise FileError(f"{path}: a device or pipe, not a file: it is not replaced")
     whole = path.absolute()
     temporary = temporary_path((folder or whole.parent) / whole.name)
     old = temporary.with_name(f"{temporary.name}.old")

@@ -46,7 +46,7 @@ def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        `rms_error` and `max_error` by output, in its unit.
+        `rms_error`, `max_error` and `signal_range` of the full order by output, in its unit.
 
     Raises
     ------
@@ -60,14 +60,18 @@ def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
             raise InputError(f"{name} is {quoted(given)}, not a run as `simulate` gives it")
     if not np.array_equal(run.times, full.times):
         raise InputError("the runs have other output times: simulate both with the same input")
+    if run.inputs.shape != full.inputs.shape:
+        raise InputError("the runs are of models with other inputs: compare runs of one model")
     if not np.allclose(run.inputs, full.inputs, rtol=1e-6, atol=1e-9 * np.abs(full.inputs).max()):
         raise InputError("the runs have other inputs: simulate both with the same")
-    difference = run.outputs - full.chosen(run.names).outputs
+    reference = full.chosen(run.names).outputs
+    difference, size = run.outputs - reference, signal_range(reference)
     labels = run.chosen(run.names).dataset().drop_dims(["time", "input"])
     return xr.Dataset(
         {
             "rms_error": ("output", rms(difference), {"long_name": "root mean square error"}),
             "max_error": ("output", max_abs(difference), {"long_name": "largest error"}),
+            "signal_range": ("output", size, {"long_name": "range of the full-order output"}),
         },
         labels.coords,
     )

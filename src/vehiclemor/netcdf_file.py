@@ -81,7 +81,7 @@ def global_attributes(path: Path) -> dict[str, Any]:
     import netCDF4
 
     try:
-        if not _sealed(path):
+        if not (path.is_file() and _sealed(path)):
             return {}
         with netCDF4.Dataset(path) as file:
             return {name: file.getncattr(name) for name in file.ncattrs()}
@@ -99,7 +99,7 @@ def opened(path: Path, kind: str, mend: str = "") -> Iterator[netCDF4.Dataset]:
 
     if not path.is_file():
         if path.exists():
-            raise CorruptError(f"is a folder, not a {kind}", path)
+            raise CorruptError(f"is a folder or device, not a {kind}", path)
         raise FileError(f"{path}: no such {kind}")
     try:
         sealed = _sealed(path)

@@ -1,5 +1,6 @@
 """The border to TOML files: one clear line for whatever is wrong with a file."""
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -7,6 +8,11 @@ from typing import Annotated, Any, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from vehiclemor.exceptions import FileError
+from vehiclemor.files import read_regular
+
+# Bytes of a file; the largest of the package have 40 kB.
+MOST_BYTES, MOST_PARTS = 1_000_000, 50
+DEEP_KEY = re.compile(rf"(?:[\w'\"-]+\s*\.\s*){{{MOST_PARTS}}}")
 
 Schema = TypeVar("Schema", bound="FileSchema")
 
@@ -34,7 +40,11 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
 def toml_content(path: Path) -> dict[str, Any]:
     """What a TOML file says; `FileError` if it is missing or unreadable."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        text = read_regular(path, MOST_BYTES).decode("utf-8")
+        # Time to read a key grows with the square of its parts.
+        if DEEP_KEY.search(text):
+            raise FileError(f"{path}: a key has more than {MOST_PARTS} parts")
+        return tomllib.loads(text)
     except RecursionError:
         raise FileError(f"{path}: tables or lists are nested too deeply") from None
     except FileNotFoundError:

@@ -128,6 +128,23 @@ def test_a_model_shows_all_that_it_declares(name):
     assert (row["value"], row["source"]) == ([0.0, 0.8, -0.1], "override")
 
 
+def test_a_model_that_ships_shows_what_it_was_trained_on():
+    car = vm.rom("independent_suspension_vehicle")
+    shown = vm.describe(car.model.name)["reduced model that ships"]
+    speeds = [run["speed"] for run in car.training]
+    assert shown["initial speed, m/s"] == f"{min(speeds):g} to {max(speeds):g}"
+    assert shown["training runs"] == str(len(speeds))
+    assert shown["maneuvers"].startswith("lane_change, multisine")
+    assert shown["starts"] == "dropped, equilibrium"
+    largest = car.input_range.largest[:, 0]
+    assert f"{largest[0]:.3g} rad ({np.degrees(largest[0]):.3g} deg)" in shown["input delta"]
+    assert shown["input delta"].endswith(f"above 2 Hz up to {largest[1]:.3g} rad")
+    lines = str(car).splitlines()
+    assert lines[0] == f"{car.model.name} by slow_manifold, order 12"
+    assert lines[1:] == [f"  {name}: {text}" for name, text in shown.items() if name != "method"]
+    assert str(vm.reduce(car.model, "linear_single_track")).endswith("training runs: none")
+
+
 @pytest.mark.parametrize("name", names("method"))
 def test_a_method_shows_every_setting_of_every_kind(name):
     models = {model: vm.model(model) for model in names("model")}

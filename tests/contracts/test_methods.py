@@ -146,6 +146,15 @@ def test_a_method_describes_itself_and_its_settings(name):
             assert {key: complete[key] for key in values} == values
 
 
+def test_a_fit_reads_no_more_of_the_training_than_is_declared(pair):
+    readable = {"nothing": (), "inputs": (SimpleNamespace(maneuver=pair.maneuver),)}
+    if pair.method.learns_from == "runs":
+        pytest.skip(f"{pair.name} reads whole runs")
+    settings = validated(pair.method, pair.model.kind, SETTINGS.get(pair.name, {}))
+    reduced = pair.method.fit(pair.model, readable[pair.method.learns_from], settings)
+    np.testing.assert_array_equal(pair.run(reduced).outputs, pair.run(pair.fit()).outputs)
+
+
 def test_every_preset_simulates_the_nominal_maneuver(pair):
     full = pair.model.simulate(pair.maneuver)
     for preset in pair.method.presets_of(pair.model.kind):

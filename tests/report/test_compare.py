@@ -39,9 +39,8 @@ def test_every_published_number_and_claim_has_a_row(rows):
     assert set(rows["id"]) == compared | told
     assert set(rows["threshold_source"]) - {""} == {"published", "the claim's words", "added here"}
     assert set(rows["model"]) == {*MODELS, "all three models"}
-    # What studies that there are no longer have measured keeps its verdict.
-    old = rows[rows["id"] == "all_essential_for_design"]
-    assert old["verdict"].tolist() == ["missed"]
+    # Nothing is measured of it.
+    assert rows[rows["id"] == "all_essential_for_design"]["verdict"].tolist() == ["not_comparable"]
 
 
 def test_verdicts_follow_from_the_numbers(rows, results_folder):

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,10 @@ from scipy.io import mmread
 import vehiclemor as vm
 from tests.study.small import small_study
 from vehiclemor.cli import main
+from vehiclemor.codegen.kernels import Derivation
 from vehiclemor.report.published import fixed_test_sets
 from vehiclemor.study import timing
-from vehiclemor.study.dataset import digest_of
+from vehiclemor.study.dataset import EQUATIONS, digest_of
 from vehiclemor.study.plans.protocol import load_protocol, protocol_names, sampled_sets
 
 OUTSIDE = Path(__file__).parents[2] / "examples" / "outside_method.py"
@@ -41,6 +43,41 @@ def test_fixed_test_sets_never_change(capsys):
     assert main(["cite"]) == 0
     told = capsys.readouterr().out
     assert all(f"{name}: digest {digest}" in told for name, digest in fixed_test_sets().items())
+
+
+def stiffer(definition):
+    """A truck whose frame is made otherwise, from the same parameters."""
+
+    def structure(values):
+        made = definition.structure(values)
+        return replace(made, stiffness=1.001 * made.stiffness)
+
+    return replace(definition, structure=structure)
+
+
+@pytest.mark.parametrize("name", protocol_names())
+def test_other_physics_are_another_test_set(name):
+    protocol = load_protocol(protocol_names()[name])
+    model = protocol.model
+
+    def digest_with(**changes):
+        return digest_of(replace(protocol, model=replace(model, **changes)))
+
+    assert digest_with() == digest_of(protocol)
+    entries = model.parameters.entries
+    first, entry = next(iter(entries.items()))
+    value = np.multiply(entry.value, 1.0 + 1e-12).tolist()
+    changed = entries | {first: entry.model_copy(update={"value": value})}
+    values = replace(model.parameters, entries=changed)
+    found = [digest_with(parameters=values)]
+    for function in filter(model.kernels.__contains__, EQUATIONS):
+        kernel = model.equations.sources[function]
+        other = replace(kernel, listed=kernel.listed.replace("multiply", "add", 1))
+        equations = Derivation(model.equations.sources | {function: other})
+        found.append(digest_with(equations=equations))
+    if model.kind == "structural":
+        found.append(digest_with(definition=stiffer(model.definition)))
+    assert len({digest_of(protocol), *found}) == 1 + len(found)
 
 
 def read(path):

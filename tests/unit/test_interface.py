@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,12 +36,31 @@ def test_a_full_model_and_a_reduced_one_are_run_and_compared(car, pod):
     expected = np.sqrt(np.mean(difference**2)), abs(difference).max()
     of_yaw = errors.sel(output="yaw")
     np.testing.assert_allclose((of_yaw["rms_error"], of_yaw["max_error"]), expected, rtol=1e-6)
+    assert of_yaw["signal_range"] == np.ptp(full["yaw"])
     assert errors["output_unit"].values.tolist() == ["m", "rad"]
+    shares = vm.plot(run, full, kind="errors").axes[0].get_lines()[0]
+    expected = 100.0 * errors["rms_error"] / errors["signal_range"]
+    np.testing.assert_allclose(shares.get_xdata(), expected)
     figure = vm.plot(run, full)
     assert {line.get_label() for axis in figure.axes for line in axis.get_lines()} > {"full order"}
     some = pod.simulate(turn, times=full.times[::250])
     np.testing.assert_allclose(some["yaw"], run["yaw"][::250], rtol=1e-9)
     np.testing.assert_array_equal(some.times, full.times[::250])
+
+
+def of_another_model(run):
+    return replace(run, inputs=np.hstack([run.inputs, run.inputs]))
+
+
+def with_inputs(run, factor, shift=0.0):
+    """The run with other inputs, shifted by a part of the largest."""
+    return replace(run, inputs=factor * run.inputs + shift * np.abs(run.inputs).max())
+
+
+def test_inputs_that_differ_by_rounding_are_the_same(car):
+    run = car.simulate(vm.maneuver("lane_change"), solver="ros34pw2", tolerance=1e-3)
+    for full in (with_inputs(run, 1.0 + 1e-7), with_inputs(run, 1.0, 1e-10)):
+        assert vm.errors(run, full)["max_error"].max() == 0.0
 
 
 @pytest.mark.parametrize(
@@ -59,6 +79,9 @@ def test_a_full_model_and_a_reduced_one_are_run_and_compared(car, pod):
         (lambda run: vm.errors(run, run.chosen("yaw")), "longitudinal_position"),
         (lambda run: run.chosen(["yaw", "yaw"]), "twice"),
         (lambda run: vm.errors(run, run.model.simulate(vm.maneuver("straight_ahead"))), "inputs"),
+        (lambda run: vm.errors(run, of_another_model(run)), "models with other inputs"),
+        (lambda run: vm.errors(run, with_inputs(run, 1.0 + 1e-5)), "other inputs"),
+        (lambda run: vm.errors(run, with_inputs(run, 1.0, 1e-8)), "other inputs"),
         (lambda run: run.model.bare(["rhs"]), "rhs"),
     ],
 )

@@ -247,6 +247,7 @@ def test_processes_go_on_after_a_method_that_ends_its_own(tmp_path, capsys):
         ("summary=None", "summary is None"),
         ("summary='\\x1b[2Jgone'", r"summary is '\x1b[2Jgone'"),
         ("fit=3", "fit is not a function"),
+        ("learns_from='run'", "unknown learns_from of 'faulty' 'run'"),
     ],
 )
 def test_a_declaration_that_is_none_is_listed_with_what_is_wrong(faulty, change, words):

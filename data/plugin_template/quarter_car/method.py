@@ -10,6 +10,7 @@ from scipy.linalg import expm, schur
 
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.settings import Settings
+from vehiclemor.simulation.run_timer import clock
 
 
 class ModalSettings(Settings):
@@ -33,7 +34,7 @@ class Modal:
     def simulate(self, maneuver, start):
         """The run at the maneuver's output times, from a start's name or a full state."""
         (a, b, c), times, inputs = self.equations, maneuver.times, maneuver.at(maneuver.times)
-        began, step, n = process_time(), times[1], len(a)
+        began, step, n = clock(), times[1], len(a)
         # Exact where inputs are linear between the output times.
         held = np.kron([[0.0, step, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]], np.eye(n))
         held[:n, :n] = step * a
@@ -43,7 +44,7 @@ class Modal:
         z = [self.left @ (self.model.start(start) - self.centre)]
         for force in forces:
             z.append(free @ z[-1] + force)
-        states, seconds = self.centre + np.array(z) @ self.right.T, process_time() - began
+        states, seconds = self.centre + np.array(z) @ self.right.T, clock() - began
         # Outputs follow from the states; what the full model counts hasn't been called.
         return self.model.trajectory(times, inputs, states, [0] * len(self.model.counts), seconds)
 
@@ -54,14 +55,15 @@ class Modal:
 
 def fit(model, training, settings):
     """Reduce a model; `training` holds runs (times, inputs, states, outputs) to learn from."""
+    # CPU time of all threads; of runs, which studies take in one thread, `clock`.
     began, x, none = process_time(), model.start(), np.zeros(len(model.inputs))
-    a, rate = model.system.jacobian(x, none), model.rhs(x, none)
-    steps = 1e-6 * np.eye(len(none))
-    b = np.array([model.rhs(x, s) - model.rhs(x, -s) for s in steps]).T / 2e-6
+    a, b = model.jacobian(x, none), model.jacobian(x, none, "inputs")
+    rate = model.rhs(x, none)
     spaces = (schur(m, sort=lambda re, im: np.hypot(re, im) <= settings.fastest) for m in (a, a.T))
     right, left = (vectors[:, :kept] for _, vectors, kept in spaces)
     left = np.linalg.solve(left.T @ right, left.T)
-    cost = offline_cost(began, model, further=1 + 2 * (len(x) + len(none)))
+    # A column of a Jacobian costs about one evaluation.
+    cost = offline_cost(began, model, further=1 + len(x) + len(none))
     return Modal(model, x, left, right, (left @ a @ right, left @ b, left @ rate), cost, len(left))
 
 
@@ -71,4 +73,6 @@ METHOD = Method(
     # Kinds of models that it reduces.
     settings={"ode": ModalSettings},
     fit=fit,
+    # What `fit` reads of the training: "runs", their "inputs", or "nothing".
+    learns_from="nothing",
 )

@@ -111,17 +111,18 @@ def simulate(
     if animate:
         print(f"written: {vm.animate(dataset, out=animate)}")
     if out is None and picture is None and animate is None:
-        print("nothing is kept: --out FILE.nc keeps the result, --plot draws it")
+        print("nothing is saved: --out FILE.nc saves the result, --plot draws it")
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
 def _maneuver(name: str | None, csv: list[str] | None) -> str | vm.Signal | None:
     """A registered name, or the signal of a CSV file."""
     options = key_values("--csv", csv)
-    if Path(name or "").suffix.lower() == ".csv":
+    if name and Path(name).suffix.lower() == ".csv":
         words = inspect.signature(vm.Signal.from_csv).parameters.keys() - {"path"}
         columns = {key: str(options.pop(key)) for key in options.keys() - words}
-        return vm.Signal.from_csv(name, **{"inputs": columns} | options)
+        how: dict[str, Any] = {"inputs": columns, **options}
+        return vm.Signal.from_csv(name, **how)
     if options:
         raise InputError("--csv is for a log: --maneuver FILE.csv")
     return name

@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import quoted
+from vehiclemor.arguments import number, quoted, real_array
 from vehiclemor.exceptions import FileError, InputError, one_line
+from vehiclemor.registry import choice
 
 # What may stand between columns in the place of the separator that is expected.
 SEPARATORS = ",;\t| "
+# Units of logged inputs -> SI.
+UNITS = {"SI": 1.0, "deg": np.pi / 180.0, "mm": 1e-3}
 
 
 def csv_samples(
@@ -59,9 +62,12 @@ def csv_samples(
             raise InputError(f"{path}: there is no column {quoted(name)}: {known}")
         if table[name].dtype.kind not in "iuf":
             texts = table[name].astype(str).str.replace(decimal, ".", regex=False)
-            odd = texts[pd.to_numeric(texts, errors="coerce").isna()].iloc[0]
-            hint = ": is decimal=',' meant?" if "," in odd else ""
-            raise InputError(f"{path}: column {name!r} holds {quoted(odd)}, not a number{hint}")
+            numbers: Any = pd.to_numeric(texts, errors="coerce")
+            if numbers.isna().any():
+                odd = texts[numbers.isna()].iloc[0]
+                hint = ": is decimal=',' meant?" if "," in odd else ""
+                raise InputError(f"{path}: column {name!r} holds {quoted(odd)}, not a number{hint}")
+            table[name] = numbers
     values = np.column_stack([table[name] for name in columns.values()] or [np.empty(0)])
     return table[time].to_numpy(), values, [*columns]
 
@@ -77,9 +83,46 @@ def _check_separator(path: Path, separator: str, header: str, row: str) -> None:
         )
 
 
+def unit_factor(unit: str, ratio: float) -> float:
+    """Factor from a logged column to an input in SI units."""
+    if number("ratio", ratio) == 0.0:
+        raise InputError("ratio is 0; it divides the columns")
+    return UNITS[choice("unit", unit, UNITS)] / ratio
+
+
+def sample_arrays(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values as floats; `InputError` if they are none."""
+    try:
+        return real_array(t), real_array(u)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"samples of a signal: {one_line(error)}") from None
+
+
 def listed(inputs: Any) -> tuple[str, ...]:
     """Names, of which one may stand alone."""
     names = (inputs,) if isinstance(inputs, str) else inputs
     if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
         raise InputError(f"inputs is {quoted(inputs)}, not a list of names")
     return tuple(names)
+
+
+def column_names(inputs: Any, columns: int) -> tuple[str, ...]:
+    """Names of the columns, or none."""
+    names = listed(inputs)
+    if len(set(names)) < len(names) or len(names) not in (0, columns):
+        raise InputError(f"a signal of {columns} columns can't be named {quoted(names)}")
+    return names
+
+
+def integral_of(name: str) -> str:
+    """Name of the input whose derivative an input is by its own name, if it is one."""
+    base, dot, order = name.rpartition("_")
+    if order == "ddot":
+        return f"{base}_dot"
+    return base if dot and order == "dot" else ""
+
+
+def derivative_order(name: str, inputs: Sequence[str]) -> int:
+    """How often one of the inputs has been derived from the lowest of them."""
+    lower = integral_of(name)
+    return 1 + derivative_order(lower, inputs) if lower in inputs else 0

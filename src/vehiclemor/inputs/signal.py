@@ -10,10 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, line_of_text, number, quoted, real_array, within
+from vehiclemor.arguments import file_path, line_of_text, number, within
 from vehiclemor.codegen.loops import Loop, loops
-from vehiclemor.exceptions import InputError, blamed, one_line
-from vehiclemor.inputs.columns import csv_samples, listed
+from vehiclemor.exceptions import InputError, blamed
+from vehiclemor.inputs.columns import (
+    column_names,
+    csv_samples,
+    derivative_order,
+    integral_of,
+    listed,
+    sample_arrays,
+    unit_factor,
+)
 from vehiclemor.inputs.maneuver import (
     LONGEST_DURATION,
     MOST_SAMPLES,
@@ -30,8 +38,6 @@ HOLDS = {"linear": 1, "zero": 0, "cubic": 3}
 OUTPUT_STEP = 0.02
 # Time (s) between the samples that are taken of a function.
 FUNCTION_STEP = 0.01
-# Units of logged inputs -> SI.
-UNITS = {"SI": 1.0, "deg": np.pi / 180.0, "mm": 1e-3}
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +111,7 @@ class Signal(Maneuver):
         InputError
             If times don't increase, a value isn't finite, or shapes don't fit.
         """
-        times, values = _arrays(t, u)
+        times, values = sample_arrays(t, u)
         how: dict[str, Any] = {"inputs": inputs, "output_step": output_step, "name": name}
         return many_signals(times, values[None], hold, **how)[0]
 
@@ -117,7 +123,9 @@ class Signal(Maneuver):
             return self.pieces
         if "polynomials" not in self.kept:
             inputs = self.pieces.coefficients.shape[1]
-            orders = np.array([_order(name, self.inputs) for name in self.inputs] or [0] * inputs)
+            orders = np.array(
+                [derivative_order(name, self.inputs) for name in self.inputs] or [0] * inputs
+            )
             amplitudes = amplitude * frequency**orders
             self.kept["polynomials"] = self.pieces._replace(
                 edges=self.pieces.edges / frequency,
@@ -187,7 +195,7 @@ class Signal(Maneuver):
         """Polynomials (pieces, 6) of an input, at factors of 1."""
         pieces, order = self.pieces, 0
         while name not in self.inputs:
-            lower = _integral(name)
+            lower = integral_of(name)
             if not lower:
                 return np.zeros_like(pieces.coefficients[:, 0])
             name, order = lower, order + 1
@@ -258,9 +266,7 @@ class Signal(Maneuver):
             As of `from_samples`; the name is that of the file by default.
         """
         path = file_path("path", path)
-        if number("ratio", ratio) == 0.0:
-            raise InputError("ratio is 0; it divides the columns")
-        scale = UNITS[choice("unit", unit, UNITS)] / ratio
+        scale = unit_factor(unit, ratio)
         times, values, names = csv_samples(path, separator, decimal, time, inputs)
         name = name or path.name
         return cls.from_samples(
@@ -287,7 +293,7 @@ def many_signals(
         See `Signal.from_samples`.
     """
     choice("hold", hold, HOLDS)
-    times, values = _arrays(t, u)
+    times, values = sample_arrays(t, u)
     if times.ndim != 1 or values.ndim not in (2, 3) or values.shape[1] != len(times):
         raise InputError(
             f"samples of a signal: t has shape {times.shape} and u {values.shape[1:]} in a run, "
@@ -297,7 +303,7 @@ def many_signals(
         raise InputError(f"a signal needs two samples at least, not {len(times)}")
     within("number of samples", len(times), (2, MOST_SAMPLES))
     times, values = times - times[0], values.reshape(*values.shape[:2], -1)
-    names = _names(inputs, values.shape[2])
+    names = column_names(inputs, values.shape[2])
     if not line_of_text("name", name):
         raise InputError("name is empty")
     every = through(times, np.ascontiguousarray(values), hold)
@@ -311,41 +317,12 @@ def _unused(*_: Any) -> Any:
     raise NotImplementedError("a signal is evaluated by its polynomials, which have its corners")
 
 
-def _arrays(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
-    try:
-        return real_array(t), real_array(u)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"samples of a signal: {one_line(error)}") from None
-
-
-def _names(inputs: Any, columns: int) -> tuple[str, ...]:
-    """Names of the columns, or none."""
-    names = listed(inputs)
-    if len(set(names)) < len(names) or len(names) not in (0, columns):
-        raise InputError(f"a signal of {columns} columns can't be named {quoted(names)}")
-    return names
-
-
 def _output_samples(duration: float, step: Any) -> int:
     """Number of times about so many seconds apart."""
     if number("step", step) <= 0.0:
         raise InputError(f"step: {step:g} s is not positive")
     within("step", step, (duration / (MOST_SAMPLES - 1), LONGEST_DURATION), " s")
     return max(round(duration / step), 1) + 1
-
-
-def _integral(name: str) -> str:
-    """Name of the input whose derivative an input is by its own name, if it is one."""
-    base, dot, order = name.rpartition("_")
-    if order == "ddot":
-        return f"{base}_dot"
-    return base if dot and order == "dot" else ""
-
-
-def _order(name: str, inputs: Sequence[str]) -> int:
-    """How often one of the inputs has been derived from the lowest of them."""
-    lower = _integral(name)
-    return 1 + _order(lower, inputs) if lower in inputs else 0
 
 
 @cache

@@ -93,6 +93,14 @@ class FittedModel(Protocol):
         ...
 
 
+def lower_rank(settings: Mapping[str, Any], reduced: FittedModel) -> str:
+    """That a model has a lower rank than its settings ask for; empty if it has not."""
+    rank = settings.get("rank", 0)
+    if reduced.order >= rank:
+        return ""
+    return f"effective rank {reduced.order}, where {rank} is asked for: training has no more"
+
+
 def simulated(
     reduced: FittedModel, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None
 ) -> Trajectory:
@@ -190,6 +198,7 @@ class Method(ShortRepr):
             raise InputError(f"method {self.name!r}: packages are a tuple of names, not a text")
         for name in self.packages:
             line_of_text(f"method {self.name!r}: packages", name)
+        choice(f"learns_from of {self.name!r}", self.learns_from, ("runs", "inputs", "nothing"))
         for name in ("fit", "refusal", "check"):
             if not callable(getattr(self, name)):
                 raise InputError(f"method {self.name!r}: {name} is not a function")

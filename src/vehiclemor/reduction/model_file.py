@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -18,10 +18,12 @@ import numpy as np
 
 from vehiclemor.arguments import file_path, quoted
 from vehiclemor.exceptions import FileError, InputError, VehiclemorError, one_line
-from vehiclemor.netcdf_file import INTEGRITY, opened, write_dataset
+from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.netcdf_file import INTEGRITY, global_attributes, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.parts import Reader, Writer
+from vehiclemor.reduction.training import training_summary
 from vehiclemor.reduction.trust import BANDS, InputRange
 from vehiclemor.reduction.validation import checked_fit, checked_settings, validated
 from vehiclemor.registry import component
@@ -52,7 +54,9 @@ def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
 
     path = file_path("path", path)
     if path.is_dir() or (path.exists() and not overwrite):
-        raise InputError(f"{path} is there already; overwrite=True replaces a file")
+        raise InputError(f"{path} is there already; overwrite=True replaces a saved model")
+    if path.exists() and "saved_model" not in global_attributes(path):
+        raise InputError(f"{path} is no saved model: it is not replaced")
     model, state, writer = rom.model, rom.__getstate__(), Writer(rom.model)
     try:
         parts = {name: writer.part(state[name], name) for name in PARTS}
@@ -110,6 +114,14 @@ def read(path: Any) -> dict[str, Any]:
         raise _unfit(path, one_line(error)) from None
     except (SyntaxError, ValueError, VehiclemorError) as error:
         raise _unfit(path, " ".join(str(error).split())) from None
+
+
+def training_of(path: Path, inputs: Sequence[Quantity]) -> dict[str, str]:
+    """Method of a file and what it was trained on, without the model being built."""
+    stored, attrs = content(path)
+    method, runs = str(attrs["method"]), json.loads(stored["training"])
+    covered = training_summary(method, runs, stored["input_range.largest"], inputs)
+    return {"method": method} | covered
 
 
 def _parsed(text: str) -> Any:

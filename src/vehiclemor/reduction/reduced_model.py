@@ -15,9 +15,9 @@ from vehiclemor.arguments import number
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.reduction import model_file
-from vehiclemor.reduction.interface import FittedModel, Method, simulated
+from vehiclemor.reduction.interface import FittedModel, Method, lower_rank, simulated
 from vehiclemor.reduction.settings import Value
-from vehiclemor.reduction.training import own_speed
+from vehiclemor.reduction.training import own_speed, training_summary
 from vehiclemor.reduction.trust import InputRange
 from vehiclemor.reduction.validation import for_model, validated
 from vehiclemor.registry import choice, component
@@ -58,6 +58,21 @@ class ReducedOrderModel(ShortRepr):
     training: tuple[Any, ...]
     reduced: FittedModel
     input_range: InputRange | None = None
+
+    def __str__(self) -> str:
+        lines = [f"{self._name}, order {self.reduced.order}"]
+        if self._lower_rank:
+            lines.append(self._lower_rank)
+        if self.input_range is not None:
+            runs = self.__getstate__()["training"]
+            sizes, inputs = self.input_range.largest, self.model.definition.inputs
+            covered = training_summary(self.method, runs, sizes, inputs)
+            lines += [f"{name}: {text}" for name, text in covered.items()]
+        return "\n  ".join(lines)
+
+    @cached_property
+    def _lower_rank(self) -> str:
+        return lower_rank(self.settings, self.reduced)
 
     @cached_property
     def states(self) -> tuple[str, ...]:
@@ -114,6 +129,8 @@ class ReducedOrderModel(ShortRepr):
             run = simulated(self.reduced, chosen, begun, names)
         # A copy would take a twentieth of a short run.
         run.__dict__["method"] = self.method
+        if self._lower_rank:
+            run.__dict__["remark"] = "; ".join(filter(None, (run.remark, self._lower_rank)))
         if not run.trust and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
         return run if times is None else run.chosen(times=times)

@@ -1,6 +1,7 @@
 """Training runs: full-order simulations that a method may learn from."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -8,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.multibody.quantities import DROP
+from vehiclemor.multibody.quantities import DROP, Quantity
+from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -16,6 +18,16 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 HISTORIES = ("times", "inputs", "states", "coordinates", "speeds", "outputs", "counts")
 # Parameter with the speed (m/s) at which a vehicle starts.
 SPEED = "initial_speed"
+# An input that is no larger was zero in training.
+NOTHING = 1e-11
+# What is shown of training runs -> key of their contents.
+COVERED = {
+    "maneuvers": "maneuver",
+    "starts": "start",
+    "initial speed, m/s": "speed",
+    "frequency factor": "frequency",
+    "amplitude factor": "amplitude",
+}
 # Parameters that say how a run starts, not which model it is of.
 OF_STARTS = (SPEED, *DROP)
 
@@ -50,6 +62,41 @@ class TrainingRun(ShortRepr):
 
 
 Training = Sequence[TrainingRun]
+
+
+def training_summary(
+    method: str,
+    runs: Sequence[Mapping[str, Any]],
+    largest: np.ndarray,
+    inputs: Sequence[Quantity],
+) -> dict[str, str]:
+    """What the contents of training runs cover, and sizes of their inputs, see `InputRange`."""
+    if not runs or component("method", method).learns_from == "nothing":
+        return {"training runs": "none"}
+    values: dict[str, list[Any]] = {}
+    for run in runs:
+        for name, key in COVERED.items():
+            values.setdefault(name, []).append(run[key])
+        for name, value in run.get("parameters", ()):
+            values.setdefault(name, []).append(value)
+    covered = {name: _span(seen) for name, seen in values.items() if seen[0] is not None}
+    for quantity, (size, *quick) in zip(inputs, largest.T.tolist(), strict=True):
+        text = f"up to {size if size > NOTHING else 0.0:.3g} {quantity.unit}"
+        if quantity.unit == "rad":
+            text += f" ({math.degrees(size):.3g} deg)"
+        # Of structures they are shares of the bands.
+        if len(quick) == 2:
+            text += f"; above 2 Hz up to {quick[0]:.3g} {quantity.unit}"
+        covered[f"input {quantity.name}"] = text
+    return {"training runs": str(len(runs))} | covered
+
+
+def _span(values: list[Any]) -> str:
+    """Both ends of numbers; all of texts and tables."""
+    if not all(isinstance(value, float) for value in values):
+        return ", ".join(sorted(set(map(str, values))))
+    low, high = min(values), max(values)
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
 def own_speed(model: Model) -> float | None:

@@ -1,6 +1,7 @@
 """Comparisons: with the paper, on unseen inputs, of every model, of any study; and costs."""
 
 import math
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,7 @@ def compare(
         at `model_comparison` and `study_comparison` in `vehiclemor.report.comparison`.
     """
     folder, jobs = file_path("results", results), count("jobs", jobs)
+    what = os.fspath(what) if isinstance(what, os.PathLike) else what
     if seed is not None and (what == PAPER or what in names("model")):
         raise InputError(f"seed: comparison {what!r} samples no test runs of its own")
     if what == PAPER:
@@ -104,14 +106,11 @@ def stored_rows(results: Path) -> Iterator[Row]:
 
 
 def claim_criterion(claim: Claim) -> Criterion:
-    """The criterion of a claim; without one it is what was measured once, or nothing."""
+    """The criterion of a claim; without one nothing is measured."""
     if found := (CRITERIA | CLAIMS).get(claim.id):
         return found
-    finding, variant = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-"), ""
-    if old := claim.measured:
-        finding = Finding(old.value, old.bound, old.value <= old.bound, old.measure, old.seen)
-        variant = old.variant
-    return Criterion(lambda *_: finding, variants={"": variant}, of_replay=False)
+    finding = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-")
+    return Criterion(lambda *_: finding, variants={"": ""}, of_replay=False)
 
 
 def of_published_start(dataset: xr.Dataset) -> xr.Dataset:

@@ -1,5 +1,6 @@
 """What a name stands for: model, method, maneuver, study, or the schema of a file."""
 
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path
 from vehiclemor.reduction.interface import never_refused
+from vehiclemor.reduction.model_file import training_of
+from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build_derived
@@ -40,6 +43,7 @@ def description(
     name: str, parameters: Mapping[str, object] | None = None, parameter_file: Path | None = None
 ) -> Description:
     """What a name stands for; lists of dictionaries are the rows of tables."""
+    name = os.fspath(name) if isinstance(name, os.PathLike) else name
     if not isinstance(name, str):
         raise InputError(f"name is {quoted(name)}, not a text")
     if name in names("model"):
@@ -72,6 +76,9 @@ def _model(
         starts = [DESIGN_START]
     else:
         starts = [UNKNOWN] if definition.solved else list(definition.starts(parameters.values()))
+    shipped, file = {}, shipped_folder() / f"{name}.nc"
+    if file.exists():
+        shipped["reduced model that ships"] = training_of(file, definition.inputs)
     declared = zip(definition.parameters.items(), parameters.entries.values(), strict=True)
     return {
         "model": name,
@@ -81,6 +88,7 @@ def _model(
         "starts": starts,
         "methods": [method for method, answer in accepted.items() if answer == "yes"],
         f"methods that may fit ({UNKNOWN})": [m for m, a in accepted.items() if a == "?"],
+        **shipped,
         **{kind: _quantities(getattr(definition, kind)) for kind in QUANTITIES},
         "parameter file": str(path),
         "parameters": [

@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
+from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import write_text
@@ -75,9 +75,9 @@ def write_report(
         If a name is wrong, nothing is stored, or the file can't be written.
     """
     path, folder = file_path("out", out), file_path("results", results)
-    studies = [studies] if isinstance(studies, str) else studies
-    if not (isinstance(studies, Sequence) and all(isinstance(name, str) for name in studies)):
-        raise InputError(f"studies is {quoted(studies)}, not a list of names of studies")
+    if path.suffix not in (".html", ".htm"):
+        raise InputError(f"out: {path} does not end in .html")
+    studies = study_names("studies", studies)
     left_out: dict[str, str] = {}
     sections: list[Section] = []
     if studies:

@@ -40,27 +40,16 @@ class Number(Printed):
     note: Line | None = None
 
 
-class Measured(FileSchema):
-    """A number on a claim by a study that the package no longer has: met up to its bound."""
-
-    value: float
-    bound: float
-    variant: Line
-    measure: Line
-    seen: Line
-
-
 class Claim(Printed):
     """A printed statement in our words; without a model it is about all three.
 
     A `setup` says how something was made, a `result` what the paper says it saw, an `expectation`
-    what it explains without showing it; `measured` is of a claim that no criterion is for.
+    what it explains without showing it.
     """
 
     model: Model | None = None
     kind: Literal["setup", "result", "expectation"]
     statement: Line
-    measured: Measured | None = None
 
 
 class Published(FileSchema):

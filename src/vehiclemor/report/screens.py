@@ -298,7 +298,9 @@ def _protocol_parts(rows: Mapping[str, list[Row]], explain: bool) -> list[Part]:
         parts.append(Table(named, units, explain=explain))
     parts.append(Table(named, [*costs, "offline_seconds"], explain=explain))
     chosen = [row for row in named if row["role"] != FULL_ORDER and row["chosen_settings"]]
-    return [*parts, *[Table(chosen, ("label", "chosen_settings"))] * bool(chosen)]
+    if chosen:
+        parts.append(Table(chosen, ("label", "chosen_settings")))
+    return parts
 
 
 def _winner_parts(

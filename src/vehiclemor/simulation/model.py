@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import within
 from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
@@ -31,8 +30,6 @@ from vehiclemor.simulation.evaluation import (
 )
 from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Names, Start, Trajectory
 
-# A position of more metres would be rounded by more than a tenth of a millimetre.
-LARGEST_START = 1e12
 NEEDED_FOR = {
     "second_order": "equations of motion can't be projected in the coordinates, nor weighed by "
     "energy",
@@ -146,9 +143,7 @@ class Model(ShortRepr):
     def start(self, name: Start | None = None) -> np.ndarray:
         """State (n,) of an initial condition, the first by default, or a copy of the one given."""
         if not isinstance(name, str | None):
-            state = self._state(name, "start").copy()
-            within("largest number of a start", abs(state).max(), (0.0, LARGEST_START))
-            return state
+            return self._state(name, "start").copy()
         name = self.starts[0] if name is None else name
         if name not in self.initial:
             raise InputError(f"unknown start {name!r}; {self.name} has {', '.join(self.starts)}")

@@ -34,6 +34,8 @@ from vehiclemor.study.plans.study_runs import PARAMETER
 from vehiclemor.study.result import variables
 from vehiclemor.study.scenario import Scenario
 
+# What makes a model's equations, whatever its kind; the rest follows from it.
+EQUATIONS = ("constants", "residual", "derivative", "port_forces", "outputs")
 NOTE = "Train on training, choose settings by validation; never train or tune on test."
 
 
@@ -69,11 +71,28 @@ def dataset(model: str | Path, out: str | Path | None = None) -> Path:
 
 
 def digest_of(protocol: Protocol) -> str:
-    """Identity of a test set: its model, parameters, bounds and runs."""
+    """Identity of a test set: equations, values of all parameters, bounds and runs.
+
+    It is made of texts that all machines have alike.  Matrices of a structure, which they round
+    differently, count by six digits of weighted sums.
+    """
+    model = protocol.model
     runs = sampled_sets(protocol).get("drawn") or protocol.sets["test"]
-    same = protocol.definition.model_dump_json(include={"model", "parameters", "bounds"})
-    text = "\n".join([same, *(run.label for run in runs)])
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    texts = [protocol.definition.model_dump_json(include={"model", "bounds"})]
+    texts.append(of_run.parameters_of(model).text)
+    texts += [repr(model.kernels.sources[name]) for name in EQUATIONS if name in model.kernels]
+    if isinstance(model, StructuralModel):
+        structure = model.system.structure
+        matrices = structure.mass, structure.stiffness, structure.dampers, structure.ports
+        texts += [_weighted_sum(matrix) for matrix in (*matrices, *structure.outputs)]
+    texts += [run.label for run in runs]
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
+
+
+def _weighted_sum(matrix: Any) -> str:
+    """Sum of the magnitudes of all entries, each times its row and column number."""
+    rows, columns = (np.arange(1.0, size + 1.0) for size in matrix.shape)
+    return f"{rows @ (abs(matrix) @ columns):.5e}"
 
 
 def _write(protocol: Protocol, folder: Path) -> None:

@@ -14,7 +14,7 @@ from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, bla
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
-from vehiclemor.reduction.interface import FitOther, FittedModel, Method
+from vehiclemor.reduction.interface import FitOther, FittedModel, Method, lower_rank
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.trust import InputRange, input_range
 from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
@@ -254,6 +254,8 @@ def _tested(
     run = checked_run(own, scenario.maneuver, start, reduced)
     if run.finished and not np.isfinite(run.outputs).all():
         run = replace(run, status="diverged", message="an output is not finite")
+    if remark := lower_rank(experiment.settings, reduced):
+        run = replace(run, remark="; ".join(filter(None, (run.remark, remark))))
     judged = run
     method: Method = component("method", experiment.method)
     trained = partial(known_inputs, model, experiment.training, method.follows_time)

@@ -23,11 +23,20 @@ import numpy as np
 import xarray as xr
 
 from vehiclemor.exceptions import CorruptError, FileError, MachineError, machine_reason
-from vehiclemor.files import make_folder, not_written, probe_folder, remove_leftovers, write_whole
+from vehiclemor.files import (
+    make_folder,
+    not_written,
+    probe_folder,
+    read_regular,
+    remove_leftovers,
+    write_whole,
+)
 from vehiclemor.netcdf_file import global_attributes, read_dataset, write_dataset
 from vehiclemor.short_repr import shortened
 
 QUARANTINE = "quarantine"
+# Bytes of a run's file: more than any history has.
+MOST_BYTES = 1 << 30
 ENDING, SCHEMA = ".safetensors", "vehiclemor run 4"
 # Bytes that say how long the header is; and where the hash stands, for which there are zeros while
 # it is computed.
@@ -143,7 +152,7 @@ def read_run(folder: Path, key: str) -> StoredRun:
     """Stored result; `FileError` if it is missing, `CorruptError` if not what was written."""
     path = run_path(folder, key)
     try:
-        return decoded(path.read_bytes(), key)
+        return decoded(read_regular(path, MOST_BYTES), key)
     except CorruptError as error:
         raise CorruptError(error.reason, path, "; run again") from None
     except IsADirectoryError:

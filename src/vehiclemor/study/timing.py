@@ -1,11 +1,13 @@
 """The timing pass: runs interleaved in one process, medians of rounds, stored by content.
 
 What counts is a whole call of `simulate` with an input that was just made, all states and outputs
-delivered, timed from outside: whatever is worked out about an input is part of its call.  The same
-call repeated, and what a model tells of its own loop, are recorded beside it and decide nothing.
-Between two runs of a comparison other work throws code and data out of the processor's caches, so
-a call that is not timed comes first.  Seconds stored with the results of a study are measured
-while others run beside them; a speed-up is quoted from this pass only.
+delivered, timed from outside: whatever a model works out about an input is part of its call. Inputs
+arrive as signals, piecewise polynomials: making these of a formula takes milliseconds of Python,
+once, for reduced models and full order alike. The same call repeated, and what a model tells of its
+own loop, are recorded beside it and decide nothing. Between two runs of a comparison other work
+throws code and data out of the processor's caches, so a call that is not timed comes first. Seconds
+stored with the results of a study are measured while others run beside them; a speed-up is quoted
+from this pass only.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,6 +27,7 @@ import xarray as xr
 from vehiclemor.codegen.cache import compiler_identity
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.polynomials import signal_of
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.progress import tell
 from vehiclemor.provenance import attributes, machine
@@ -158,7 +161,7 @@ def _rounds(
     """
     model = model_of(experiments[0])
     scenarios = experiments[0].test
-    tests = [(scenario.maneuver, start_of(model, scenario)) for scenario in scenarios]
+    tests = [(as_signal(model, s.maneuver), start_of(model, s)) for s in scenarios]
     shape = (len(experiments), len(tests))
     wanted = np.ones(shape, dtype=bool) if finished is None else finished.copy()
     # Each has a name of its own, so that progress never goes back.
@@ -199,10 +202,20 @@ class Seconds(NamedTuple):
     loop: float
 
 
+def as_signal(model: Model, maneuver: Maneuver) -> Maneuver:
+    """A maneuver as the signal of its polynomials; a structure's, which takes samples, as it is."""
+    if isinstance(maneuver, Signal) or model.kind == "structural":
+        return maneuver
+    pieces: Any = signal_of(maneuver).bundle
+    values = {f.name: getattr(maneuver, f.name) for f in fields(Maneuver)}
+    values |= {"frequency_factor": 1.0, "amplitude_factor": 1.0}
+    return Signal(**values, hold="polynomials", pieces=pieces)
+
+
 def as_new(maneuver: Maneuver) -> Maneuver:
     """A maneuver as a user has just made it: nothing is known of its inputs from earlier calls."""
     if isinstance(maneuver, Signal):
-        return replace(maneuver, kept={})
+        return replace(maneuver, pieces=maneuver.pieces._replace(), kept={})
     # What is worked out about inputs is looked up by their function.
     return replace(maneuver, signal=partial(maneuver.signal))
 

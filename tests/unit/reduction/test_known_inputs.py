@@ -157,6 +157,15 @@ def test_pod_tells_when_it_leaves_its_training_run():
     assert 0.0 < run.trust.until < 1.0
 
 
+def test_a_lower_rank_than_asked_for_is_told():
+    told = "effective rank 4, where 8 is asked for: training has no more"
+    pod = vm.reduce("double_wishbone", "pod", rank=8, training="nominal")
+    assert told in str(pod)
+    assert pod.simulate().remark == told
+    assert vm.simulate("double_wishbone", "pod", rank=8)["remark"].item() == told
+    assert vm.simulate("double_wishbone", "pod", rank=4)["remark"].item() == ""
+
+
 def test_a_remark_of_trust_is_a_sentence():
     run = vm.simulate("double_wishbone", "pod", training="nominal", frequency=1.2)
     remark = run["remark"].item()

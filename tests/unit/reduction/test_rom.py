@@ -110,13 +110,16 @@ def test_a_loop_may_go_on_for_ever(linear):
     assert state[linear.states.index("X")] == pytest.approx(MOST_CALLS // 3 * 20e-3, rel=1e-6)
 
 
-def test_methods_that_do_not_judge_themselves_know_their_inputs(linear):
-    x, largest = linear.state(), 0.0300768 * 1.2990381
-    assert linear.trust(x, [0.9 * largest]).indicator == pytest.approx(0.9, rel=1e-3)
-    assert linear.trust(x, [0.9 * largest]).reason == ""
-    assert "input delta" in linear.trust(x, [1.1 * largest]).reason
-    run = linear.simulate(component("maneuver", "lane_change").perturbed(1.0, 1.3))
+def test_methods_that_do_not_judge_themselves_know_the_inputs_that_they_read(full, linear):
+    wider = component("maneuver", "lane_change").perturbed(1.0, 1.3)
+    basis = vm.reduce(full.model, "fixed_basis", training="lane_change")
+    assert basis.simulate("lane_change").status == "ok"
+    run = basis.simulate(wider)
     assert run.status == "untrusted"
+    assert "input delta" in run.message
+    # What reads no training knows no range.
+    assert linear.simulate(wider).status == "ok"
+    assert linear.trust(linear.state(), [0.1]).reason == ""
 
 
 def test_nothing_is_trusted_where_the_full_model_means_nothing(full):

@@ -44,10 +44,11 @@ class ReplayModel(ShortRepr):
         return 0
 
     @cached_property
-    def _ranges(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ranges over all training runs: of the inputs (inputs,), of the conditions (k,)."""
+    def _ranges(self) -> np.ndarray:
+        """Range of each input and condition over all training runs; infinite where it is zero."""
         inputs = np.vstack([run.inputs for run in self.recorded])
-        return np.ptp(inputs, axis=0), np.ptp(self.conditions, axis=0)
+        ranges = np.append(np.ptp(inputs, axis=0), np.ptp(self.conditions, axis=0))
+        return np.where(ranges > 0.0, ranges, np.inf)
 
     def for_model(self, model: Model) -> "ReplayModel":
         """The same runs, asked for with the online parameters of another model."""
@@ -56,9 +57,9 @@ class ReplayModel(ShortRepr):
     def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
         """The nearest training run: each of them is given back exactly.
 
-        The distance is the mean square difference of the inputs plus that of the conditions.  Each
-        quantity is divided by its range over the training runs, so units do not matter.  One that
-        is the same in all of them is left out.
+        The distance adds squares: of the RMS difference of each input, and of the difference of
+        each condition.  Each is divided by the range of its quantity over the training runs, so
+        units do not matter, and what is the same in all of them does not count.
 
         Runs of the maneuver's own output times come first.  If there are none, inputs are compared
         over the time that a run and the maneuver share, and the run is read at the maneuver's
@@ -91,11 +92,12 @@ class ReplayModel(ShortRepr):
         self, times: np.ndarray, inputs: np.ndarray, conditions: np.ndarray, number: int
     ) -> float:
         """Distance of a training run, over the time that both cover."""
-        run, (of_inputs, of_conditions) = self.recorded[number], self._ranges
+        run = self.recorded[number]
         shared = times <= run.times[-1]
         difference = _resampled(run.times, run.inputs, times[shared]) - inputs[shared]
-        apart = _mean_square(self.conditions[number] - conditions, of_conditions)
-        return _mean_square(difference, of_inputs) + apart
+        of_inputs = np.sqrt(np.mean(difference**2, axis=0))
+        apart = np.append(of_inputs, self.conditions[number] - conditions)
+        return float(np.linalg.norm(apart / self._ranges))
 
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""
@@ -107,12 +109,6 @@ def _conditions(model: Model, start: Start) -> np.ndarray:
     values = model.parameters.values()
     online = [np.ravel(values[name]) for name in model.definition.online]
     return np.concatenate([model.start(start), *online])
-
-
-def _mean_square(differences: np.ndarray, ranges: np.ndarray) -> float:
-    """Mean square of differences (..., k) over ranges (k,) that are not zero."""
-    varied = ranges > 0.0
-    return float(np.mean((differences[..., varied] / ranges[varied]) ** 2)) if varied.any() else 0.0
 
 
 def _resampled(before: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:

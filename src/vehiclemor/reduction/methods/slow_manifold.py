@@ -26,6 +26,7 @@ from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.fitting import (
+    YAW_BOUND,
     after_transient,
     forward_selection,
     improved,
@@ -74,6 +75,12 @@ class SlowManifoldSettings(OnlineSettings):
     steps: int = Field(
         8, ge=0, description="Gauss-Newton steps on whole training runs, once and again"
     )
+    heading_error: float = Field(
+        YAW_BOUND,
+        gt=0.0,
+        description="error of heading in rad that the steps weigh like 0.03 m of place; by "
+        "default the paper's bound on yaw, which also judges",
+    )
     trusted: float = Field(
         1.0,
         gt=0.0,
@@ -106,7 +113,7 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     if dropped:
         reduced = with_transients(reduced, modes, runs)
     if settings.steps:
-        targets = targets_of(reduced, training, runs)
+        targets = targets_of(reduced, training, runs, settings.heading_error)
         (odd, lateral), (even, symmetric) = reduced.features.groups
         # What heave and pitch do in straight running is exact, and speed is constant there.
         even = even[2 + made.symmetric :]

@@ -36,8 +36,10 @@ from vehiclemor.simulation.trajectory import Trajectory
 
 # Columns of which less than this share is left are sums of those chosen before.
 DEPENDENT = 1e-8
-# Errors that count the same: heading in rad, place in m, part of a slow coordinate's range.
-HEADING, PLACE, PART = 7.6e-5, 0.03, 0.02
+# The paper's bound on the RMS error of yaw in rad (section 3.1, 7.59e-5).
+YAW_BOUND = 7.6e-5
+# Errors that count as much as one of heading: place in m, part of a slow coordinate's range.
+PLACE, PART = 0.03, 0.02
 # The variational equations step over so many output times, runs are compared at every so many of
 # their steps.
 STRIDE, COMPARED = 2, 4
@@ -124,7 +126,8 @@ def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more:
 class Target:
     """One training run in reduced states (samples, states + 3), as a reduced run should be.
 
-    `steps` are indices of the output times that the variational equations step on.
+    `steps` are indices of the output times that the variational equations step on, `scale` are
+    weights (states + 3,) of errors.
     """
 
     run: TrainingRun
@@ -132,6 +135,7 @@ class Target:
     inputs: np.ndarray
     states: np.ndarray
     steps: np.ndarray
+    scale: np.ndarray
 
     @cached_property
     def compared(self) -> np.ndarray:
@@ -146,19 +150,26 @@ class Target:
 
 
 def targets_of(
-    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory]
+    reduced: ReducedVehicle,
+    training: Training,
+    runs: Sequence[Trajectory],
+    heading: float = YAW_BOUND,
 ) -> list[Target]:
-    """Training runs in reduced states."""
+    """Training runs in reduced states; `heading` is the error in rad that counts as `PLACE`."""
     k, result = reduced.features.states - 1, []
-    for run, true in zip(training, runs, strict=True):
-        states = reduced.encoded_path(true.states, true.inputs)
+    paths = [reduced.encoded_path(true.states, true.inputs) for true in runs]
+    ranges = np.max([np.abs(states[:, :k]).max(axis=0) for states in paths], axis=0)
+    # The speed counts by the place.
+    weights = np.array([0.0, 1.0 / heading, 1.0 / PLACE, 1.0 / PLACE])
+    scale = np.concatenate([1.0 / (PART * ranges), weights])
+    for run, true, states in zip(training, runs, paths, strict=True):
         z = states[:, : k + 1]
         moved = np.abs(z[:, :k] - z[-1, :k]).max(axis=1)
         restless = np.flatnonzero(moved > REST * moved.max())
         last = len(z) - 1
         rest = int(restless[-1]) if len(restless) else 0
         steps = [*range(0, rest, STRIDE), *range(rest, last, LONG_STRIDE), last]
-        result.append(Target(run, true.times, true.inputs, states, np.array(steps)))
+        result.append(Target(run, true.times, true.inputs, states, np.array(steps), scale))
     return result
 
 
@@ -202,26 +213,18 @@ def _compared(
 ) -> tuple[list[np.ndarray], float]:
     """Reduced runs, and the sum of powers of their errors; infinite if one has failed."""
     paths, total = [], 0.0
-    scale = _scale(targets)
     for target in targets:
         path = reduced.path(target.run.maneuver, target.run.start)
         if path is None:
             return [], np.inf
         paths.append(path)
-        total += float(np.sum(_errors(target, path, scale) ** 2) ** (0.5 * power))
+        total += float(np.sum(_errors(target, path) ** 2) ** (0.5 * power))
     return paths, total
 
 
-def _scale(targets: Sequence[Target]) -> np.ndarray:
-    """Weights (states + 3,) of errors; the speed counts by the place."""
-    slow = targets[0].states.shape[1] - PLANAR - 1
-    ranges = np.max([np.abs(target.states[:, :slow]).max(axis=0) for target in targets], axis=0)
-    return np.concatenate([1.0 / (PART * ranges), [0.0, 1.0 / HEADING, 1.0 / PLACE, 1.0 / PLACE]])
-
-
-def _errors(target: Target, path: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def _errors(target: Target, path: np.ndarray) -> np.ndarray:
     """Weighted errors (compared times, states + 3) of a reduced run."""
-    return (path - target.states)[target.compared] * scale * target.shares[:, None]
+    return (path - target.states)[target.compared] * target.scale * target.shares[:, None]
 
 
 def normal_equations(
@@ -232,13 +235,12 @@ def normal_equations(
     power: float = 2.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix and gradient of the sum of squares by the free coefficients."""
-    scale = _scale(targets)
     size = sum(len(terms) for terms, _ in free)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     for target, path in zip(targets, paths, strict=True):
-        rows = _sensitivities(reduced, target, path, free, target.shares[:, None] * scale)
+        rows = _sensitivities(reduced, target, path, free, target.shares[:, None] * target.scale)
         rows = rows.reshape(-1, size)
-        error = _errors(target, path, scale).ravel()
+        error = _errors(target, path).ravel()
         weight = max(error @ error, NOTHING) ** (0.5 * power - 1.0)
         normal += weight * (rows.T @ rows)
         gradient += weight * (rows.T @ error)

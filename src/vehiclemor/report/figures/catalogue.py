@@ -8,7 +8,7 @@ from typing import NamedTuple
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vehiclemor.arguments import MOST_JOBS, count, file_path, quoted
+from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
 from vehiclemor.exceptions import InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder
@@ -115,9 +115,7 @@ def figures(
     """
     folder = file_path("results", results)
     target = folder / "figures" if out is None else file_path("out", out)
-    only = [only] if isinstance(only, str) else only
-    if not (isinstance(only, Sequence) and all(isinstance(name, str) for name in only)):
-        raise InputError(f"only is {quoted(only)}, not a list of names of figures")
+    only = study_names("only", only)
     # What is wrong is named before anything is computed.
     theme.styled(style, dpi)
     jobs = count("jobs", jobs, most=MOST_JOBS)

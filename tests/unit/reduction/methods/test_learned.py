@@ -143,6 +143,10 @@ def test_interpolation_with_all_rows_is_the_projection_itself(car):
     np.testing.assert_allclose(few.state("dropped"), plain.state("dropped"), atol=1e-9)
     test = few.reduced.spaces.test_basis[0]
     assert (np.abs(test).max(axis=0) > 0.0).sum() == 8
+    # The basis, then the training run at its output times, and a rate at each of these.
+    recorded = car.simulate(lane_change)
+    more = recorded.counts["rhs_calls"] + len(recorded.times)
+    assert few.reduced.offline.evaluations == plain.reduced.offline.evaluations + more
     trial = few.reduced.spaces.trial_basis[0]
     np.testing.assert_allclose(test @ trial.T, np.eye(4), atol=1e-9)
 

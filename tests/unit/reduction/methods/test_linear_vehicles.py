@@ -1,5 +1,6 @@
 """Linear methods for vehicles: right where the vehicle is linear, and no better than promised."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -113,7 +114,7 @@ def test_static_correction_keeps_steady_cornering(shape):
 )
 def test_without_steering_the_car_drives_straight_at_its_own_speed(shape, method, settings):
     model = vm.model(shape.model.name)
-    maneuver = VEHICLES[model.name][1]
+    maneuver, still = VEHICLES[model.name][1], np.zeros(len(model.inputs))
     start = vm.model(model.name, {"initial_speed": 22.0}).start(model.starts[0])
     reduced = fitted(model, maneuver, method, **settings)
     trajectory = reduced.simulate(maneuver, start)
@@ -121,6 +122,12 @@ def test_without_steering_the_car_drives_straight_at_its_own_speed(shape, method
     assert np.abs(outputs["lateral_position"]).max() < 1e-8
     assert outputs["longitudinal_position"][-1] == pytest.approx(22.0 * trajectory.times[-1])
     assert reduced.spectral_abscissa == 0.0
+    # Backwards in time it grows as fast as its fastest motion fades.
+    straight = reduced.begin(model.starts[0], still)
+    rates = reduced.sensitivities(straight, still, 0.0, "state", "rhs")
+    backwards = replace(reduced, coefficients=-reduced.coefficients)
+    fastest = np.linalg.eigvals(rates).real.min()
+    assert backwards.spectral_abscissa == pytest.approx(-fastest, rel=1e-5)
     assert reduced.offline.evaluations == 2 * (len(shape.kept) + len(model.inputs))
 
 

@@ -17,6 +17,7 @@ from vehiclemor.reduction.vehicle.linear_modes import slow_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.reduction.vehicle.slow_features import SlowFeatures, add_fiala
 from vehiclemor.simulation.build import build
+from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.scenario import Scenario, start_of, training_run
 
 LANE_CHANGES = {
@@ -236,6 +237,17 @@ def test_sensitivities_are_the_differences_of_runs(vehicle):
         wrong = np.abs(found[:, :, place] - difference).max(axis=0)
         # The variational equations are solved with the output times as steps.
         assert np.all(wrong <= 0.05 * size + 1e-8)
+
+
+def test_the_fit_weighs_heading_by_the_bound_of_the_paper_unless_it_has_another(vehicle):
+    bounds = load_protocol("predictive-independent_suspension_vehicle").definition.bounds
+    settings = validated(slow_manifold.METHOD, vehicle.kind, {})
+    assert settings.heading_error == pytest.approx(bounds["yaw"].bound, rel=0.01)
+    usual, loose = (
+        fitted(vehicle, dropped=False, steps=1, **given).coefficients
+        for given in ({}, {"heading_error": 1e-3})
+    )
+    assert not np.array_equal(usual, loose)
 
 
 def test_gauss_newton_steps_bring_reduced_runs_nearer_to_the_training_runs(vehicle):
