@@ -153,10 +153,11 @@ def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
     code = MachineCode(fetched(f"kernels/{kernel.name}-{digest_of(parts)}.o", make))
     address = code.address(kernel.name)
     pointers = [ctypes.c_void_p] * len(kernel.arguments)
-    return address, ctypes.CFUNCTYPE(None, *pointers)(address), code
+    # It keeps the lock of the interpreter, which takes longer to get back than one call lasts.
+    return address, ctypes.PYFUNCTYPE(None, *pointers)(address), code
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Derivation(ShortRepr):
     """What is left of a program: kernels by name; `constants` gives those of the parameters."""
 

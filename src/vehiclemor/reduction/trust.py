@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import extent_of, first_beyond
+from vehiclemor.inputs.polynomials import extent_of, first_beyond, recorded_inputs
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.sizes import shaped
@@ -145,7 +145,8 @@ class InputRange:
         """How far a run with an initial speed in m/s goes in the range."""
         maneuver = maneuver.for_inputs(model.inputs)
         if model.kind == "ae":
-            ranges = self._samples(model.inputs, maneuver.at(maneuver.times), maneuver.times)
+            times, inputs = recorded_inputs(maneuver)
+            ranges = self._samples(model.inputs, inputs, times)
         else:
             of_inputs = self._bands if model.kind == "structural" else self._extents
             ranges = of_inputs(model.inputs, maneuver)
@@ -179,9 +180,10 @@ class InputRange:
     def _unlike(self, maneuver: Maneuver) -> tuple[float, float]:
         """How far inputs are from those of the nearest training run, and since when (s)."""
         assert self.histories is not None
-        times = maneuver.times[maneuver.times <= self.longest]
+        times, inputs = recorded_inputs(maneuver)
+        count = int(np.searchsorted(times, self.longest, side="right"))
+        times, inputs, off = times[:count], inputs[:count], []
         known = np.linspace(0.0, self.longest / EDGE, self.histories.shape[1])
-        inputs, off = maneuver.at(times), []
         for history in self.histories:
             then = [np.interp(times, known, column) for column in history.T]
             off.append(np.abs((inputs - np.transpose(then)) / self._sizes[0]).max(axis=1) / CLOSE)

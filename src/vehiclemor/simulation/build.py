@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import real_array
 from vehiclemor.codegen.kernels import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
-from vehiclemor.exceptions import GeometryError, InputError, blamed
+from vehiclemor.exceptions import GeometryError, InputError, VehiclemorError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.parameters import ParameterSet, load_parameters, overridden, parameter_path
 from vehiclemor.progress import first_use
@@ -24,10 +24,14 @@ from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
 if TYPE_CHECKING:
     from vehiclemor.simulation.algebraic import AlgebraicModel
+    from vehiclemor.simulation.dynamic import DynamicModel
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.structures.model import StructuralModel
     from vehiclemor.symbolic.program import Program
 
+# Integrators freeze the Jacobian of the model of rounded parameters, which many cars share.  They
+# are rounded to the model's own ones and steps of this part of them; points to steps of so many m.
+ROUNDED, ROUNDED_POINT, SMALLEST = 0.25, 0.02, 1e-9
 # Largest gap (m or rad) between the joints of a mechanism that counts as assembled.
 CLOSED = 1e-9
 # Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
@@ -64,6 +68,7 @@ def _made(
     """A model of equations that may have been derived already, see `compiled`."""
     name, flat = definition.name, parameters.flat()
     make, loops = _kind(definition.kind)
+    near: list[DynamicModel | None] = []
     values, initial = values_of(definition, flat), {DESIGN_START: np.zeros(0)}
     with blamed(f"model {name!r}: check", definition.check):
         definition.check(values)
@@ -78,9 +83,10 @@ def _made(
     if definition.kind in ("ode", "dae"):
         with blamed(f"model {name!r}: starts", definition.starts):
             initial = {start: real_array(x) for start, x in definition.starts(values).items()}
+        near = [_near(definition, flat, equations, digest)]
     _check_states(definition, initial)
     constants = hoisted_constants(equations, flat, solved)
-    return make(definition, equations, parameters, digest, constants, initial)
+    return make(definition, equations, parameters, digest, constants, initial, *near)
 
 
 def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:
@@ -97,6 +103,35 @@ def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:
     from vehiclemor.simulation.dynamic import DynamicModel
 
     return DynamicModel, LOOP_SOURCES
+
+
+def _near(definition: ModelDefinition, flat: np.ndarray, *derived: Any) -> DynamicModel | None:
+    """The model of rounded parameters; none if these are round, or there is no such model."""
+    try:
+        usual, steps = _usual_parameters(definition)
+        rounded = usual + steps * np.rint((flat - usual) / steps)
+        if np.array_equal(rounded, flat):
+            return None
+        return _rounded_model(definition, rounded.tobytes(), *derived)
+    except VehiclemorError:
+        return None
+
+
+@lru_cache(maxsize=64)
+def _usual_parameters(definition: ModelDefinition) -> tuple[np.ndarray, np.ndarray]:
+    """Components of the model's own parameters, and the steps to which others are rounded."""
+    declared = definition.parameters
+    usual = load_parameters(definition.name, declared, definition.parameter_file).flat()
+    points = np.repeat([d.size > 1 for d in declared.values()], [d.size for d in declared.values()])
+    steps = np.where(points, ROUNDED_POINT, np.maximum(ROUNDED * np.abs(usual), SMALLEST))
+    return usual, steps
+
+
+@lru_cache(maxsize=8)
+def _rounded_model(definition: ModelDefinition, rounded: bytes, *derived: Any) -> Any:
+    overrides = values_of(definition, np.frombuffer(rounded))
+    name, declared, path = definition.name, definition.parameters, definition.parameter_file
+    return _made(definition, load_parameters(name, declared, path, overrides), derived)
 
 
 def _assembled(*fields: Any) -> AlgebraicModel:

@@ -20,11 +20,11 @@ STEP, SMALLEST = 1e-4, 1e-2
 
 def values_of(definition: ModelDefinition, flat: np.ndarray) -> dict[str, Any]:
     """Values by name of all components in declared order: floats, and arrays of several."""
-    values, place = {}, 0
+    values, numbers, place = {}, flat.tolist(), 0
     for name, declared in definition.parameters.items():
-        part = flat[place : place + declared.size]
-        values[name] = part.copy() if declared.size > 1 else float(part[0])
-        place += declared.size
+        end = place + declared.size
+        values[name] = flat[place:end].copy() if declared.size > 1 else numbers[place]
+        place = end
     return values
 
 

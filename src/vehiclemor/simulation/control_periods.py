@@ -71,7 +71,7 @@ def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float
 
     Break points are ends of the smooth segments of the inputs, from 0 to the end of the maneuver.
     """
-    cuts = np.unique(np.concatenate([breaks, edges, [begin, end]]))
+    cuts = np.sort(np.concatenate([breaks, edges, [begin, end]]))
     cuts = cuts[(cuts >= begin) & (cuts <= end)]
     # Times that differ by rounding are one.
     cuts = cuts[np.concatenate([[True], np.diff(cuts) > 1e-9 * max(end, 1.0)])]
@@ -79,9 +79,11 @@ def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float
     cuts = np.array([begin, end]) if len(cuts) == 1 else cuts
     cuts[-1] = end
     middles = (cuts[1:] + cuts[:-1]) / 2.0
-    segments = np.clip(np.searchsorted(breaks, middles) - 1, 0, len(breaks) - 2)
-    windows = np.clip(np.searchsorted(edges, middles) - 1, 0, len(edges) - 2)
-    return Spans(cuts, segments.astype(np.int64), windows.astype(np.int64))
+    segments, windows = (
+        np.minimum(np.searchsorted(known, middles, side="right") - 1, len(known) - 2)
+        for known in (breaks, edges)
+    )
+    return Spans(cuts, segments, windows)
 
 
 @lru_cache(maxsize=64)

@@ -51,7 +51,12 @@ def reference_solver(maneuver: Maneuver) -> tuple[str, float]:
 
 @dataclass(frozen=True, eq=False)
 class DynamicModel(Model):
-    """Compiled first-order equations dx/dt = f(x, u), x = (coordinates, speeds)."""
+    """Compiled first-order equations dx/dt = f(x, u), x = (coordinates, speeds).
+
+    Near is a model of similar parameters, whose operators and workspaces serve this one too.
+    """
+
+    near: DynamicModel | None = None
 
     def _numbers(self, states: Iterable[str]) -> np.ndarray:
         """Places of some states among all."""
@@ -89,6 +94,8 @@ class DynamicModel(Model):
     @cached_property
     def system(self) -> System:
         """The model as the compiled loops take it; its Jacobian freezes at straight running."""
+        if self.near is not None:
+            return self.near.system.with_constants(self.constants)
         return System(
             self.kernels,
             self.constants,
@@ -284,4 +291,4 @@ class DynamicModel(Model):
 
     @cached_property
     def _recorder(self) -> Recorder:
-        return Recorder(self)
+        return Recorder(self) if self.near is None else self.near._recorder.of(self)

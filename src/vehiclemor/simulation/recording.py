@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Ready, address_of_array, ready
+from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import limits_of
@@ -22,9 +23,20 @@ class Recorder:
     """Makes outputs of runs of a model; watches those that are `limited`, and loads behind them."""
 
     def __init__(self, model: Model) -> None:
-        self.model = model
+        self.model, self._constants = model, model.constants.ctypes.data
         self.limited, self._watched, self._ranges = limits_of(model.definition)
         self._packed: dict[tuple[tuple[str, ...], int], tuple[Ready, int]] = {}
+
+    def of(self, model: Model) -> Recorder:
+        """The recorder of a model with other constants."""
+        other = copy(self)
+        other.model, other._constants = model, model.constants.ctypes.data
+        return other
+
+    def _run(self, call: Prepared) -> None:
+        """Run a loop over outputs with the constants of this model."""
+        call.words[call.address("outputs.constants")] = self._constants
+        call()
 
     def first_outside(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> list[int]:
         """The first sample at which each watched output is out of its limits; else all samples.
@@ -41,7 +53,7 @@ class Recorder:
             held = run.kept["watched"] = states, call, first, call.address("states") + 1
         _, call, first, rows = held
         call.words[rows] = run.rows
-        call()
+        self._run(call)
         return first.tolist()
 
     def histories(
@@ -59,7 +71,7 @@ class Recorder:
         *_, call, (rows, address) = held
         result = np.empty((len(names), len(run.times)))
         call.words[rows], call.words[address] = run.rows, address_of_array(result)
-        call()
+        self._run(call)
         return result.T
 
     def packed(
@@ -123,8 +135,9 @@ class Recording:
         """Some outputs, coordinates or speeds (samples, names), without the others."""
         outputs, results = self._recorder.packed(names, len(self.states))
         histories = np.empty((len(names), len(self.places) or len(self.states)))
+        arrays = np.empty((len(self.states), results)), histories
         points = self.states, self.inputs, self.places
-        path_loops()["chosen"](*points, outputs, np.empty((len(self.states), results)), histories)
+        self._recorder._run(path_loops()["chosen"].prepared(*points, outputs, *arrays))
         return self._cut(histories.T)
 
     def at(self, rows: np.ndarray) -> Recording:

@@ -9,7 +9,7 @@ import numpy as np
 
 from vehiclemor.arguments import loop_array
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.loops import Ready, ready
+from vehiclemor.codegen.loops import Prepared, Ready, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
@@ -70,6 +70,14 @@ class System(ShortRepr):
             if source.arguments[0] == "_x":
                 given = (dim, self.inputs, n)
                 source.check(*given, *([results[name]] if name in results else ()))
+
+    def with_constants(self, constants: np.ndarray) -> System:
+        """The system of other constants; operators, packed arguments and workspaces serve both."""
+        # What is made of the Jacobian is made by this one, before it is shared.
+        _ = self.frame, self.turning_jacobian, self._ready, self._pool
+        other = object.__new__(System)
+        vars(other).update(vars(self), constants=constants, _address=constants.ctypes.data)
+        return other
 
     @cached_property
     def turning(self) -> np.ndarray:
@@ -199,6 +207,7 @@ class System(ShortRepr):
             space, left = self._pool.taken(kind, make), partial(self._pool.give_back, kind)
             if space.signal is not signal_of(maneuver):
                 space.take(self._drive(maneuver, windows, space.output.samples))
+        self._set_constants(space.call)
         output = space.output
         assert len(state) == len(space.start), f"{len(state)} states, not {len(space.start)}"
         space.start[:] = state
@@ -266,4 +275,13 @@ class System(ShortRepr):
             buffer,
             np.empty(dim + 8, dtype=np.int64),
         )
+        self._set_constants(call)
         return Workspace(call, start, output, buffer, windows, drive.signal)
+
+    def _set_constants(self, call: Prepared) -> None:
+        """Have a loop read the constants of this system."""
+        call.words[call.address("equations.constants")] = self._address
+
+    @cached_property
+    def _address(self) -> int:
+        return self.constants.ctypes.data

@@ -140,10 +140,10 @@ def solve_equilibrium(p: Mapping[str, Any], derivative: Derivative) -> dict[str,
         for end in ("front", "rear")
     ]
     unknown = np.array([p["tire_radius"] - deflection - front[2], 0.0, *lengths])
-    nothing = np.zeros(3)
+    x, nothing = design_state(p, 0.0, 0.0), np.zeros(3)
 
     def accelerations(values: np.ndarray) -> np.ndarray:
-        x = design_state(p, values[0], values[1])
+        x[HEIGHT], x[PITCH] = values[:2]
         change = derivative(list(values[2:]), x, nothing)[COORDINATES:]
         return change[[HEIGHT, PITCH, ARMS[0], ARMS[2]]]
 

@@ -322,11 +322,6 @@ class Decoding(ShortRepr):
         )
         if not largest:
             return space.states, None
-        if largest[len(watched)] > 1.0:
-            times, sizes = space.times[:rows], np.abs(space.states[:rows, self.layout.size :])
-            spent = durations(times, sizes[:, : len(self.reach.lasted) // 2])
-            beyond = int((spent > self.reach.lasted).any(axis=(1, 2)).argmax())
-            first[len(watched)] = beyond or rows - 1
         left = min(first)
         if left >= rows:
             return space.states, Trust(max(largest))

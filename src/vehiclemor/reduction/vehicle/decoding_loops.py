@@ -102,13 +102,12 @@ def decoded(
 
 
 def tell(states, column, known, largest, first):
-    """How far a run goes in durations and its start in known ones, and the first samples beyond.
-
-    Of the durations, which are first, only how far.
-    """
+    """How far a run goes in durations and its start in known ones, and the first samples beyond."""
     times, columns = known.times, len(known.spent) // 2
     longest, moving = durations(times, states, column, known.lasted, known.spent)
     largest[0] = longest
+    if longest > 1.0:
+        first[0] = lasted_until(times, states, column, known.lasted, known.spent)
     if moving < len(times):
         largest[1] = known.start[0] / max(times[moving], SOON)
         first[1] = moving if largest[1] > 1.0 else first[1]
@@ -152,6 +151,25 @@ def durations(times, states, column, lasted, spent):
             total += spent[row, level]
             longest = max(longest, total / lasted[row, level])
     return longest, moving
+
+
+def lasted_until(times, states, column, lasted, spent):
+    """The first sample at which columns have spent more than known times beyond a level."""
+    columns, last = len(spent) // 2, len(times) - 1
+    spent[:, :] = 0.0
+    for sample in range(1, last):
+        span = times[sample] - times[sample - 1]
+        for k in range(columns):
+            size, seconds, integral = abs(states[sample, column + k]), spent[k], spent[columns + k]
+            for level in range(LEVELS):
+                beyond = MOVING if level == 1 else max((level - 1) / PARTS, STILL)
+                if size > beyond:
+                    seconds[level] += span
+                integral[level] += span * seconds[level]
+                known = seconds[level] <= lasted[k, level]
+                if not known or integral[level] > lasted[columns + k, level]:
+                    return sample
+    return last
 
 
 def recurrence(matrices: Cube, forcing: Cube, result: Cube) -> Int:

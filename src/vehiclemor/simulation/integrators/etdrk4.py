@@ -29,7 +29,7 @@ so that defective matrices, those of stabilised constraints, are no exception.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -122,8 +122,8 @@ def accept(problem, t, h, method, work, counts):
 
 
 def phi_functions(matrix: np.ndarray) -> tuple[np.ndarray, ...]:
-    """phi_0 to phi_3 of a matrix (n, n)."""
-    norm = float(np.abs(matrix).sum(axis=0).max())
+    """phi_0 to phi_3 of a matrix (n, n), or of several (k, n, n)."""
+    norm = float(np.abs(matrix).sum(axis=-2).max())
     halvings = max(0, math.ceil(math.log2(norm / SMALL))) if norm > 0.0 else 0
     functions = _series(matrix / 2.0**halvings)
     for _ in range(halvings):
@@ -132,7 +132,7 @@ def phi_functions(matrix: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def _series(z: np.ndarray) -> tuple[np.ndarray, ...]:
-    identity = np.eye(len(z))
+    identity = np.eye(z.shape[-1])
     third = np.zeros_like(z)
     for k in range(TERMS, -1, -1):
         third = third @ z + identity / math.factorial(k + 3)
@@ -151,19 +151,24 @@ def _doubled(functions: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     )
 
 
-def exponential_tables(jacobian: np.ndarray, grid: Iterable[float]) -> np.ndarray:
+def exponential_tables(jacobian: np.ndarray, grid: Sequence[float]) -> np.ndarray:
     """Tables (step sizes, 7, n, n) of the loops, each matrix transposed.
 
     J; phi_1(z/2) / 2 and phi_2(z/2); phi_1, 2 phi_2, 2 phi_2 - 4 phi_3, 4 phi_3 - phi_2 of
-    z = h J.
+    z = h J.  Step sizes grow by a root of 2: each octave of the grid doubles the one before.
     """
-    steps = [float(h) for h in grid]
+    steps = np.asarray(grid)
+    octave = int((steps < 1.99 * steps[0]).sum())
     tables = np.empty((len(steps), TABLES, *jacobian.shape))
-    for table, h in zip(tables, steps, strict=True):
-        half = phi_functions(0.5 * h * jacobian)
-        _, first, second, third = _doubled(half)
-        table[0] = jacobian.T
-        table[1], table[2] = half[1].T / 2.0, half[2].T
-        table[3], table[4] = first.T, 2.0 * second.T
-        table[5], table[6] = (2.0 * second - 4.0 * third).T, (4.0 * third - second).T
+    half = phi_functions(0.5 * steps[:octave, None, None] * jacobian)
+    for begin in range(0, len(steps), octave):
+        whole = _doubled(half)
+        _, first, second, third = whole
+        columns = (
+            *(np.broadcast_to(jacobian, first.shape), half[1] / 2.0, half[2]),
+            *(first, 2.0 * second, 2.0 * second - 4.0 * third, 4.0 * third - second),
+        )
+        part = tables[begin : begin + octave]
+        part[:] = np.stack(columns, axis=1)[: len(part)].swapaxes(2, 3)
+        half = whole
     return tables

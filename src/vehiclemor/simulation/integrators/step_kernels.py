@@ -11,6 +11,7 @@ that are their own mirror image, one of those that reverse.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -237,6 +238,7 @@ def _total(terms: Sequence[Value]) -> Value:
     return sum(terms[1:], terms[0])
 
 
+@lru_cache(maxsize=8)
 def w_step(frame: Frame, inputs: int) -> Kernel:
     """A step of `ros34pw2`: first argument (y, f, h, inputs of three stages), result (new, error).
 
@@ -267,6 +269,7 @@ def w_step(frame: Frame, inputs: int) -> Kernel:
     return step.made("ros34pw2_step")
 
 
+@lru_cache(maxsize=8)
 def exponential_step(frame: Frame, inputs: int) -> Kernel:
     """A step of `etdrk4`: first argument (y, f, both a step before, numbers, inputs of two stages).
 
