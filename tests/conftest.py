@@ -58,6 +58,18 @@ def pytest_configure(config: pytest.Config) -> None:
             process.wait()
 
 
+# Folders and files whose tests take long.
+SLOW = ("contracts", "plugin", "reference", "report", "study", "unit/exporting")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark slow tests, so that the quick ones can be run alone."""
+    folder = Path(__file__).parent
+    for item in items:
+        if item.path.relative_to(folder).as_posix().startswith(SLOW):
+            item.add_marker("slow")
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Where tests run in several processes, keep those together that share long computations."""

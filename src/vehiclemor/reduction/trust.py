@@ -18,7 +18,7 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.polynomials import extent_of, first_beyond, recorded_inputs
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
-from vehiclemor.sizes import shaped
+from vehiclemor.sizes import require, shaped
 
 # Edges in Hz of bands in which inputs of structures are known, and time (s) between samples.  A
 # reduced structure holds motion up to a frequency: on a corrugated road hardly anything is slower.
@@ -133,8 +133,12 @@ class InputRange:
     histories: np.ndarray | None = None
 
     def check_sizes(self) -> None:
-        """Raise `ValueError` if the magnitudes are no table of floats."""
+        """Raise `ValueError` if the magnitudes or the histories are no tables of floats."""
         shaped("largest", (self.largest, len(self.largest), *self.largest.shape[1:2]))
+        if self.histories is not None:
+            runs_and_samples = self.histories.shape[:2]
+            require(min(runs_and_samples) > 0, "histories")
+            shaped("histories", (self.histories, *runs_and_samples, self.largest.shape[1]))
 
     @property
     def _sizes(self) -> np.ndarray:
