@@ -223,7 +223,7 @@ def test_a_name_stands_wherever_the_template_has_its_own(here, capsys):
         (["my_car", "--out", "file"], "file exists: it is not replaced"),
         (["my_car", "--out", "no/where"], "no/where: the folder no does not exist"),
         (["my_car", "--out", "file/x"], "file/x: "),
-        (["my_car", "--out", "a" * 300], "can't be written"),
+        (["my_car", "--out", "a" * 300], "is not a path"),
     ],
 )
 def test_what_cannot_be_made_is_one_line(plug_in_package, here, capsys, arguments, words):
