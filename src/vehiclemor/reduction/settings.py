@@ -89,5 +89,5 @@ def inline_table(text: str, where: str) -> dict[str, Any]:
 class OnlineSettings(Settings):
     """How a reduced system is integrated."""
 
-    solver: Solver = "ros34pw2"
+    solver: Solver = "etdrk4"
     tolerance: Tolerance = 1e-3

@@ -46,10 +46,9 @@ class DynamicSettings(OnlineSettings):
     """How equations of motion are integrated."""
 
     solver: AnyIntegrator = Field(
-        "exponential_adams",
+        "dopri5",
         description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
-        "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; with the same "
-        "etdrk4: exponential method of order 4; exponential_adams: of order 6, for high accuracy",
+        "Jacobians; etdrk4: exponential method of order 4, one Jacobian for all runs",
     )
     tolerance: Tolerance = 1e-8
 

@@ -35,7 +35,7 @@ class GuardedSettings(OnlineSettings):
         "", description="its other settings, as in TOML: terms = 12, ridge = 1e-9"
     )
     safe_solver: Solver = "etdrk4"
-    safe_tolerance: Tolerance = 2e-3
+    safe_tolerance: Tolerance = 1e-4
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 2e-3
 
