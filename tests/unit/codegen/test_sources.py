@@ -198,7 +198,7 @@ def derived(tmp_path, monkeypatch):
 
     def fetch(name: str = "standard_problems"):
         kept._read.cache_clear()
-        return derivation(name, standard_problems.derive), len(made)
+        return derivation(name, standard_problems.derive).sources, len(made)
 
     return fetch
 
