@@ -53,6 +53,8 @@ class Extent(NamedTuple):
 class Excitation(ShortRepr):
     """Inputs of a model over a fixed duration: a `Maneuver` of functions, a `Signal` of samples."""
 
+    repr_fields = ("name", "inputs", "duration", "samples", "frequency_factor", "amplitude_factor")
+
     name: str
     summary: str
     inputs: tuple[str, ...]

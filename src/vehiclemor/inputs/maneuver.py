@@ -65,8 +65,6 @@ class Maneuver(Excitation):
         Of a family, such as roads of other seeds: number -> maneuver, whose name is `NAME:NUMBER`.
     """
 
-    repr_fields = ("name", "inputs", "duration", "samples", "frequency_factor", "amplitude_factor")
-
     name: str
     summary: str
     signal: Callable[[np.ndarray, float, float], np.ndarray]
