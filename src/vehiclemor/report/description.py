@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from vehiclemor.inputs.maneuver import FACTORS
+from vehiclemor.inputs.excitation import FACTORS
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path

@@ -8,7 +8,7 @@ import numpy as np
 
 from vehiclemor.arguments import loop_array, number, quoted, within
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import ModelDefinition
 
 LARGEST = sys.float_info.max
@@ -70,7 +70,7 @@ def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
 
 
 def output_times(
-    given: Any, maneuver: Maneuver, repeats: bool = False, begin: float = 0.0
+    given: Any, maneuver: Excitation, repeats: bool = False, begin: float = 0.0
 ) -> np.ndarray:
     """Output times (samples,) in s that increase within a maneuver, or `InputError`.
 

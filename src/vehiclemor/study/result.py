@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.failure import Failure
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.provenance import attributes
 from vehiclemor.reduction.interface import FittedModel
@@ -137,7 +137,7 @@ def _compared(
     return Outcome(missing, missing)
 
 
-def _missing(model: Model, maneuver: Maneuver, failure: Failure) -> Trajectory:
+def _missing(model: Model, maneuver: Excitation, failure: Failure) -> Trajectory:
     times = maneuver.times
     coordinates, speeds, outputs = (
         np.full((len(times), len(names)), np.nan)

@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.checks import check_resolved, checked_maneuver
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.reduction.training import SPEED, TrainingRun, own_speed
 from vehiclemor.registry import component
@@ -48,7 +48,7 @@ class Scenario:
     model's parameters, if it has any; `parameters` are what differs from the model's.
     """
 
-    maneuver: Maneuver
+    maneuver: Excitation
     start: str | tuple[float, ...]
     speed: float | None = None
     parameters: Overrides = ()
@@ -95,7 +95,7 @@ class Scenario:
         parameters: Overrides = (),
     ) -> "Scenario":
         """The run of a registered maneuver with two factors: of frequency, of amplitude."""
-        chosen: Maneuver = component("maneuver", maneuver)
+        chosen: Excitation = component("maneuver", maneuver)
         return cls(chosen.perturbed(*factors), start, speed, parameters)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -107,7 +107,7 @@ class Scenario:
 
 # As many as the references that a process keeps.
 @lru_cache(maxsize=1024)
-def _sent(maneuver: Maneuver) -> Maneuver | tuple[str, float, float]:
+def _sent(maneuver: Excitation) -> Excitation | tuple[str, float, float]:
     """What goes to another process: the name of a registered maneuver, and its factors.
 
     Its functions would be new ones each time: what was fitted or solved with it were not found.
@@ -120,8 +120,8 @@ def _sent(maneuver: Maneuver) -> Maneuver | tuple[str, float, float]:
 
 
 @lru_cache(maxsize=1024)
-def _received(sent: Maneuver | tuple[str, float, float]) -> Maneuver:
-    if isinstance(sent, Maneuver):
+def _received(sent: Excitation | tuple[str, float, float]) -> Excitation:
+    if isinstance(sent, Excitation):
         return sent
     name, *factors = sent
     return component("maneuver", name).perturbed(*factors)
@@ -135,11 +135,11 @@ def scenario_text(scenario: Scenario) -> str:
 
 
 @lru_cache(maxsize=1024)
-def input_hash(maneuver: Maneuver) -> str:
+def input_hash(maneuver: Excitation) -> str:
     """Hash of the output times and the inputs at these times; of a signal all there is of it."""
     times = maneuver.times
     if isinstance(maneuver, Signal):
-        parts = [part.tobytes() for part in (times, *maneuver.polynomials)]
+        parts = [part.tobytes() for part in (times, *maneuver.pieces)]
         names = json.dumps(maneuver.inputs).encode()
         return hashlib.sha256(b"".join([names, *parts])).hexdigest()[:16]
     # Adding zero makes -0 and 0 one input.

@@ -16,7 +16,7 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,8 +26,8 @@ import xarray as xr
 
 from vehiclemor.codegen.cache import compiler_identity
 from vehiclemor.failure import Failure, attempt
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import signal_of
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.progress import tell
 from vehiclemor.provenance import attributes, machine
@@ -200,27 +200,26 @@ class Seconds(NamedTuple):
     loop: float
 
 
-def as_signal(model: Model, maneuver: Maneuver) -> Maneuver:
+def as_signal(model: Model, maneuver: Excitation) -> Excitation:
     """A maneuver as the signal of its polynomials; a structure's, which takes samples, as it is."""
     if isinstance(maneuver, Signal) or model.kind == "structural":
         return maneuver
-    pieces: Any = signal_of(maneuver).bundle
-    values = {f.name: getattr(maneuver, f.name) for f in fields(Maneuver)}
-    values |= {"frequency_factor": 1.0, "amplitude_factor": 1.0}
-    return Signal(**values, hold="polynomials", pieces=pieces)
+    about = maneuver.name, maneuver.summary, maneuver.inputs, maneuver.duration, maneuver.samples
+    return Signal(*about, hold="polynomials", nominal_pieces=maneuver.pieces)
 
 
-def as_new(maneuver: Maneuver) -> Maneuver:
+def as_new(maneuver: Excitation) -> Excitation:
     """A maneuver as a user has just made it: nothing is known of its inputs from earlier calls."""
     if isinstance(maneuver, Signal):
-        return replace(maneuver, pieces=maneuver.pieces._replace(), kept={})
-    # What is worked out about inputs is looked up by their function.
+        return replace(maneuver, nominal_pieces=maneuver.nominal_pieces._replace())
+    assert isinstance(maneuver, Maneuver)
+    # Cached results are looked up by the function.
     return replace(maneuver, signal=partial(maneuver.signal))
 
 
 def called(
     simulate: Callable[..., Trajectory],
-    run: tuple[Maneuver, *tuple[Any, ...]],
+    run: tuple[Excitation, *tuple[Any, ...]],
     inputs: int,
     *,
     again: bool = True,
@@ -231,7 +230,7 @@ def called(
     """
     maneuver, *further = run
 
-    def delivered(new: Maneuver) -> Trajectory:
+    def delivered(new: Excitation) -> Trajectory:
         # Histories are made when they are first read.
         trajectory = simulate(new, *further)
         assert trajectory.outputs is not None

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import ConvergenceError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import Method, OfflineCost, Presets
 from vehiclemor.reduction.projection.structural import StructuralRuns, StructuralSettings
 from vehiclemor.reduction.reduced_system import ReducedMechanism, ReducedSystem
@@ -87,7 +87,7 @@ class FullOrder:
         return len(self.model.coordinates)
 
     def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """Full-order trajectory at the output times; it may have diverged."""
         how = {"solver": self.solver, "tolerance": self.tolerance, "outputs": outputs}

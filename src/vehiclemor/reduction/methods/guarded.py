@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import FitOther, FittedModel, Method, OfflineCost, simulated
 from vehiclemor.reduction.settings import OnlineSettings, Settings, Solver, Tolerance, inline_table
 from vehiclemor.reduction.training import Training
@@ -68,7 +68,7 @@ class FallbackModel(ShortRepr):
         return self.fast.best_approximation(states)
 
     def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """The fast run; where it can't be trusted, the safe one."""
         run = simulated(self.fast, maneuver, start, outputs)

@@ -22,6 +22,7 @@ import xarray as xr
 from vehiclemor.codegen.cache import compiler_identity
 from vehiclemor.exceptions import InputError
 from vehiclemor.failure import Failure
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.metrics import rms, signal_range
 from vehiclemor.progress import tell
@@ -44,7 +45,7 @@ FULL = "full order"
 GROUPS = ("motion", "strain")
 ROUNDS = 5
 # What runs a maneuver, the maneuver or its beginning, and how many times as long the whole is.
-Call = tuple[Callable[[Maneuver], Any], Maneuver, float]
+Call = tuple[Callable[[Excitation], Any], Excitation, float]
 
 
 def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
@@ -128,7 +129,7 @@ def strongest_full(name: str) -> ReducedOrderModel:
     return ReducedOrderModel(model, method.name, {}, (), method.fit(model, (), settings))
 
 
-def _reference(model: Any, maneuver: Maneuver, step: float, folder: Path) -> xr.Dataset:
+def _reference(model: Any, maneuver: Excitation, step: float, folder: Path) -> xr.Dataset:
     """Stored full-order outputs of a run; they do not depend on the machine."""
     parameters = json.dumps({k: e.value for k, e in model.parameters.entries.items()})
     parts = model.kernel_hash, code_digest(model.name, "full_order", {}), parameters
