@@ -14,7 +14,8 @@ from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, bla
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
-from vehiclemor.reduction.interface import FitOther, FittedModel, Method, lower_rank
+from vehiclemor.reduction.fallback import with_fallback
+from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.trust import InputRange, input_range
 from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
@@ -40,8 +41,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# How a fitted model is integrated: experiments that differ in these alone are fitted once.
-ONLINE = ("solver", "tolerance")
+# How a fitted model is integrated, and its fallback: experiments that differ in these alone are
+# fitted once.
+SOLVER = ("solver", "tolerance")
+ONLINE = (*SOLVER, "fallback", "fallback_tolerance")
 # More than the fits of a study of protocols, some of which take a minute.
 MOST_FITS = 128
 
@@ -178,35 +181,32 @@ def _shared(fit: Fit) -> Fitted:
 
 
 def _made(fit: Fit) -> FittedModel | Failure:
-    """A fit; one that differs from another in its integration alone shares what that has fitted."""
+    """A fit; those that differ in what does not reach `fit` alone share one result."""
     settings = json.loads(fit.settings)
-    defaults = default_settings(fit.model, fit.method)
-    online = {name: value for name, value in settings.items() if name in ONLINE}
-    common = _text(settings | {name: defaults[name] for name in online})
-    if common != fit.settings:
-        found: Any = _shared(fit._replace(settings=common)).reduced
-        if isinstance(found, Failure):
-            return found
-        if all(hasattr(found, name) for name in online):
-            return replace(found, **online)
-
-    def other(name: str, given: Any) -> FittedModel:
-        content, function = _text(given.model_dump()), component("method", name).fit
-        shared = _shared(fit._replace(method=name, settings=content, function=function)).reduced
-        if isinstance(shared, Failure):
-            # Fitted again it fails as it does alone.
-            return fitted(component("method", name), *_given(fit), given)
-        return shared
-
-    return _fit(fit, other)
+    method: Method = component("method", fit.method)
+    if method.variant_of:
+        method = component("method", method.variant_of)
+    defaults = default_settings(fit.model, method.name)
+    common = settings | {name: defaults[name] for name in ONLINE if name in settings}
+    first = fit._replace(method=method.name, settings=_text(common), function=method.fit)
+    if first == fit:
+        return _fit(fit)
+    reduced: Any = _shared(first).reduced
+    if isinstance(reduced, Failure):
+        return reduced
+    online = {name: settings[name] for name in SOLVER if name in settings}
+    if not all(hasattr(reduced, name) for name in online):
+        return _fit(fit)
+    complete = for_method(fit.model, fit.method, settings)
+    return with_fallback(replace(reduced, **online), fit.model, complete)
 
 
-def _fit(fit: Fit, others: FitOther | None = None) -> FittedModel | Failure:
+def _fit(fit: Fit) -> FittedModel | Failure:
     method: Method = component("method", fit.method)
 
     def made() -> FittedModel:
         complete = for_method(fit.model, fit.method, json.loads(fit.settings))
-        return fitted(method, *_given(fit), complete, others)
+        return fitted(method, *_given(fit), complete)
 
     with one_thread():
         return attempt(made)

@@ -81,7 +81,7 @@ def make_experiment(
     return Experiment(
         model.name,
         model.kernel_hash,
-        code_digest(model.name, method, settings),
+        code_digest(model.name, method),
         parameters_of(model),
         method,
         settings,

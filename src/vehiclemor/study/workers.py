@@ -289,7 +289,7 @@ def on_worker(experiments: Sequence[Experiment]) -> Done:
     """As `evaluate_and_store`, on a worker: files are sent."""
     with _turn(), TemporaryDirectory() as name:
         for e in {e.code + e.kernel: e for e in experiments}.values():
-            code = code_digest(e.model, e.method, e.settings)
+            code = code_digest(e.model, e.method)
             if code != e.code or model_of(e).kernel_hash != e.kernel:
                 from distributed import get_worker
 

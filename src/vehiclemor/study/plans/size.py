@@ -54,7 +54,7 @@ def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
     if component("model", study.model).kind != "structural":
         raise InputError(f"size: {study.model} is no structure")
     kernel = build(study.model, overrides=study.size.meshes[0]).kernel_hash
-    codes = [code_digest(study.model, e.method, dict(e.settings)) for e in study.methods]
+    codes = [code_digest(study.model, e.method) for e in study.methods]
     content = [study.model_dump_json(), *codes, kernel, machine(), ROUNDS]
     text = json.dumps([*content, compiler_identity()])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -132,7 +132,7 @@ def strongest_full(name: str) -> ReducedOrderModel:
 def _reference(model: Any, maneuver: Excitation, step: float, folder: Path) -> xr.Dataset:
     """Stored full-order outputs of a run; they do not depend on the machine."""
     parameters = json.dumps({k: e.value for k, e in model.parameters.entries.items()})
-    parts = model.kernel_hash, code_digest(model.name, "full_order", {}), parameters
+    parts = model.kernel_hash, code_digest(model.name, "full_order"), parameters
     run = maneuver.name, maneuver.frequency_factor, maneuver.amplitude_factor, step
     key = hashlib.sha256(json.dumps([parts, run]).encode()).hexdigest()[:16]
 
