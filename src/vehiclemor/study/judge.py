@@ -16,7 +16,7 @@ from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.netcdf_file import opened, read_dataset
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.results import judged_part
-from vehiclemor.study.plans.study_file import Bound, StudyFile
+from vehiclemor.study.plans.study_file import Bound, ProtocolFile
 from vehiclemor.study.store import combined_path
 
 Bounds = Mapping[str, Bound]
@@ -55,7 +55,7 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
     truth, found = _read(known, "test set"), _read(path, "file of predictions")
     if "configuration" not in truth.attrs or "apart" not in truth:
         raise FileError(f"{known}: not the test set of a dataset of this package")
-    bounds = StudyFile.model_validate_json(truth.attrs["configuration"]).bounds
+    bounds = ProtocolFile.model_validate_json(truth.attrs["configuration"]).bounds
     _check(path, found, truth, bounds)
     judged = truth["apart"].values == ""
     if not judged.any():

@@ -20,7 +20,7 @@ from vehiclemor.study.experiment import (
     default_settings,
     make_experiment,
 )
-from vehiclemor.study.plans.study_file import MethodEntry, StudyFile
+from vehiclemor.study.plans.study_file import GridFile, MethodEntry
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER, TEXTS, Sampling, values
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Overrides, Scenario, Values, check, overrides, with_parameters
@@ -40,7 +40,7 @@ class Grid:
     """
 
     name: str
-    definition: StudyFile
+    definition: GridFile
     model: Model
     dimensions: dict[str, list[Any]]
     samples: dict[str, list[float]]
@@ -48,7 +48,7 @@ class Grid:
     experiments: dict[str, Experiment]
 
 
-def expand(name: str, study: StudyFile) -> Grid:
+def expand(name: str, study: GridFile) -> Grid:
     """All experiments of a study; `FileError` if it names something unknown or unfit."""
     try:
         model = build(study.model, overrides=study.parameters)
@@ -73,7 +73,7 @@ def expand(name: str, study: StudyFile) -> Grid:
 
 
 def _dimensions(
-    model: Model, study: StudyFile, samples: Mapping[str, list[float]]
+    model: Model, study: GridFile, samples: Mapping[str, list[float]]
 ) -> dict[str, list[Any]]:
     """Name -> values of every dimension, checked."""
     settings = {s for entry in study.methods for s in default_settings(model, entry.method)}
@@ -91,7 +91,7 @@ def _dimensions(
     return dimensions | {"label": list(study.labelled)}
 
 
-def _check_histories(model: Model, study: StudyFile, dimensions: Mapping[str, list[Any]]) -> None:
+def _check_histories(model: Model, study: GridFile, dimensions: Mapping[str, list[Any]]) -> None:
     """Raise `InputError` if the histories of all runs can't be held, or not side by side."""
     names = dimensions.get("maneuver", [study.maneuver or model.definition.maneuver])
     first, *others = [component("maneuver", name) for name in names]
@@ -117,7 +117,7 @@ def _points(
 
 
 def _of_method(
-    model: Model, study: StudyFile, entry: MethodEntry, points: Iterator[dict[str, Any]]
+    model: Model, study: GridFile, entry: MethodEntry, points: Iterator[dict[str, Any]]
 ) -> Iterator[Experiment]:
     """Experiments of a method at some points; `InputError` if its settings fit at none of them.
 

@@ -18,8 +18,8 @@ from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
-from vehiclemor.study.plans.loading import read_study, study_path
-from vehiclemor.study.plans.study_file import DRAWN, SETS, MethodEntry, StudyFile
+from vehiclemor.study.plans.loading import load_studies, read_study, study_path
+from vehiclemor.study.plans.study_file import DRAWN, SETS, ProtocolEntry, ProtocolFile
 from vehiclemor.study.plans.study_runs import DECIMALS, Box, Draw, Group
 from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
 
@@ -72,7 +72,7 @@ class Protocol:
 
     name: str
     path: Path
-    definition: StudyFile
+    definition: ProtocolFile
     model: Model
     sets: dict[str, Scenarios]
     entries: tuple[Entry, ...]
@@ -108,7 +108,7 @@ def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protoc
     """
     path = study_path(study)
     definition = read_study(path)
-    if not definition.bounds:
+    if not isinstance(definition, ProtocolFile):
         raise FileError(f"{path}: has no bounds")
     seed = definition.seed if seed is None else seed
     try:
@@ -119,7 +119,7 @@ def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protoc
         raise FileError(f"{path}: {error}") from None
 
 
-def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protocol:
+def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Protocol:
     model = build(definition.model, overrides=definition.parameters)
     straight = definition.straight
     outputs = [*definition.bounds, *definition.reported, *definition.sensitive]
@@ -136,7 +136,7 @@ def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protoc
         if (run := scenario.run_key) in seen:
             raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
         seen[run] = key
-    draws = {key: draw for key in DRAWN if (draw := getattr(definition, key))}
+    draws = definition.draws
     for key, draw in draws.items():
         for number, box in enumerate(draw.boxes, start=1):
             _checked(model, f"{key}, box {number}", _corners, box)
@@ -152,10 +152,10 @@ def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protoc
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
         if definition.extends and target.against not in known:
-            base = ", ".join(read_study(study_path(definition.extends)).labelled)
+            (base,) = load_studies(definition.extends).values()
             raise InputError(
                 f"a target is against {target.against!r}, a row of {definition.extends}: "
-                f"rows is needed and must name its method, of {base}"
+                f"rows is needed and must name its method, of {', '.join(base.labelled)}"
             )
         choice("row that a target is against", target.against, known)
     return Protocol(name, path, definition, model, sets, entries, seed)
@@ -205,9 +205,8 @@ def _corners(model: Model, box: Box) -> list[Scenario]:
     return [Scenario.of(*corner) for corner in (*corners, *others, *further)]
 
 
-def _entry(model: Model, entry: MethodEntry, training: Scenarios) -> Entry:
-    label = entry.label or entry.method
-    where = f"method {label!r}"
+def _entry(model: Model, entry: ProtocolEntry, training: Scenarios) -> Entry:
+    where = f"method {entry.name!r}"
     candidates: list[Settings] = []
     for given in entry.candidates:
         own: dict[str, object] = dict(given)
@@ -223,7 +222,7 @@ def _entry(model: Model, entry: MethodEntry, training: Scenarios) -> Entry:
     for name in learned:
         choice(f"maneuver in the training of {where}", name, known)
     runs = tuple(run for run in training if not learned or run.maneuver.name in learned)
-    return Entry(label, entry.method, entry.role, tuple(candidates), runs)
+    return Entry(entry.name, entry.method, entry.role, tuple(candidates), runs)
 
 
 def sampled_sets(protocol: Protocol) -> dict[str, Scenarios]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,13 @@ def second_runs(protocol: Protocol, scenarios: Scenarios) -> Experiment:
     preset = "recommended" if model.kind == "ae" else "paper"
     settings = complete_settings(model, "full_order", preset=preset)
     return make_experiment(model, "full_order", settings, (), scenarios, "errors")
+
+
+def validation_keys(protocol: Protocol) -> set[str]:
+    """Keys of the runs that the choice of candidates needs, which come first."""
+    validation = protocol.sets["validation"]
+    groups = (entry.experiments(protocol.model, validation) for entry in protocol.entries)
+    return {experiment.key for experiment in chain.from_iterable(groups)}
 
 
 def validate(

@@ -33,7 +33,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.study.plans.loading import content_hash
-from vehiclemor.study.plans.study_file import MethodEntry, StudyFile
+from vehiclemor.study.plans.study_file import MethodEntry, SizeFile
 from vehiclemor.study.plans.study_runs import Size
 from vehiclemor.study.result import variables
 from vehiclemor.study.store import combined_path, stored
@@ -47,9 +47,8 @@ ROUNDS = 5
 Call = tuple[Callable[[Maneuver], Any], Maneuver, float]
 
 
-def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
+def run_size(name: str, study: SizeFile, folder: Path) -> xr.Dataset:
     """Times and errors on the dimensions `mesh`, `label` and `group`; stored, as are its runs."""
-    assert study.size is not None
     if component("model", study.model).kind != "structural":
         raise InputError(f"size: {study.model} is no structure")
     kernel = build(study.model, overrides=study.size.meshes[0]).kernel_hash
@@ -61,7 +60,7 @@ def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
     return stored(combined_path(folder, name), "size", key, make, content=content_hash(study))
 
 
-def _measured(name: str, study: StudyFile, size: Size, folder: Path) -> xr.Dataset:
+def _measured(name: str, study: SizeFile, size: Size, folder: Path) -> xr.Dataset:
     # What can't be had is told before anything is computed.
     beside = [(strongest_full(model), rom(model)) for model in size.beside]
     meshes: list[Any] = [build(study.model, overrides=mesh) for mesh in size.meshes]
@@ -146,13 +145,13 @@ def _reference(model: Any, maneuver: Maneuver, step: float, folder: Path) -> xr.
     return stored(folder / "references" / f"{key}.nc", "reference", key, make)
 
 
-def _fit(study: StudyFile, size: Size, entry: MethodEntry, model: Any) -> ReducedOrderModel | None:
+def _fit(study: SizeFile, size: Size, entry: MethodEntry, model: Any) -> ReducedOrderModel | None:
     """A method fitted to a mesh; none where the mesh is larger than it is made."""
-    method, label = component("method", entry.method), entry.label or entry.method
+    method, label = component("method", entry.method), entry.name
     if not method.accepts(model)[0] or model.size > size.up_to.get(label, model.size):
         return None
     tell(f"{label} of {model.name}, n = {model.size}", 0, 1)
-    runs = (TrainingRun(model, component("maneuver", str(study.training)), model.starts[0]),)
+    runs = (TrainingRun(model, component("maneuver", study.training), model.starts[0]),)
     own = {"step_size": size.step, **entry.settings}
     settings = validated(method, model.kind, own, entry.preset)
     reduced = fitted(method, model, runs, settings)

@@ -173,7 +173,19 @@ class Draw(FileSchema):
     """Runs sampled from boxes."""
 
     runs: int = Field(ge=1, le=100_000, description="how many")
+    common: dict[str, Any] = table_of("keys of every box that does not say otherwise")
     boxes: list[Box] = Field(min_length=1, description="what they are sampled from")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_common(cls, value: Any) -> Any:
+        """The keys in common stand in each box."""
+        if not isinstance(value, dict) or not isinstance(value.get("common"), dict):
+            return value
+        common, boxes = value["common"], value.get("boxes")
+        if not isinstance(boxes, list) or not all(isinstance(box, dict) for box in boxes):
+            return value
+        return value | {"common": {}, "boxes": [common | box for box in boxes]}
 
 
 class Size(FileSchema):
