@@ -107,7 +107,7 @@ bounds.second_euler_angle = { measure = "max", bound = 2.4e-5 }
         ("[{ tolerance = 1e-12 }, { tolerance = 1e-6 }]", "{ tolerance = [1e-12, 1e-6] }"),
         (
             "frequency = [0.7, 2.0], amplitude = [1.3, 1.4] }]",
-            "amplitude = [1.3, 1.4] }]\ncommon = { amplitude = [9.0, 9.0], frequency = [0.7, 2.0] }",
+            "amplitude = [1.3, 1.4] }]\ncommon = { amplitude = [9.0], frequency = [0.7, 2.0] }",
         ),
     ):
         assert old in text
