@@ -71,7 +71,7 @@ def _plans(study: str, seed: int | None) -> list[Plan]:
     files = studies_and_files(study)
     if seed is not None and not any(_samples(definition) for _, definition in files.values()):
         raise InputError(f"seed: {study} samples no test runs")
-    return [_plan(name, *found, seed) for name, found in files.items()]
+    return [_plan(name, path, definition, seed) for name, (path, definition) in files.items()]
 
 
 def _samples(definition: StudyFile) -> bool:
@@ -81,7 +81,7 @@ def _samples(definition: StudyFile) -> bool:
 def _plan(name: str, path: Path, definition: StudyFile, seed: int | None) -> Plan:
     if isinstance(definition, SizeFile):
         run = partial(run_size, name, definition)
-        # It is timed as a whole.
+        # Its runs are timed together.
         return Plan(name, definition, lambda folder, *_: run(folder), keys=tuple)
     if isinstance(definition, ProtocolFile):
         own_seed = seed if definition.drawn else None

@@ -58,13 +58,13 @@ def expand(name: str, study: GridFile) -> Grid:
             _check_histories(model, study, dimensions)
         keys = np.empty([len(entry) for entry in dimensions.values()], KEY)
         experiments: dict[str, Experiment] = {}
-        own = {name: found for name, found in dimensions.items() if name != "label"}
+        axes = {name: points for name, points in dimensions.items() if name != "label"}
         for number, entry in enumerate(study.methods):
-            made = list(_of_method(model, study, entry, _points(own, samples)))
-            # Settings that a method does not have make no further experiments of it.
-            experiments |= {experiment.key: experiment for experiment in made}
-            found = np.array([experiment.key for experiment in made], KEY)
-            keys[..., number] = found.reshape(keys.shape[:-1])
+            of_method = list(_of_method(model, study, entry, _points(axes, samples)))
+            # Settings that a method does not have give no further experiments of it.
+            experiments |= {experiment.key: experiment for experiment in of_method}
+            keys_of_method = np.array([experiment.key for experiment in of_method], KEY)
+            keys[..., number] = keys_of_method.reshape(keys.shape[:-1])
     except PlugInError:
         raise
     except (InputError, GeometryError) as error:
@@ -111,9 +111,11 @@ def _points(
     dimensions: Mapping[str, list[Any]], samples: Mapping[str, list[float]]
 ) -> Iterator[dict[str, Any]]:
     """Name of a dimension, or of what is sampled -> value, at every point."""
-    for place in itertools.product(*dimensions.values()):
-        point = dict(zip(dimensions, place, strict=True))
-        yield point | {name: found[point["sample"]] for name, found in samples.items()}
+    for coordinates in itertools.product(*dimensions.values()):
+        point = dict(zip(dimensions, coordinates, strict=True))
+        for name, values_of_samples in samples.items():
+            point[name] = values_of_samples[point["sample"]]
+        yield point
 
 
 def _of_method(
@@ -123,7 +125,8 @@ def _of_method(
 
     Corners of a grid may not fit, such as a rank above the number of snapshots.
     """
-    names, first, fits = set(default_settings(model, entry.method)), "", False
+    names = set(default_settings(model, entry.method))
+    first_refusal, fits = "", False
     factors = tuple((one, other) for one, other in study.training_set)
     for point in points:
         given = entry.settings | {d: point[d] for d in study.grid if d in names}
@@ -143,13 +146,14 @@ def _of_method(
         learned = _training(model, learner, training, test, of_entry)
         experiment = make_experiment(model, entry.method, settings, learned, (test,), study.keep)
         if not fits:
-            found = refusal(model, experiment)
+            failure = refusal(model, experiment)
             # Of a method that refuses the model nothing is set; a bug is a result.
-            fits = found is None or found.status != "rejected" or not settings
-            first = first or (found.message if found else "")
+            fits = failure is None or failure.status != "rejected" or not settings
+            if failure and not first_refusal:
+                first_refusal = failure.message
         yield experiment
     if not fits:
-        raise InputError(first)
+        raise InputError(first_refusal)
 
 
 @lru_cache(maxsize=4096)
@@ -161,7 +165,7 @@ def _complete(model: Model, method: str, given: tuple[tuple[str, Any], ...], pre
 def _checked(
     model: Model, maneuver: str, factors: tuple[float, float], start: str, parameters: Overrides
 ) -> Scenario:
-    """A test scenario; `InputError` if the model can't be run or made so."""
+    """A test scenario; `InputError` if the model can't be built or run so."""
     try:
         with_parameters(model, parameters)
     except VehiclemorError as error:

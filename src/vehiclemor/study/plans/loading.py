@@ -148,7 +148,7 @@ def content_hash(definition: FileSchema) -> str:
 def write_study(definition: StudyFile, path: Path) -> Path:
     """Write what a study says beyond the defaults as a TOML file."""
     content = definition.model_dump(exclude_defaults=True).items()
-    # Entries of the longest lists stand on lines of their own.
+    # Entries of the longest lists stand on separate lines.
     lines = [f"{name} = {_toml(value, LINE)}" for name, value in content]
     return write_text(path, "\n".join([*lines, ""]))
 

@@ -24,7 +24,7 @@ from vehiclemor.study.plans.study_runs import DECIMALS, Box, Draw, Group
 from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
 
 FULL_ORDER, CONTENDER = "full order", "contender"
-# Of the names of the package's own; the model follows.
+# Of the names of those in the package; the model follows.
 PREFIX = "predictive-"
 # Samples tried for each run before a box counts as too small.
 TRIES = 100
@@ -59,7 +59,7 @@ class Entry:
         return [self.row_label(number) for number in numbers]
 
     def row_label(self, candidate: int) -> str:
-        """Label of a candidate's row; of a full-order method every candidate has its own."""
+        """Label of a candidate's row; of a full-order method every candidate has one."""
         if self.role != FULL_ORDER:
             return self.label
         tolerance = f"{float(self.candidates[candidate].get('tolerance', 0.0)):.1e}"
@@ -131,11 +131,13 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
         parts = [_checked(model, f"{key}, group {n}", _of_group, group) for n, group in groups]
         sets[key] = tuple(itertools.chain(*parts))
     seen: dict[tuple, str] = {}
-    for key, scenario in ((key, scenario) for key, part in sets.items() for scenario in part):
-        # What a method has learned from or was chosen by can't test it.
-        if (run := scenario.run_key) in seen:
-            raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
-        seen[run] = key
+    for key, part in sets.items():
+        for scenario in part:
+            # What a method has learned from or was chosen by can't test it.
+            run = scenario.run_key
+            if run in seen:
+                raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
+            seen[run] = key
     draws = definition.draws
     for key, draw in draws.items():
         for number, box in enumerate(draw.boxes, start=1):
@@ -183,9 +185,9 @@ def _of_group(model: Model, group: Group) -> list[Scenario]:
     points = group.points or [[frequency, size, *speed] for frequency, size, speed in products]
     samples = itertools.product(*group.parameters.values())
     tables = [overrides(dict(zip(group.parameters, sample, strict=True))) for sample in samples]
-    own = own_speed(model)
+    usual_speed = own_speed(model)
     return [
-        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else own, table)
+        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else usual_speed, table)
         for point in points
         for start in group.start or model.starts[:1]
         for table in tables
@@ -208,10 +210,10 @@ def _corners(model: Model, box: Box) -> list[Scenario]:
 def _entry(model: Model, entry: ProtocolEntry, training: Scenarios) -> Entry:
     where = f"method {entry.name!r}"
     candidates: list[Settings] = []
-    for given in entry.candidates:
-        own: dict[str, object] = dict(given)
-        preset = str(own.pop("preset", entry.preset))
-        complete = complete_settings(model, entry.method, {**entry.settings, **own}, preset)
+    for candidate in entry.candidates:
+        settings = {**entry.settings, **candidate}
+        preset = str(settings.pop("preset", entry.preset))
+        complete = complete_settings(model, entry.method, settings, preset)
         # Of a method that refuses the model all candidates are empty.
         if complete and complete in candidates:
             raise InputError(f"{where} has the same candidate twice")
@@ -229,16 +231,16 @@ def sampled_sets(protocol: Protocol) -> dict[str, Scenarios]:
     """Sampled sets by name; none of their runs is one of training or validation."""
     # What is listed for other ends may be sampled again: else a list could strike runs from a set.
     known = [*protocol.sets["training"], *protocol.sets["validation"]]
-    found: dict[str, Scenarios] = {}
+    sets: dict[str, Scenarios] = {}
     for number, name in enumerate(DRAWN):
         if draw := getattr(protocol.definition, name):
             seeds = protocol.seed, protocol.definition.version, number
             try:
-                found[name] = sampled_runs(protocol.model, draw, seeds, known)
+                sets[name] = sampled_runs(protocol.model, draw, seeds, known)
             except InputError as error:
                 raise FileError(f"{protocol.path}: {error}") from None
-            known += found[name]
-    return found
+            known += sets[name]
+    return sets
 
 
 def sampled_runs(
@@ -251,16 +253,17 @@ def sampled_runs(
     # Of the generator only `random` is used: NumPy may change how the other functions sample.
     generator = np.random.Generator(np.random.PCG64(seeds))
     shares = np.cumsum([box.share for box in draw.boxes])
-    seen, found = {scenario.run_key for scenario in known}, list[Scenario]()
+    seen = {scenario.run_key for scenario in known}
+    runs: list[Scenario] = []
     for _ in range(TRIES * draw.runs):
-        place = generator.random() * shares[-1]
-        box = draw.boxes[int(np.searchsorted(shares, place, side="right"))]
+        share = generator.random() * shares[-1]
+        box = draw.boxes[int(np.searchsorted(shares, share, side="right"))]
         scenario = _sampled_run(model, box, generator.random)
         if scenario.run_key not in seen:
             seen.add(scenario.run_key)
-            found.append(scenario)
-        if len(found) == draw.runs:
-            return tuple(found)
+            runs.append(scenario)
+        if len(runs) == draw.runs:
+            return tuple(runs)
     raise InputError(f"the boxes hold fewer than {draw.runs} different runs")
 
 
