@@ -18,7 +18,7 @@ from vehiclemor.reduction.methods import pod, slow_manifold
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
-from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, known_inputs
+from vehiclemor.study.evaluate import cached_fit, evaluate, fresh_fit, known_inputs
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Scenario, speed_of
@@ -44,7 +44,7 @@ def of_runs(model, method, training, tests, **settings):
 @pytest.fixture(autouse=True)
 def _nothing_kept():
     """What an earlier test has fitted or solved is not used again."""
-    evaluation.kept_reference.cache_clear()
+    evaluation.cached_reference.cache_clear()
     evaluation._KEPT.clear()
 
 
@@ -200,8 +200,8 @@ def guarded(terms):
 
 
 def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(vehicle, fits):
-    alone = kept_fit(vehicle, experiment(vehicle, "slow_manifold", terms=2, steps=0))
-    both = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
+    alone = cached_fit(vehicle, experiment(vehicle, "slow_manifold", terms=2, steps=0))
+    both = cached_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
     assert len(fits) == 1
     assert both.fast.tolerance == 5e-3
     assert both.fast.coefficients is alone.coefficients
@@ -210,7 +210,7 @@ def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(veh
     anew = fresh_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
     assert anew.fast.coefficients is not alone.coefficients
     np.testing.assert_array_equal(anew.fast.coefficients, alone.coefficients)
-    failed = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(FAILING)))
+    failed = cached_fit(vehicle, experiment(vehicle, "guarded", **guarded(FAILING)))
     assert failed == Failure("diverged", "no fit")
 
 
@@ -224,7 +224,7 @@ def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
     broken = replace(method, fit=fit)
     monkeypatch.setattr("vehiclemor.study.evaluate.component", lambda *_: broken)
     wanted = experiment(vehicle, "slow_manifold", terms=1, steps=0)
-    found = [kept_fit(vehicle, wanted).status for _ in range(4)]
+    found = [cached_fit(vehicle, wanted).status for _ in range(4)]
     assert found == ["error", "error", "diverged", "diverged"]
     assert len(raised) == 3
 

@@ -25,7 +25,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.simulation.structures.model import StructuralModel
 from vehiclemor.study import scenario as of_run
-from vehiclemor.study.evaluate import evaluate, kept_reference, model_of
+from vehiclemor.study.evaluate import cached_reference, evaluate, model_of
 from vehiclemor.study.plans.choice import reasons
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names, sampled_sets
 from vehiclemor.study.plans.protocol_run import second_runs
@@ -146,9 +146,10 @@ def _runs(model: Model, scenarios: Sequence[Scenario], work: str) -> xr.Dataset:
     for quantity, history in zip(quantities, np.concatenate(blocks).T.copy(), strict=True):
         meaning = {"long_name": quantity.long_name, "units": quantity.unit}
         columns[quantity.name] = "sample", history, meaning, {"zlib": True}
+    labels = [run.label for run in scenarios]
     known: dict[str, object] = {
         "row_size": [len(block) for block in blocks],
-        "label": np.array([run.label for run in scenarios], object),
+        "label": np.array(labels, object),
     }
     if states:
         known["initial_state"] = [
@@ -173,7 +174,7 @@ def _runs(model: Model, scenarios: Sequence[Scenario], work: str) -> xr.Dataset:
 
 def _samples(model: Model, scenario: Scenario, width: int) -> np.ndarray:
     """Histories (samples, width); not a number where the full order has no solution."""
-    run = attempt(partial(kept_reference, model, scenario))
+    run = attempt(partial(cached_reference, model, scenario))
     if isinstance(run, Failure):
         times = scenario.maneuver.times
         return np.column_stack((times, np.full((len(times), width - 1), np.nan)))

@@ -158,12 +158,16 @@ def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
     measured: dict[str, object] = {
         "largest_output": max_abs(outputs[:early]),
         "smallest_output": outputs[landed:].min(axis=0),
-        **{name: getattr(run, name) for name in ("seconds", "status", "message", "remark")},
-        **{name: run.counts.get(name, 0) for name in model.counts},
+        "seconds": run.seconds,
+        "status": run.status,
+        "message": run.message,
+        "remark": run.remark,
         "trust_indicator": trust.indicator if trust else np.nan,
         "trusted_until": trust.until if trust else np.inf,
         "warned": run.status == "untrusted" or bool(run.finished and trust and trust.reason),
     }
+    for name in model.counts:
+        measured[name] = run.counts.get(name, 0)
     if full is not None:
         error = outputs - full.outputs
         measured |= {

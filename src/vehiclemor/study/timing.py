@@ -35,7 +35,7 @@ from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread, timed
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.study.evaluate import evaluate, for_run, fresh_fit, kept_fit, model_of
+from vehiclemor.study.evaluate import cached_fit, evaluate, for_run, fresh_fit, model_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.result import variables
 from vehiclemor.study.scenario import model_of_run, start_of
@@ -67,10 +67,9 @@ def timed_starts(experiments: Mapping[str, Mapping[str, Experiment]], path: Path
         parts = [timed_cases(cases).assign_coords(start=s) for s, cases in experiments.items()]
         return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
 
-    keys = {
-        start: {case: experiment.key for case, experiment in cases.items()}
-        for start, cases in experiments.items()
-    }
+    keys: dict[str, dict[str, str]] = {}
+    for start, cases in experiments.items():
+        keys[start] = {case: experiment.key for case, experiment in cases.items()}
     return stored_timing(path, [keys, CASE_ROUNDS], every_start)
 
 
@@ -169,7 +168,9 @@ def _rounds(
     tell(work, 0, rounds[0] + 1)
     fits = [_warm_fit(model, e, bool(w.any())) for e, w in zip(experiments, wanted, strict=True)]
     models = [model_of_run(model, scenario) for scenario in scenarios]
-    for_test = [[for_run(reduced, changed) for changed in models] for reduced, _ in fits]
+    for_test: list[list[Any]] = []
+    for reduced, _ in fits:
+        for_test.append([for_run(reduced, changed) for changed in models])
     seconds = np.full((rounds[0] + 1, *shape, len(Seconds._fields)), np.nan)
     for turn in range(rounds[0] + 1):
         for number, (maneuver, start) in enumerate(tests):
@@ -251,7 +252,7 @@ def _warm_fit(
     model: Model, experiment: Experiment, needed: bool
 ) -> tuple[FittedModel | None, float]:
     """A fitted model, and the median seconds of fits with their machine code loaded."""
-    fitted = kept_fit(model, experiment)
+    fitted = cached_fit(model, experiment)
     if isinstance(fitted, Failure):
         return None, np.nan
     if not needed or fitted.offline.seconds > LONG_FIT:

@@ -198,8 +198,8 @@ def _corners(model: Model, box: Box) -> list[Scenario]:
     """Scenarios of the corners of a box, and one of every start, end of members and parameters."""
     starts, speeds = box.start or list(model.starts[:1]), box.speed or [None]
     factors = list(itertools.product(box.frequency, box.amplitude))
-    ends = [{name: limits[end] for name, limits in box.parameters.items()} for end in (0, 1)]
-    low, high = (overrides(table) for table in ends)
+    low = overrides({name: limits[0] for name, limits in box.parameters.items()})
+    high = overrides({name: limits[1] for name, limits in box.parameters.items()})
     members = [f"{box.maneuver}:{number}" for number in box.members or ()] or [box.maneuver]
     corners = itertools.product(members[:1], factors, starts[:1], speeds, [low])
     others = itertools.product(members[:1], factors[:1], starts[1:], speeds[:1], [low])

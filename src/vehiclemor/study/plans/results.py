@@ -163,21 +163,12 @@ def protocol_dataset(
     dataset = dataset.merge(parts[0][fixed])
     # How the files store text holds for the longest words in each of them only.
     dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
-    run_keys: list[str] = []
-    for index in range(len(rows)):
+    per_row: dict[str, list[Any]] = {"offline_seconds": timed["offline_seconds"].values.tolist()}
+    for index, row in enumerate(rows):
         keys = {name: datasets[index].attrs["cell"] for name, datasets in results.items()}
-        run_keys.append(json.dumps(keys))
-    per_row: dict[str, list[Any]] = {
-        "role": [row.entry.role for row in rows],
-        "series": [row.entry.label for row in rows],
-        "winner": [row.winner for row in rows],
-        "method": [row.entry.method for row in rows],
-        "settings": [json.dumps(row.settings, sort_keys=True) for row in rows],
-        "cell_keys": run_keys,
-        "validation": [_validation(row) for row in rows],
-        "validation_score": [row.result.score for row in rows],
-    }
-    per_row["offline_seconds"] = timed["offline_seconds"].values.tolist()
+        record = _record(row) | {"cell_keys": json.dumps(keys)}
+        for name, value in record.items():
+            per_row.setdefault(name, []).append(value)
     dataset = dataset.assign(variables(per_row, "label")).set_coords("method")
     dataset = dataset.assign_coords(label=[row.label for row in rows])
     for name in ("label", "scenario"):
@@ -199,6 +190,19 @@ def protocol_dataset(
         evaluations=protocol.model.evaluations,
         test_set=_test_set(protocol, results),
     )
+
+
+def _record(row: Row) -> dict[str, Any]:
+    """What describes a row, by names of variables."""
+    return {
+        "role": row.entry.role,
+        "series": row.entry.label,
+        "winner": row.winner,
+        "method": row.entry.method,
+        "settings": json.dumps(row.settings, sort_keys=True),
+        "validation": _validation(row),
+        "validation_score": row.result.score,
+    }
 
 
 def _test_set(protocol: Protocol, results: Mapping[str, Sequence[xr.Dataset]]) -> str:
