@@ -1,8 +1,8 @@
-"""What a reduced model knows: how far a run goes in the ranges that it has been made for.
+"""What a reduced model knows: how far a run goes in its training ranges.
 
 All that can be exceeded is a range with a name: states or features along a run (`trust_of`), inputs
-as whole signals, initial speeds and durations (`InputRange`).  Each tells how much of it a run uses
-and since when it is beyond, and `trust_in` makes one trust of all.
+as signals, initial speeds and durations (`InputRange`).  Each range gives how much of it a run uses
+and since when it is beyond; `trust_in` combines them in one trust.
 """
 
 from __future__ import annotations
@@ -108,9 +108,9 @@ def bands_of(maneuver: Excitation) -> np.ndarray:
     power = np.abs(np.fft.rfft(mirrored, axis=0)) ** 2 * (2.0 / len(mirrored) ** 2)
     # The mean is no motion.
     hertz = np.fft.rfftfreq(len(mirrored), maneuver.duration / count)[1:]
-    whole = np.maximum(power[1:].sum(axis=0), NOTHING**2)
+    total = np.maximum(power[1:].sum(axis=0), NOTHING**2)
     inside = [(low < hertz) & (hertz <= high) for low, high in pairwise(BANDS)]
-    shares = [np.sqrt(power[1:][band].sum(axis=0) / whole) for band in inside]
+    shares = [np.sqrt(power[1:][band].sum(axis=0) / total) for band in inside]
     return np.vstack([np.abs(values).max(axis=0), shares])
 
 
@@ -119,7 +119,7 @@ class InputRange:
     """Inputs, initial speeds and durations of the training runs: a method's least claim."""
 
     # Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a structure
-    # these and shares of `BANDS` in their RMS values (6, inputs); of a dynamic model sizes of whole
+    # these and shares of `BANDS` in their RMS values (6, inputs); of a dynamic model sizes of
     # signals (3, inputs), see `Extent`.
     largest: np.ndarray
     # Middle of the initial speeds in m/s, and how far they lie from it.
@@ -164,19 +164,21 @@ class InputRange:
     def _extents(
         self, names: Sequence[str], maneuver: Excitation
     ) -> dict[str, tuple[float, float]]:
-        """How far whole inputs of a vehicle go, and since when (s) they are beyond."""
+        """How far the inputs of a vehicle go, and since when (s) they are beyond."""
         used = maneuver.extent.largest / self._sizes
         since = np.full(len(names), np.inf)
         if (used > 1.0).any():
             since = inputs_beyond(maneuver, self.largest)
-        found = {}
+        ranges = {}
         for name, (further, *quicker), time in zip(names, used.T, since, strict=True):
-            what = f"input {name}" + " above 2 Hz" * bool(further <= 1.0 < max(quicker))
-            found[what] = float(max(further, *quicker)), float(time)
-        return found
+            what = f"input {name}"
+            if further <= 1.0 < max(quicker):
+                what += " above 2 Hz"
+            ranges[what] = float(max(further, *quicker)), float(time)
+        return ranges
 
     def _bands(self, names: Sequence[str], maneuver: Excitation) -> dict[str, tuple[float, float]]:
-        """How far whole inputs of a structure go, in magnitude and in each band."""
+        """How far the inputs of a structure go, in magnitude and in each band."""
         used = bands_of(maneuver) / self._sizes
         words = ["", *(f", {low:g} to {high:g} Hz" for low, high in pairwise(BANDS))]
         labels = [f"input {name}{word}" for name in names for word in words]

@@ -92,7 +92,7 @@ def test_steering_of_the_protocol_is_within_what_is_known(name):
     plan = protocol.definition.drawn
     drawn_runs = sampled_runs(protocol.model, plan, (7, 1, 0), known)
     for scenario in (*protocol.sets["validation"], *drawn_runs):
-        assert reach.driven(scenario.maneuver)[0] <= 1.0
+        assert reach.input_use(scenario.maneuver)[0] <= 1.0
 
 
 def test_the_whole_signal_is_looked_at():

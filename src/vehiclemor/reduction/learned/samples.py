@@ -169,7 +169,7 @@ def _of_run(
             deviations, rates = found.coordinates, np.zeros_like(now)
         elif states.shape:
             shape, deviations = states.shape, states.of(found.states)
-            rates, motion = shape.motion(deviations[taken] + shape.reference, inputs[taken])
+            rates, motion = shape.rates(deviations[taken] + shape.reference, inputs[taken])
             motion = motion - [0.0, shape.speed, 0.0]
         else:
             deviations = states.of(found.states)

@@ -151,7 +151,7 @@ def by_pymor(name: str) -> Reductor:
             raise InputError(
                 f"rank is {settings.rank}; {shape.model.name} allows at most {most - 1}"
             )
-        outputs = shape.linearised.motion_a[[0, 2]] @ modes.right
+        outputs = shape.linearised.velocity_a[[0, 2]] @ modes.right
         full = LTIModel.from_matrices(modes.rates, modes.input_matrix[:, None], outputs)
         with log_levels({"pymor": "ERROR"}):
             projection = reductor(full)
@@ -181,8 +181,8 @@ def linear_vehicle(model: DynamicModel, settings: Any, reductor: Reductor) -> Re
     c = np.zeros((len(features.terms), k + 1 + PLANAR))
     c[odd[: k + 1], :k] = np.vstack([modes.rates.T, modes.input_matrix])
     for column, row in ((k + 1, 0), (k + 3, 2)):
-        c[odd, column] = decoding[odd] @ linear.motion_a[row]
-        c[odd[k:], column] += linear.motion_b[row]
+        c[odd, column] = decoding[odd] @ linear.velocity_a[row]
+        c[odd[k:], column] += linear.velocity_b[row]
     c[even, k + 2] = shape.speed, 1.0
     lateral_scale = error_scale(shape, modes, static_response)
     return ReducedVehicle(
@@ -205,7 +205,7 @@ def linear_vehicle(model: DynamicModel, settings: Any, reductor: Reductor) -> Re
 def error_scale(shape: VehicleShape, modes: SlowModes, static_response: np.ndarray) -> np.ndarray:
     """Magnitudes (k,) of lateral coordinates: a multiple of those in steady cornering."""
     steady = -np.linalg.solve(modes.rates, modes.input_matrix)
-    turn = shape.linearised.motion_a[0] @ (modes.right @ steady + static_response[:, 0])
+    turn = shape.linearised.velocity_a[0] @ (modes.right @ steady + static_response[:, 0])
     # At least a thousandth of the largest one, for coordinates that steady cornering leaves alone.
     sizes = np.maximum(np.abs(steady), 1e-3 * np.abs(steady).max())
     return MARGIN * CORNERING / shape.speed / abs(turn) * sizes
@@ -224,7 +224,7 @@ def single_track(
     shape = VehicleShape(model)
     linear, modes, inputs = shape.linearised, slow_modes(shape, np.inf), len(model.inputs)
     # States of the shape that are nearest to V and r; the others follow them and the steering.
-    planar = np.argmax(np.abs(linear.motion_a[[2, 0]]), axis=1)
+    planar = np.argmax(np.abs(linear.velocity_a[[2, 0]]), axis=1)
     others = np.setdiff1d(np.arange(len(linear.a)), planar)
     drive = np.column_stack([linear.a[np.ix_(others, planar)], linear.b[others, 0]])
     response = np.zeros((len(linear.a), 3))

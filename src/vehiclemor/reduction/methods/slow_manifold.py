@@ -49,8 +49,8 @@ from vehiclemor.reduction.vehicle.slow_features import (
     Names,
     SlowFeatures,
     even_candidates,
-    given_terms,
     odd_candidates,
+    required_terms,
     slow_features,
 )
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -153,12 +153,12 @@ def _fitted_on_rates(
     settings: SlowManifoldSettings,
 ) -> ReducedVehicle:
     """Equations fitted on the rates of the training runs; nothing is decoded yet."""
-    u, motion, k, n = samples.inputs, samples.motion, made.lateral, made.speed
+    u, motion, k, n = samples.inputs, samples.planar_velocity, made.lateral, made.speed
     z = modes.coordinates(samples.deviations, u)
     # Inputs are derivatives of the first one.
     rates = samples.rates @ modes.encoding.T - u[:, 1:] @ modes.input_shift[:, :-1].T
     lateral = np.column_stack([rates[:, :k], motion[:, 0], motion[:, 2]])
-    own, forward = modes.rates[k:, k:], shape.linearised.motion_a[1] @ modes.right[:, k:]
+    own, forward = modes.rates[k:, k:], shape.linearised.velocity_a[1] @ modes.right[:, k:]
     linear = np.column_stack([z[:, k:n] @ own.T, np.zeros(len(z)), z[:, k:n] @ forward + z[:, n]])
     symmetric = np.column_stack([rates[:, k:], motion[:, 1] - shape.speed]) - linear
 
@@ -169,7 +169,7 @@ def _fitted_on_rates(
         columns = made.columns(terms, z, u)
         return [terms[i] for i in forward_selection(columns, values, len(given), more)]
 
-    given, straight = given_terms(made)
+    given, straight = required_terms(made)
     others = even_candidates(made)
     odd = chosen(given, odd_candidates(made), rates[:, :k], settings.terms)
     even = [*straight, *chosen([], others, symmetric, settings.even_terms)]

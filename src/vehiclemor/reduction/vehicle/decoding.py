@@ -1,7 +1,7 @@
 """From reduced states to full ones in one compiled pass, with what tells how far a run goes.
 
 Ranges tell where a run is.  But errors of the heading grow with the time that a run stays there,
-those of the place with the way that it drives on with them; and what a start excites, beside the
+those of the position with the way that it drives on with them; and what a start excites, beside the
 slow motion, is known for the starts of the training alone.
 """
 
@@ -35,7 +35,7 @@ from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.simulation.workspaces import Run
 from vehiclemor.sizes import require, shaped
 
-# Part of a transient below which it needs no samples of its own.
+# Part of a transient below which it needs no further samples.
 NEGLIGIBLE = 1e-4
 # Modes are known by differences: a smaller part of a deviation than this excites none.
 ROUNDING = 1e-7
@@ -47,7 +47,7 @@ UNLIKE = 3.0
 FADED = 0.01
 # Decay (1/s) that is none.
 SLOWEST = 1e-6
-# What is told besides ranges, in the order of the loop.
+# Reasons besides ranges, in the order of the loop.
 REASONS = (
     "lateral motion lasts longer, or ended longer ago, than in training",
     "lateral motion begins earlier after such a start than in training",
@@ -80,9 +80,11 @@ class Transient:
         """Amplitudes (m,) that a deviation (n,) of a start's shape excites; empty if it is none."""
         if not len(self.rates):
             return self.rates
-        found = self.left @ deviation
+        amplitudes = self.left @ deviation
         least = ROUNDING * (abs(self.left) @ abs(deviation))
-        return found[: None if (abs(found) > least).any() else 0]
+        if (abs(amplitudes) > least).any():
+            return amplitudes
+        return amplitudes[:0]
 
 
 NO_TRANSIENT = Transient(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)))
@@ -106,8 +108,8 @@ class TrainingReach:
     # Directions (m, n), in parts of `left`, in which known starts leave more, and how far.
     starts: np.ndarray
     begun: np.ndarray
-    # Sizes (3, inputs) that the inputs may have between output times too, see `Extent`; nothing is
-    # told of them where it is empty.
+    # Sizes (3, inputs) that the inputs may have between output times too, see `Extent`; empty
+    # where nothing is known of them.
     inputs: np.ndarray = field(default_factory=lambda: np.zeros((3, 0)))
 
     def check_sizes(self) -> None:
@@ -118,14 +120,14 @@ class TrainingReach:
         shaped("starts", (self.left, n), (self.starts, starts, n), (self.begun, starts))
         shaped("reach", (self.inputs, 3, *self.inputs.shape[1:2]))
 
-    def driven(self, maneuver: Excitation) -> tuple[float, float]:
+    def input_use(self, maneuver: Excitation) -> tuple[float, float]:
         """How far a maneuver's inputs go, 1 at the edge, and when (s) they pass it."""
         if not self.inputs.size:
             return 0.0, np.inf
         used = float(np.maximum.reduce(maneuver.extent.largest / self.inputs, axis=None))
         return used, np.inf if used <= 1.0 else inputs_beyond(maneuver, self.inputs).min()
 
-    def settled(self, excited: np.ndarray) -> float:
+    def decay_time(self, excited: np.ndarray) -> float:
         """Time in s from which on a start's transient, as `Decoding.excited` gives it, is known."""
         rates, amplitudes = excited
         if not len(rates) or not len(self.decaying):
@@ -133,14 +135,14 @@ class TrainingReach:
         sizes = np.hypot(*amplitudes.T)
         larger = np.maximum(sizes / self.decaying, 1.0)
         # What does not decay never settles.
-        settled = float((np.log(larger) / np.maximum(-rates[:, 0], SLOWEST)).max())
+        decayed = float((np.log(larger) / np.maximum(-rates[:, 0], SLOWEST)).max())
         if not self.faded:
-            return settled
+            return decayed
         # Slower motion of the start is in the reduced states; it is as large as that of the modes.
         larger = max(float((sizes / self.steered).max()) / FADED, 1.0)
-        return max(settled, self.faded * np.log(larger) / -np.log(FADED))
+        return max(decayed, self.faded * np.log(larger) / -np.log(FADED))
 
-    def unlike(self, remainder: np.ndarray) -> float:
+    def start_distance(self, remainder: np.ndarray) -> float:
         """How much a start leaves (n,), beside what known starts do; 1 is the edge."""
         if not len(self.left):
             return 0.0
@@ -193,7 +195,7 @@ class Decoding(ShortRepr):
     reach: TrainingReach = NOTHING_KNOWN
 
     @cached_property
-    def _made(self) -> dict[int, tuple[Kernels, np.ndarray]]:
+    def _by_modes(self) -> dict[int, tuple[Kernels, np.ndarray]]:
         return {}
 
     def kernel(self, modes: int) -> tuple[Kernel, np.ndarray]:
@@ -209,22 +211,20 @@ class Decoding(ShortRepr):
 
     def _kernels(self, modes: int) -> tuple[Kernels, np.ndarray]:
         """The kernel and its constants."""
-        if modes not in self._made:
+        if modes not in self._by_modes:
             (kernel, constants), features = self.kernel(modes), self.features
-            given = features.states + PLANAR, features.inputs + 2 * modes, len(constants)
-            kernel.check(*given)
-            self._made[modes] = Kernels([kernel]), constants
-        return self._made[modes]
+            kernel.check(features.states + PLANAR, features.inputs + 2 * modes, len(constants))
+            self._by_modes[modes] = Kernels([kernel]), constants
+        return self._by_modes[modes]
 
     def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of full states by reduced ones and inputs, without a transient."""
         kernels, constants = self._kernels(0)
         size, arrays = self.layout.size, (state, inputs, constants)
-        by_state, by_inputs = (
-            partial(kernels, "full_state", arrays, size + len(self.features.watched), place)[:size]
-            for place in (STATE, INPUTS)
-        )
-        return by_state, by_inputs
+        rows = size + len(self.features.watched)
+        by_state = partial(kernels, "full_state", arrays, rows, STATE)
+        by_inputs = partial(kernels, "full_state", arrays, rows, INPUTS)
+        return by_state[:size], by_inputs[:size]
 
     def excited(self, deviation: np.ndarray) -> np.ndarray:
         """Rates and amplitudes (2, m, 2) of the transient's modes, each with its two parts.
@@ -232,30 +232,30 @@ class Decoding(ShortRepr):
         The deviation (n,) of the start's shape may excite none, as straight running at any speed.
         """
         amplitudes = self.transient.amplitudes(deviation)
-        found = np.array([self.transient.rates[: len(amplitudes)], amplitudes], dtype=complex)
-        return np.stack([np.real(found), np.imag(found)], axis=2)
+        modes = np.array([self.transient.rates[: len(amplitudes)], amplitudes], dtype=complex)
+        return np.stack([np.real(modes), np.imag(modes)], axis=2)
 
     def states(
         self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, excited: np.ndarray
     ) -> tuple[np.ndarray, Trust | None]:
-        """Full states, and behind them what is watched (samples, 2 n + watched); what this tells.
+        """Full states and, behind them, what is watched (samples, 2 n + watched); the trust.
 
         The path has reduced states (samples, states + 3); `excited` is what `excited` gives.
         """
         recorded = times, path, inputs
         if len(times) > 1 or excited.shape[1]:
-            return self._lifted(self.space(recorded, excited, len(times)), len(times))
+            return self._decode(self.space(recorded, excited, len(times)), len(times))
         # One sample and then another, as in a closed loop.
         try:
-            held, own = self._single.pop()
+            space, sample = self._single.pop()
         except IndexError:
-            own = tuple(array.copy() for array in recorded)
-            held = self.space(own, excited, 1)
-        for array, given in zip(own, recorded, strict=True):
-            array[:] = given
-        states, trust = self._lifted(held, 1)
+            sample = tuple(array.copy() for array in recorded)
+            space = self.space(sample, excited, 1)
+        for array, values in zip(sample, recorded, strict=True):
+            array[:] = values
+        states, trust = self._decode(space, 1)
         states = states.copy()
-        self._single.append((held, own))
+        self._single.append((space, sample))
         return states, trust
 
     @cached_property
@@ -265,18 +265,18 @@ class Decoding(ShortRepr):
     def of_run(
         self, run: Run, inputs: np.ndarray, excited: np.ndarray, start: Sequence[float]
     ) -> tuple[np.ndarray, Trust | None]:
-        """The same of a run and its inputs at the samples; of its rows only `run.rows` count.
+        """Full states and trust of a run, of whose rows only `run.rows` count.
 
-        Of `start` see `decoding_loops.Known`.
+        `inputs` are those at the samples; of `start` see `decoding_loops.Known`.
         """
-        held = run.kept.get("decoded")
-        if held is None or held.excited.shape != excited.shape:
+        space = run.kept.get("decoded")
+        if space is None or space.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
-            held = self.space((times, run.whole, inputs), excited.copy(), run.rows)
-            run.kept["decoded"] = held
-        held.excited[:] = excited
-        held.start[:] = start
-        return self._lifted(held, run.rows)
+            space = self.space((times, run.whole, inputs), excited.copy(), run.rows)
+            run.kept["decoded"] = space
+        space.excited[:] = excited
+        space.start[:] = start
+        return self._decode(space, run.rows)
 
     def space(
         self, recorded: tuple[np.ndarray, ...], excited: np.ndarray, rows: int
@@ -294,8 +294,8 @@ class Decoding(ShortRepr):
         lanes = LANES if rows >= LANES else 1
         address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
         states = np.empty((len(times), self.layout.size + len(watched)))
-        told = len(watched) + BESIDES if watched else 0
-        largest, first = np.empty(told), np.empty(told, dtype=np.int64)
+        reasons = len(watched) + BESIDES if watched else 0
+        largest, first = np.empty(reasons), np.empty(reasons, dtype=np.int64)
         start = np.array([0.0, 0.0, 0.0, 0.0, np.inf])
         lasted = self.reach.lasted
         known = Known(times, lasted, np.empty_like(lasted), start, self.reach.sideways)
@@ -303,28 +303,25 @@ class Decoding(ShortRepr):
             path, inputs, address, constants, states, known, largest, first
         )
         calls.append((decoded, ("path", "inputs", "states", "known.times")))
-        counted = tuple(
-            (call, tuple(call.address(name) + 1 for name in names)) for call, names in calls
-        )
-        return DecodingSpace(excited, times, states, largest, first, start, counted)
+        counted = []
+        for call, names in calls:
+            counted.append((call, tuple(call.address(name) + 1 for name in names)))
+        return DecodingSpace(excited, times, states, largest, first, start, tuple(counted))
 
-    def _lifted(self, space: DecodingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
-        """What `states` gives of the arrays; no trust where nothing tells how far a run goes."""
-        for call, places in space.calls:
-            for place in places:
-                call.words[place] = rows
+    def _decode(self, space: DecodingSpace, rows: int) -> tuple[np.ndarray, Trust | None]:
+        """Run the loops on so many rows; no trust where nothing is watched."""
+        for call, row_counts in space.calls:
+            for index in row_counts:
+                call.words[index] = rows
             call()
-        largest, first, watched = (
-            space.largest.tolist(),
-            space.first.tolist(),
-            self.features.watched,
-        )
+        largest, first = space.largest.tolist(), space.first.tolist()
+        watched = self.features.watched
         if not largest:
             return space.states, None
         left = min(first)
         if left >= rows:
             return space.states, Trust(max(largest))
-        # Of what is left at once the start tells most.
+        # Of ranges that are left at once the start's says most.
         column = len(first) - 1 - first[::-1].index(left)
         if column < len(watched):
             reason = f"{watched[column][1]} leaves its training range"

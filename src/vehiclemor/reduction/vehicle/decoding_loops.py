@@ -12,7 +12,7 @@ NOTHING = 1e-14
 # Parts of a range in which time is counted, and what of it is hardly moving, and not at all.
 PARTS, MOVING, STILL = 8, 0.02, 1e-4
 LEVELS = PARTS + 1
-# What is told besides, and a time (s) that is hardly after the start.
+# Number of reasons besides ranges, and a time (s) that is hardly after the start.
 BESIDES, SOON = 5, 1e-3
 
 
@@ -28,7 +28,7 @@ def with_decay(
 
     Rates and amplitudes a have a row of these two parts for each mode; factors are scratch space.
     """
-    m, modes, step, whole, left = inputs.shape[1], len(rates), math.nan, 0.0, 1.0
+    m, modes, step, largest, latest = inputs.shape[1], len(rates), math.nan, 0.0, 1.0
     for sample in range(len(times)):
         for j in range(m):
             result[sample, j] = inputs[sample, j]
@@ -43,13 +43,13 @@ def with_decay(
             a, b = amplitudes[k, 0], amplitudes[k, 1]
             if sample:
                 a, b = result[sample - 1, m + 2 * k], result[sample - 1, m + 2 * k + 1]
-            if left > NOTHING * whole:
+            if latest > NOTHING * largest:
                 a, b = factors[k, 0] * a - factors[k, 1] * b, factors[k, 0] * b + factors[k, 1] * a
             else:
                 a, b = 0.0, 0.0
             result[sample, m + 2 * k], result[sample, m + 2 * k + 1] = a, b
             reached = max(reached, abs(a), abs(b))
-        whole, left = max(whole, reached), reached
+        largest, latest = max(largest, reached), reached
     return 0
 
 
@@ -97,11 +97,11 @@ def decoded(
                     first[k] = sample
                 largest[k] = size
     if watched and len(known.lasted):
-        tell(states, column, known, largest[watched:], first[watched:])
+        exceed(states, column, known, largest[watched:], first[watched:])
     return 0
 
 
-def tell(states, column, known, largest, first):
+def exceed(states, column, known, largest, first):
     """How far a run goes in durations and its start in known ones, and the first samples beyond."""
     times, columns = known.times, len(known.spent) // 2
     longest, moving = durations(times, states, column, known.lasted, known.spent)
@@ -119,7 +119,7 @@ def tell(states, column, known, largest, first):
     first[3] = 0 if largest[3] > 1.0 else first[3]
     largest[4] = known.start[3]
     if largest[4] > 1.0:
-        # What passes between two samples is told of at the second.
+        # What passes between two samples counts from the second on.
         first[4] = len(times) - 1
         for sample in range(len(times)):
             if times[sample] >= known.start[4]:

@@ -35,7 +35,7 @@ from vehiclemor.simulation.evaluation import at_samples
 from vehiclemor.simulation.system import System
 from vehiclemor.sizes import apart, require
 
-# After the reduced coordinates z come heading and place.
+# After the reduced coordinates z come heading and position.
 PLANAR = 3
 # Reduced coordinates that a file may have; the models of this package have at most 9.
 MOST_STATES = 100
@@ -58,8 +58,8 @@ class Features:
     terms: tuple[int, ...]  # Number of the operation that gives each feature.
     # (numbers of features, columns of C) of each block of C that is not zero; all if empty.
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
-    # (operation, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves what
-    # the features were made for.
+    # (operation, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
+    # the training range.
     watched: tuple[tuple[int, str], ...] = ()
     # How many of these, the first ones, move when the vehicle is steered: how long they do counts
     # too.
@@ -82,8 +82,8 @@ def needed_parameters(features: Features) -> int:
     states, inputs, columns = features.states, features.inputs, features.states + PLANAR
     require(0 < states <= MOST_STATES and 0 <= inputs <= MOST_STATES, "states")
     operations, reach = features.operations, {"_x": 0, "_u": 0, "_constants": 0}
-    for array, place in (op.detail for op in operations if op.kind == "entry"):
-        reach[array] = max(reach[array], place + 1)
+    for array, index in (op.detail for op in operations if op.kind == "entry"):
+        reach[array] = max(reach[array], index + 1)
     require(reach["_x"] <= states and reach["_u"] <= inputs, "features")
     # A comparison is no number, and no number is a comparison.
     tests = [op.arguments[0] for op in operations if op.kind == "select"]
@@ -125,16 +125,19 @@ class FeatureListing(Listing):
     ) -> Features:
         """Features, each the product of its factors, and no operation that none needs."""
         numbers = [product(term).number for term in terms]
-        told = [(product(term).number, what) for term, what in watched]
-        operations, places = pruned(self.operations, [*numbers, *(n for n, _ in told)])
+        watches = [(product(term).number, what) for term, what in watched]
+        numbers_watched = [number for number, _ in watches]
+        operations, renumbered = pruned(self.operations, [*numbers, *numbers_watched])
+        named = [renumbered[n] for n in sorted(self.named) if n in renumbered]
+        terms = [renumbered[n] for n in numbers]
         return Features(
             states=len(self.z),
             inputs=len(self.u),
             operations=tuple(operations),
-            named=tuple(places[n] for n in sorted(self.named) if n in places),
-            terms=tuple(places[n] for n in numbers),
+            named=tuple(named),
+            terms=tuple(terms),
             groups=groups,
-            watched=tuple((places[n], what) for n, what in told),
+            watched=tuple((renumbered[n], what) for n, what in watches),
             lateral=lateral,
         )
 
@@ -145,10 +148,10 @@ def product(factors: Term) -> Value:
 
 
 class Layout(NamedTuple):
-    """Where the shape of a vehicle is kept in its states, place and heading, pairs that turn."""
+    """Indices in a vehicle's states: of its shape, of position and heading, of pairs that turn."""
 
     size: int
-    kept: Sequence[int]
+    shape: Sequence[int]
     planar: Sequence[int]
     pairs: Sequence[tuple[int, int]]
 
@@ -167,12 +170,14 @@ def rates_kernel(features: Features, parameters: int) -> Kernel:
     listing, values = _listed(features)
     sums: dict[int, list[Value]] = {}
     for terms, columns in features.blocks:
-        found = listing.sums("_constants", first, len(columns), [values[j] for j in terms])
+        parts = listing.sums("_constants", first, len(columns), [values[j] for j in terms])
         first += len(terms) * padded(len(columns))
-        for i, part in zip(columns, found, strict=True):
+        for i, part in zip(columns, parts, strict=True):
             sums.setdefault(i, []).append(part)
-    nothing = [listing.number(0.0)]
-    totals = [sum(rest, one) for one, *rest in (sums.get(i, nothing) for i in range(k + PLANAR))]
+    nothing, totals = [listing.number(0.0)], []
+    for i in range(k + PLANAR):
+        one, *others = sums.get(i, nothing)
+        totals.append(sum(others, one))
     forward, sideward = map(listing.let, totals[k + 1 :])
     sine, cosine = listing.parts(listing.new("sincos", listing.entry("_x", k)), 2)
     for i in range(k + 1):
@@ -192,19 +197,19 @@ def decoding_kernel(features: Features, layout: Layout, parameters: int, modes: 
     listing, factors = _listed(features)
     factors.append(listing.number(1.0))
     factors += [listing.entry("_u", first + i) for i in range(2 * modes)]
-    found = listing.sums("_constants", parameters, len(layout.kept), factors)
-    shape = dict(zip(layout.kept, found, strict=True))
+    values = listing.sums("_constants", parameters, len(layout.shape), factors)
+    shape = dict(zip(layout.shape, values, strict=True))
     sine, cosine = listing.parts(listing.new("sincos", listing.entry("_x", k)), 2)
     results: dict[int, Value | float] = dict.fromkeys(range(layout.size), 0.0) | shape
-    for place, i in zip(layout.planar, (k + 1, k + 2, k), strict=True):
-        results[place] = listing.entry("_x", i)
+    for index, i in zip(layout.planar, (k + 1, k + 2, k), strict=True):
+        results[index] = listing.entry("_x", i)
     for a, b in layout.pairs:
         results[a] = cosine * shape[a] - sine * shape[b]
         results[b] = sine * shape[a] + cosine * shape[b]
     watched = (Value(listing, number) for number, _ in features.watched)
     results |= enumerate(watched, layout.size)
-    for place, value in results.items():
-        listing.store(place, value)
+    for index, value in results.items():
+        listing.store(index, value)
     return listing.kernel("full_state", ARGUMENTS)
 
 

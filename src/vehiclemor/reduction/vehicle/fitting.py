@@ -1,4 +1,4 @@
-"""What reduced vehicles learn: regression on features, whole runs, what training runs have shown.
+"""Fits of reduced vehicles: regression on features, on runs, and the reach of the training.
 
 A fit of rates leaves small errors that add up along a run: a heading that is off by 1e-4 rad is a
 lateral position that is off by 1 cm after 5 s.  So the coefficients are changed to bring the
@@ -38,7 +38,7 @@ from vehiclemor.simulation.trajectory import Trajectory
 DEPENDENT = 1e-8
 # The paper's bound on the RMS error of yaw in rad (section 3.1, 7.59e-5).
 YAW_BOUND = 7.6e-5
-# Errors that count as much as one of heading: place in m, part of a slow coordinate's range.
+# Errors that count as much as one of heading: position in m, part of a slow coordinate's range.
 PLACE, PART = 0.03, 0.02
 # The variational equations step over so many output times, runs are compared at every so many of
 # their steps.
@@ -46,7 +46,7 @@ STRIDE, COMPARED = 2, 4
 # Where the slow coordinates have come to rest, to this part of their range, steps are longer.
 REST, LONG_STRIDE = 3e-4, 25
 DIFFERENCE = 1e-6
-# Least sum of squares that a weight is made of.
+# Least sum of squares in a weight.
 NOTHING = 1e-12
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
@@ -62,7 +62,7 @@ SHORTEST = 0.1
 # Parts of the sizes of the training runs' steering that a run's may have: few of them are as quick
 # as the quickest; its derivatives are as in these.
 KNOWN = np.array([[0.95, 1.0, 1.0], [0.75, 1.0, 1.0], [0.75, 1.0, 1.0]])
-# Part of the steered motion's own amplitudes that a start's transient may have beside it.
+# Part of the steered motion's amplitudes that a start's transient may have beside it.
 BESIDE = 0.3
 # Histories of a trajectory.
 PATHS = ("times", "inputs", "coordinates", "speeds", "outputs")
@@ -84,14 +84,14 @@ def ridge_fit(columns: np.ndarray, values: np.ndarray, weight: float) -> np.ndar
 
 def largest(values: np.ndarray) -> np.ndarray:
     """Largest magnitude in each column (samples, n) -> (n,); 1 where a column is zero."""
-    found = np.abs(values).max(axis=0)
-    return np.where(found > 0.0, found, 1.0)
+    magnitudes = np.abs(values).max(axis=0)
+    return np.where(magnitudes > 0.0, magnitudes, 1.0)
 
 
 def sizes(values: np.ndarray) -> np.ndarray:
     """Root mean square of each column (samples, n) -> (n,); 1 where a column is zero."""
-    found = np.sqrt(np.mean(values**2, axis=0))
-    return np.where(found > 0.0, found, 1.0)
+    mean = np.sqrt(np.mean(values**2, axis=0))
+    return np.where(mean > 0.0, mean, 1.0)
 
 
 def forward_selection(columns: np.ndarray, values: np.ndarray, given: int, more: int) -> list[int]:
@@ -159,7 +159,7 @@ def targets_of(
     k, result = reduced.features.states - 1, []
     paths = [reduced.encoded_path(true.states, true.inputs) for true in runs]
     ranges = np.max([np.abs(states[:, :k]).max(axis=0) for states in paths], axis=0)
-    # The speed counts by the place.
+    # The speed counts by the position.
     weights = np.array([0.0, 1.0 / heading, 1.0 / PLACE, 1.0 / PLACE])
     scale = np.concatenate([1.0 / (PART * ranges), weights])
     for run, true, states in zip(training, runs, paths, strict=True):
@@ -173,18 +173,24 @@ def targets_of(
     return result
 
 
+def free_entries(free: Free) -> tuple[np.ndarray, np.ndarray]:
+    """Features and columns of the coefficients that may change, one entry for each."""
+    terms = np.concatenate([features for features, _ in free])
+    counts = [len(features) for features, _ in free]
+    return terms, np.repeat([column for _, column in free], counts)
+
+
 def improved(
     reduced: ReducedVehicle, targets: Sequence[Target], free: Free, steps: int, power: float = 2.0
 ) -> ReducedVehicle:
     """The reduced vehicle after so many damped Gauss-Newton steps of its free coefficients.
 
-    The sum that is made small is of so high a power of the runs' errors.  With 1 the worst runs
+    The sum of so high a power of the runs' errors is minimised.  With 1 the worst runs
     count no more than the others (iteratively reweighted least squares): of use from a first guess
     on, where the errors of some are too large to say much.
     """
     paths, error = _compared(reduced, targets, power)
-    terms = np.concatenate([some for some, _ in free])
-    targeted = np.repeat([column for _, column in free], [len(some) for some, _ in free])
+    terms, targeted = free_entries(free)
     change, moved, damping = np.zeros(len(terms)), reduced, DAMPING
     for _ in range(steps):
         if not np.isfinite(error):
@@ -280,8 +286,8 @@ def _sensitivities(
     inverse = np.linalg.inv(np.eye(dim) - half * jacobian[1:])
     advance = inverse @ (np.eye(dim) + half * jacobian[:-1])
     now, before = half * inverse @ turns[1:], half * inverse @ turns[:-1]
-    targets = np.repeat([column for _, column in free], [len(some) for some, _ in free])
-    driven = columns[:samples, None, np.concatenate([some for some, _ in free])]
+    terms, targets = free_entries(free)
+    driven = columns[:samples, None, terms]
     forcing = np.take(now, targets, axis=2) * driven[1:]
     forcing += np.take(before, targets, axis=2) * driven[:-1]
     result = np.zeros((samples, dim, len(targets)))
@@ -337,10 +343,10 @@ def training_reach(
     shape, features, transient = reduced.shape, reduced.features, reduced.transient
     lateral = features.lateral
     lasted, sideways, decaying, left, starts = [], [MOVING], [], [], []
-    maneuvers = [given.maneuver for given in training]
+    maneuvers = [known.maneuver for known in training]
     faded, amplitudes = [], []
-    for given, run in zip(training, runs, strict=True):
-        path = reduced.path(given.maneuver, given.start)
+    for known, run in zip(training, runs, strict=True):
+        path = reduced.path(known.maneuver, known.start)
         if path is None:
             return NOTHING_KNOWN
         sizes = reduced.decoder.states(run.times, path, run.inputs, NOTHING_EXCITED)[0]

@@ -15,7 +15,7 @@ from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 # Modes that steering moves by less than this (relative) are symmetric: they don't steer.
 CONTROLLED = 1e-6
-# Of all modes those that steering moves by less than this (relative) are none of its own.
+# Of all modes those that steering moves by less than this (relative) are not lateral.
 MOVED = 1e-8
 # Eigenvalues (1/s) nearer to each other belong to the cluster of stabilised constraints.
 APART = 1e-2
@@ -83,7 +83,7 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
     b = w @ linear.b
     shift, driven = without_derivatives(rates, b)
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
-    scale = linear.motion_a[1] @ right[:, still].real
+    scale = linear.velocity_a[1] @ right[:, still].real
     double = np.where(np.imag(values[quiet]) > 0.0, 2.0, 1.0)
     return SlowModes(
         count,

@@ -1,4 +1,4 @@
-"""Reduced vehicles: few coordinates of the shape, heading and place as quadratures, compiled."""
+"""Reduced vehicles: few coordinates of the shape, heading and position as quadratures."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -43,15 +43,15 @@ NO_COST = OfflineCost()
 class KnownStart(NamedTuple):
     """A full state as a start, its reduced state, what of the transient it excites, until when (s).
 
-    Of it is `told` when (s) this is as in training runs; how much else it leaves, 1 at the edge of
-    what they leave; 1.
+    `start_trust` has the time (s) from which on this is as in training runs; how far the start is
+    from theirs, 1 at the edge; 1.
     """
 
     state: np.ndarray
     encoded: np.ndarray
     excited: np.ndarray
     until: float
-    told: tuple[float, float, float]
+    start_trust: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +85,15 @@ class ReducedVehicle(ReducedSystem):
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if kernels would read or write beyond these arrays."""
-        own, decoded, reach = self.features, self.decoded_features or self.features, self.reach
-        k, n, inputs = own.states, len(self.shape.kept), len(self.model.inputs)
-        require((own.inputs, decoded.inputs, decoded.states) == (inputs, inputs, k), "features")
+        features, reach = self.features, self.reach
+        decoded = self.decoded_features or features
+        k, n, inputs = features.states, len(self.shape.indices), len(self.model.inputs)
+        require((features.inputs, decoded.inputs) == (inputs, inputs), "features")
+        require(decoded.states == k, "features")
         shaped("parameters", (self.parameters, len(self.parameters)))
-        needed = max(needed_parameters(own), needed_parameters(decoded))
+        needed = max(needed_parameters(features), needed_parameters(decoded))
         require(len(self.parameters) >= needed, "parameters")
-        shaped("coefficients", (self.coefficients, len(own.terms), k + PLANAR))
+        shaped("coefficients", (self.coefficients, len(features.terms), k + PLANAR))
         shaped("decoding", (self.decoding, len(decoded.terms), n))
         shaped("encoding", (self.encoding, k, n), (self.feedthrough, k, inputs))
         shaped("error_scale", (self.error_scale, k + PLANAR))
@@ -99,19 +101,19 @@ class ReducedVehicle(ReducedSystem):
         require(not modes or self.transient.left.shape[1:] == (n,), "transient")
         require(modes <= n, "modes")
         require(reach.inputs.shape[1] in (0, inputs), "reach")
-        require(0 <= own.lateral == decoded.lateral <= len(decoded.watched), "lateral")
+        require(0 <= features.lateral == decoded.lateral <= len(decoded.watched), "lateral")
         if len(reach.lasted):
             known = len(reach.lasted), len(reach.decaying), len(reach.left)
             require(known == (2 * decoded.lateral, modes, n), "lasted")
 
     @property
     def order(self) -> int:
-        """Number of integrated states, heading and place included."""
+        """Number of integrated states, heading and position included."""
         return self.features.states + PLANAR
 
     @cached_property
     def spectral_abscissa(self) -> float:
-        """Largest real part (1/s) of the eigenvalues at straight running; not of heading, place."""
+        """Largest real part (1/s) of the shape's eigenvalues at straight running."""
         k = self.features.states
         steps = DIFFERENCE * np.vstack([np.eye(k), -np.eye(k)])
         no_input = np.zeros((2 * k, self.features.inputs))
@@ -128,7 +130,7 @@ class ReducedVehicle(ReducedSystem):
 
     @property
     def spaces(self) -> ControlPeriods:
-        """The whole space of the reduced states."""
+        """One control period with all reduced states."""
         return whole_space(self.order)
 
     @property
@@ -187,26 +189,30 @@ class ReducedVehicle(ReducedSystem):
         self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """Integrate the reduced equations, then decode states at the maneuver's output times."""
-        maneuver, inputs, driven = self._driven(maneuver)
+        maneuver, inputs, input_use = self._checked_inputs(maneuver)
         known = self.known(start, inputs[0])
         run = self.run(maneuver, known.encoded, direct_until=known.until)
-        states, trust = self.decoder.of_run(run, inputs, known.excited, (*known.told, *driven))
+        states, trust = self.decoder.of_run(
+            run, inputs, known.excited, (*known.start_trust, *input_use)
+        )
         if not len(run.places) or run.places[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state
-        found = self.model.recorded(maneuver, run, inputs, states, trust, outputs)
+        trajectory = self.model.recorded(maneuver, run, inputs, states, trust, outputs)
         run.give_back()
-        return found
+        return trajectory
 
     @cached_property
-    def _driven(self) -> Callable[[Excitation], tuple[Excitation, np.ndarray, tuple[float, float]]]:
+    def _checked_inputs(
+        self,
+    ) -> Callable[[Excitation], tuple[Excitation, np.ndarray, tuple[float, float]]]:
         """Of the last maneuvers: checked, inputs at the output times, how far these go."""
 
-        def made(maneuver: Excitation) -> tuple[Excitation, np.ndarray, tuple[float, float]]:
+        def check(maneuver: Excitation) -> tuple[Excitation, np.ndarray, tuple[float, float]]:
             maneuver = checked_maneuver(maneuver, self.model.definition)
-            return maneuver, maneuver.recorded_inputs[1], self.reach.driven(maneuver)
+            return maneuver, maneuver.recorded_inputs[1], self.reach.input_use(maneuver)
 
-        return lru_cache(MOST_STARTS)(made)
+        return lru_cache(MOST_STARTS)(check)
 
     def excited(self, state: np.ndarray) -> np.ndarray:
         """What of the transient a full state excites, see `Decoding.excited`."""
@@ -215,7 +221,7 @@ class ReducedVehicle(ReducedSystem):
     def remainder(
         self, states: np.ndarray, inputs: np.ndarray, excited: np.ndarray = NOTHING_EXCITED
     ) -> np.ndarray:
-        """What of the shapes (samples, n) of full states their own reduced states don't give."""
+        """What of the shapes (samples, n) of full states their reduced states don't give."""
         path = self.encoded_path(states, inputs)
         decoded, _ = self.decoder.states(np.zeros(len(path)), path, inputs, excited)
         return self.shape.of(states) - self.shape.of(decoded[:, : states.shape[1]])
@@ -227,6 +233,6 @@ class ReducedVehicle(ReducedSystem):
     def prepared(self, state: np.ndarray, inputs: np.ndarray) -> KnownStart:
         """A start with what it excites, at inputs."""
         excited = self.excited(state)
-        unlike = self.reach.unlike(self.remainder(state[None], inputs[None], excited)[0])
-        told, encoded = (self.reach.settled(excited), unlike, 1.0), self.encode(state, inputs)
-        return KnownStart(state, encoded, excited, decayed(excited), told)
+        remainder = self.remainder(state[None], inputs[None], excited)[0]
+        start_trust = self.reach.decay_time(excited), self.reach.start_distance(remainder), 1.0
+        return KnownStart(state, self.encode(state, inputs), excited, decayed(excited), start_trust)

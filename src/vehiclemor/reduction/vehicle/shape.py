@@ -1,8 +1,8 @@
 """Shape of a vehicle: its state without where it is and where it heads.
 
-The equations of motion of a vehicle on a plane road don't depend on its place, and turn with its
+The equations of motion of a vehicle on a plane road don't depend on its position, and turn with its
 heading.  So a reduced model needs the shape alone (speeds as components in the heading frame); the
-heading and the place follow by quadratures:
+heading and the position follow by quadratures:
 
     shape' = f(shape, u);  psi' = r,  X' = U cos(psi) - V sin(psi),  Y' = U sin(psi) + V cos(psi)
 
@@ -47,15 +47,15 @@ def no_steered_vehicle(model: Model) -> str:
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Derivatives of the shape's rate, of motion (psi', U, V) and of outputs at straight running.
+    """Derivatives of the shape's rate, of velocity (psi', U, V) and of outputs at straight running.
 
     By the shape (rows, n) and by the inputs (rows, inputs).
     """
 
     a: np.ndarray
     b: np.ndarray
-    motion_a: np.ndarray
-    motion_b: np.ndarray
+    velocity_a: np.ndarray
+    velocity_b: np.ndarray
     output_a: np.ndarray
     output_b: np.ndarray
 
@@ -70,8 +70,8 @@ class VehicleShape:
         """There are none."""
 
     @cached_property
-    def kept(self) -> np.ndarray:
-        """Numbers of the states that make the shape."""
+    def indices(self) -> np.ndarray:
+        """Indices of the shape in the states."""
         left_out = set(self.model.planar)
         return np.array([i for i in self.model.active if i not in left_out])
 
@@ -79,44 +79,43 @@ class VehicleShape:
     def names(self) -> tuple[str, ...]:
         """Names of the shape's states."""
         states = (*self.model.coordinates, *self.model.speeds)
-        return tuple(states[i] for i in self.kept)
+        return tuple(states[i] for i in self.indices)
 
     @cached_property
     def pairs(self) -> list[tuple[int, int]]:
-        """Numbers of pairs of states, other than the place, that are components in space."""
-        turning, place = self.model.rotating, set(self.model.planar)
+        """Indices of pairs of states, other than the position, that are components in space."""
+        turning, planar = self.model.rotating, set(self.model.planar)
         pairs = [(int(a), int(b)) for a, b in zip(turning[1::2], turning[2::2], strict=True)]
-        return [pair for pair in pairs if not set(pair) <= place]
+        return [pair for pair in pairs if not set(pair) <= planar]
 
     @cached_property
     def reference(self) -> np.ndarray:
-        """Shape (n,) of straight running at the model's own speed."""
+        """Shape (n,) of straight running at the model's speed."""
         return self.of(self.model.start()[None])[0]
 
     @property
     def speed(self) -> float:
         """Speed of straight running in m/s."""
-        return float(self.motion(self.reference[None], self._no_input(1))[1][0, 1])
+        return float(self.rates(self.reference[None], self._no_input(1))[1][0, 1])
 
     @property
     def layout(self) -> Layout:
-        """Where it stands in the states."""
-        model = self.model
-        kept, planar = self.kept.tolist(), model.planar.tolist()
-        return Layout(2 * len(model.coordinates), kept, planar, self.pairs)
+        """Where the shape stands in the states."""
+        size = 2 * len(self.model.coordinates)
+        return Layout(size, self.indices.tolist(), self.model.planar.tolist(), self.pairs)
 
     def of(self, states: np.ndarray) -> np.ndarray:
         """Shapes (samples, n) of states (samples, 2 n)."""
-        return turned(states, self.pairs, -states[:, self.model.planar[2]])[:, self.kept]
+        return turned(states, self.pairs, -states[:, self.model.planar[2]])[:, self.indices]
 
     def states(self, shapes: np.ndarray, planar: np.ndarray) -> np.ndarray:
-        """States of shapes (samples, n) at places and headings (samples, 3); wheels don't turn."""
+        """States of shapes (samples, n) at `planar` (samples, 3); wheels don't turn."""
         states = np.zeros((len(shapes), 2 * len(self.model.coordinates)))
-        states[:, self.kept] = shapes
+        states[:, self.indices] = shapes
         states[:, self.model.planar] = planar
         return turned(states, self.pairs, planar[:, 2])
 
-    def motion(self, shapes: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def rates(self, shapes: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rates of the shapes (samples, n), and psi', U, V (samples, 3), by the full equations."""
         states = self.states(shapes, np.zeros((len(shapes), 3)))
         rates = self.model.rhs_at(states, inputs)
@@ -126,12 +125,12 @@ class VehicleShape:
             # Components in a frame that turns.
             rates[:, a] += turn * states[:, b]
             rates[:, b] -= turn * states[:, a]
-        return rates[:, self.kept], rates[:, [heading, x, y]]
+        return rates[:, self.indices], rates[:, [heading, x, y]]
 
     @cached_property
     def linearised(self) -> Linearisation:
         """Derivatives at straight running without steering, by central differences."""
-        n, inputs = len(self.kept), len(self.model.inputs)
+        n, inputs = len(self.indices), len(self.model.inputs)
         steps = STEP * np.maximum(1.0, np.abs(self.reference))
         shapes = np.tile(self.reference, (2 * (n + inputs), 1))
         values = self._no_input(len(shapes))
@@ -143,7 +142,7 @@ class VehicleShape:
             self.states(shapes, np.zeros((len(shapes), 3))), np.ascontiguousarray(values)
         )
         parts = []
-        for image in (*self.motion(shapes, values), outputs):
+        for image in (*self.rates(shapes, values), outputs):
             slopes = (image[0::2] - image[1::2]).T / widths
             parts += [slopes[:, :n], slopes[:, n:]]
         return Linearisation(*parts)
@@ -191,7 +190,7 @@ class ShapeSamples(NamedTuple):
     outputs: np.ndarray
     deviations: np.ndarray
     rates: np.ndarray
-    motion: np.ndarray
+    planar_velocity: np.ndarray
 
 
 def shape_samples(shape: VehicleShape, runs: Sequence[Trajectory]) -> ShapeSamples:
@@ -199,4 +198,4 @@ def shape_samples(shape: VehicleShape, runs: Sequence[Trajectory]) -> ShapeSampl
     inputs = np.concatenate([run.inputs for run in runs])
     outputs = np.concatenate([run.outputs for run in runs])
     shapes = np.concatenate([shape.of(run.states) for run in runs])
-    return ShapeSamples(inputs, outputs, shapes - shape.reference, *shape.motion(shapes, inputs))
+    return ShapeSamples(inputs, outputs, shapes - shape.reference, *shape.rates(shapes, inputs))

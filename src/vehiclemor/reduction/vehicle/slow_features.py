@@ -2,7 +2,7 @@
 
 Fast motion follows the slow one, so that slips and loads of the wheels are functions of few
 arguments: lateral speed and yaw rate over the speed, roll angle, roll rate over the speed and
-steering, each held within its training range.  A vehicle is its own mirror image: terms are odd in
+steering, each clipped to its training range.  A vehicle is its own mirror image: terms are odd in
 the arguments in the lateral equations, and even in those of speed, heave and pitch.
 
 Of tires with Fiala's law, see `multibody/components/tires`, the forces are those of the law at
@@ -39,7 +39,7 @@ FORCES = ("F", "M", "G", "FD", "MD", "GD")
 MEAN, HALF = np.array([0.5, 0.5]), np.array([0.5, -0.5])
 # Factors of a term, by the names of their lines.
 Names = tuple[str, ...]
-# Terms, their columns (samples, terms), and how many of them are given.
+# Terms, their columns (samples, terms), and how many of the first ones a fit has in any case.
 Table = tuple[Sequence[Names], np.ndarray, int]
 ARGUMENTS = tuple(f"a{i}" for i in range(5))
 NAMES = ("lateral speed", "yaw rate", "roll", "roll rate", "steering", "change of speed")
@@ -53,7 +53,7 @@ ONE, FAST = ("1",), ("m",)
 # What changes with the speed.
 FASTER = tuple(("m", a) for a in ARGUMENTS)
 FASTER_SQUARE = tuple(("m", *pair) for pair in SQUARE)
-# Arguments are held beyond this multiple of their training range.
+# Arguments are clipped at this multiple of their training range.
 HULL = 1.1
 # Products in each sum that is a slip or a load of wheels, and the weight of their sizes.
 WHEEL_TERMS, RIDGE = 9, 1e-12
@@ -66,8 +66,8 @@ SATURATION = 1.2
 AFTER_LANDING, STEERED = 0.3, 1.2
 
 
-def held(value: Value) -> Value:
-    """A value held in [-1, 1]: nothing is known of what lies beyond the training runs."""
+def clipped(value: Value) -> Value:
+    """A value clipped to [-1, 1]: nothing is known beyond the training runs."""
     return 0.5 * (abs(value + 1.0) - abs(value - 1.0))
 
 
@@ -155,65 +155,69 @@ def slow_features(
     fast, loads lag behind.
     """
     z = modes.coordinates(samples.deviations, samples.inputs)
-    made = SlowFeatures(modes.lateral, len(modes.rates) - modes.lateral, samples.inputs.shape[1])
-    _add_arguments(made, shape, modes, (z, samples.inputs), (HULL / trusted, reversal))
-    _add_axles(made, shape.model, samples, z)
-    return made
+    features = SlowFeatures(
+        modes.lateral, len(modes.rates) - modes.lateral, samples.inputs.shape[1]
+    )
+    _add_arguments(features, shape, modes, (z, samples.inputs), (HULL / trusted, reversal))
+    _add_axles(features, shape.model, samples, z)
+    return features
 
 
 def _add_arguments(
-    made: SlowFeatures,
+    features: SlowFeatures,
     shape: VehicleShape,
     modes: SlowModes,
     samples: tuple[np.ndarray, np.ndarray],
     edges: tuple[float, float],
 ) -> None:
-    """Lines of the arguments in [-1, 1], `raw` where they are not held, and what is watched."""
-    (z, u), k, speed, linear = samples, made.lateral, made.speed, shape.linearised
+    """Lines of the arguments in [-1, 1], `raw` before they are clipped, and what is watched."""
+    (z, u), k, speed, linear = samples, features.lateral, features.speed, shape.linearised
     sizes = largest(z[:, :speed])
     roll = linear.output_a[shape.model.outputs.index("roll")]
-    seen = np.vstack([linear.motion_a[2], linear.motion_a[0], roll, roll @ linear.a])
+    seen = np.vstack([linear.velocity_a[2], linear.velocity_a[0], roll, roll @ linear.a])
     rows = np.column_stack([seen @ modes.right[:, :k], seen @ modes.static_response])
     values = np.column_stack([z[:, :k], u[:, 0]]) @ rows.T
     values = np.where(OVER_SPEED, values / (shape.speed + z[:, speed:]), values)
     reach = HULL * largest(np.column_stack([values, u[:, 0], z[:, speed], u[:, 1:]]))
-    part = made.let(1.0 / (made.parameter(shape.speed) + made.z[speed]))
-    lateral = [*made.z[:k], made.u[0]]
-    moved = [made.weighted(lateral, row / most) for row, most in zip(rows, reach[:4], strict=True)]
+    part = features.let(1.0 / (features.parameter(shape.speed) + features.z[speed]))
+    lateral = [*features.z[:k], features.u[0]]
+    moved = [
+        features.weighted(lateral, row / most) for row, most in zip(rows, reach[:4], strict=True)
+    ]
     lines = [part * m if over else m for m, over in zip(moved, OVER_SPEED, strict=True)]
-    others = made.u[0], made.z[speed], *made.u[1:]
-    lines += [made.parameter(1.0 / most) * x for x, most in zip(others, reach[4:], strict=True)]
-    factor, names = made.parameter(edges[0]), (*NAMES, *DERIVATIVES[: len(made.u) - 1])
+    others = features.u[0], features.z[speed], *features.u[1:]
+    lines += [features.parameter(1.0 / most) * x for x, most in zip(others, reach[4:], strict=True)]
+    factor, names = features.parameter(edges[0]), (*NAMES, *DERIVATIVES[: len(features.u) - 1])
     for i, (line, name) in enumerate(zip(lines, names, strict=True)):
-        raw = made.line(f"raw{i}", line)
+        raw = features.line(f"raw{i}", line)
         # Alone of them the speed changes without steering.
-        watched = made.besides if name == NAMES[-1] else made.watched
+        watched = features.besides if name == NAMES[-1] else features.watched
         watched.append((factor * raw, name))
     for i, name in enumerate((*ARGUMENTS, "m")):
-        made.line(name, held(made.by_name[f"raw{i}"]))
-    if len(made.u) > 1:
+        features.line(name, clipped(features.by_name[f"raw{i}"]))
+    if len(features.u) > 1:
         most = edges[1] * largest(u[:, :1] * u[:, 1:2])
-        reversal = made.weighted([made.u[0] * made.u[1]], 1.0 / most)
-        made.watched.append((reversal, "reversal of the steering"))
-    for (name,), coordinate, most in zip(made.coordinates, made.z, sizes, strict=False):
-        made.line(name, made.parameter(1.0 / most) * coordinate)
+        reversal = features.weighted([features.u[0] * features.u[1]], 1.0 / most)
+        features.watched.append((reversal, "reversal of the steering"))
+    for (name,), coordinate, most in zip(features.coordinates, features.z, sizes, strict=False):
+        features.line(name, features.parameter(1.0 / most) * coordinate)
     # More heave and pitch than corners make is known only where the car runs straight.
-    first, *rest = map(abs, made.term(ARGUMENTS))
-    steered = held(1.0 / MOVING * reduce(add, rest, first))
+    first, *rest = map(abs, features.term(ARGUMENTS))
+    steered = clipped(1.0 / MOVING * reduce(add, rest, first))
     alive = AFTER_LANDING + (1.0 / STEERED - AFTER_LANDING) * steered
-    symmetric = [made.by_name[name] for (name,) in made.coordinates[k:]]
-    made.besides += [(alive * own, "heave and pitch") for own in symmetric]
+    symmetric = [features.by_name[name] for (name,) in features.coordinates[k:]]
+    features.besides += [(alive * coordinate, "heave and pitch") for coordinate in symmetric]
 
 
 def _add_axles(
-    made: SlowFeatures, model: DynamicModel, samples: ShapeSamples, z: np.ndarray
+    features: SlowFeatures, model: DynamicModel, samples: ShapeSamples, z: np.ndarray
 ) -> None:
     """Lines of the axles' forces."""
-    odd = [*LINEAR, *made.derivatives, *CUBIC, *FASTER]
+    odd = [*LINEAR, *features.derivatives, *CUBIC, *FASTER]
     even = [ONE, FAST, *SQUARE, *FASTER_SQUARE]
-    columns = made.columns([*odd, *even], z, samples.inputs)
+    columns = features.columns([*odd, *even], z, samples.inputs)
     # Terms, their columns, and how many of the first ones every sum has.
-    of_odd = odd, columns[:, : len(odd)], len(LINEAR) + len(made.derivatives)
+    of_odd = odd, columns[:, : len(odd)], len(LINEAR) + len(features.derivatives)
     of_even = even, columns[:, len(odd) :], 1
     # Zero in straight running at any speed.
     of_turning = even[2:], columns[:, len(odd) + 2 :], 0
@@ -222,35 +226,37 @@ def _add_axles(
         terms, table, given = among
         chosen = forward_selection(table, values[:, None], given, more)
         weights = ridge_fit(table[:, chosen], values, RIDGE)
-        return made.let(made.weighted((product(made.term(terms[i])) for i in chosen), weights))
+        return features.let(
+            features.weighted((product(features.term(terms[i])) for i in chosen), weights)
+        )
 
     def of_wheels(kind: str, wheels: Sequence[str]) -> np.ndarray:
         return samples.outputs[:, [model.outputs.index(f"{kind}_{wheel}") for wheel in wheels]]
 
     exact = set(FIALA) <= set(model.parameters.entries)
-    made.forces = FORCES if exact else FORCES[:3]
+    features.forces = FORCES if exact else FORCES[:3]
     for axle, wheels in enumerate(AXLES):
         slips = np.tan(of_wheels("slip_angle", wheels))
         if not exact:
             mean = slips @ MEAN
-            slip = made.let(held(fitted(mean / (HULL * largest(mean[:, None])), of_odd, 0)))
-            size = made.line(f"G{axle}", abs(slip))
-            force = made.line(f"F{axle}", slip * size)
-            made.line(f"M{axle}", force * size)
+            slip = features.let(clipped(fitted(mean / (HULL * largest(mean[:, None])), of_odd, 0)))
+            size = features.line(f"G{axle}", abs(slip))
+            force = features.line(f"F{axle}", slip * size)
+            features.line(f"M{axle}", force * size)
             continue
         loads = of_wheels("Fz", wheels)
         slip, slip_half = fitted(slips @ MEAN, of_odd), fitted(slips @ HALF, of_turning)
         load, load_half = fitted(loads @ MEAN, of_even), fitted(loads @ HALF, of_odd)
         tire = {name: float(model.parameters[name]) for name in FIALA}, float(loads.mean())
-        left = add_fiala(made, wheels[0], slip + slip_half, load + load_half, tire)
-        right = add_fiala(made, wheels[1], slip - slip_half, load - load_half, tire)
+        left = add_fiala(features, wheels[0], slip + slip_half, load + load_half, tire)
+        right = add_fiala(features, wheels[1], slip - slip_half, load - load_half, tire)
         for kind, one, other in zip(FORCES, left, right, strict=False):
-            made.line(f"{kind}{axle}", one + other)
-            made.line(f"{kind}D{axle}", one - other)
+            features.line(f"{kind}{axle}", one + other)
+            features.line(f"{kind}D{axle}", one - other)
 
 
 def add_fiala(
-    made: SlowFeatures,
+    features: SlowFeatures,
     wheel: str,
     slip: Value,
     load: Value,
@@ -261,14 +267,14 @@ def add_fiala(
     Forces as parts of the static load, moments as parts of it times the width, from the tangent of
     the slip angle and the load in N.  Of the tire: its parameters and the static load in N.
     """
-    (values, static), parameter, let = tire, made.parameter, made.let
+    (values, static), parameter, let = tire, features.parameter, features.let
     slip, load, least = let(slip), let(load), parameter(LEAST_LOAD * static)
     load = let(0.5 * (load + least + abs(load - least)))
     fall = parameter(values["largest_friction"] - values["smallest_friction"])
     limit = let(load * (parameter(values["largest_friction"]) - fall * abs(slip)))
     raw = let(parameter(values["cornering_stiffness"] / 3.0) * slip / limit)
-    made.watched.append((parameter(1.0 / SATURATION) * raw, f"saturation of the {wheel} tire"))
-    y = let(held(raw))
+    features.watched.append((parameter(1.0 / SATURATION) * raw, f"saturation of the {wheel} tire"))
+    y = let(clipped(raw))
     left = let(1.0 - abs(y))
     sticking = let(left * left)
     share = let(parameter(1.0 / static) * limit * y)
@@ -276,32 +282,33 @@ def add_fiala(
     return force, let(share * sticking * left), sticking
 
 
-def given_terms(made: SlowFeatures) -> tuple[list[Names], list[Names]]:
+def required_terms(features: SlowFeatures) -> tuple[list[Names], list[Names]]:
     """Odd and even terms that the equations always have."""
-    k, forces = made.lateral, [(f"{kind}{axle}",) for kind in "FM" for axle in (0, 1)]
-    odd = [*made.coordinates[:k], LINEAR[-1], *made.derivatives, *forces]
-    return odd, [ONE, (f"z{made.speed}",), *made.coordinates[k:]]
+    k, forces = features.lateral, [(f"{kind}{axle}",) for kind in "FM" for axle in (0, 1)]
+    odd = [*features.coordinates[:k], LINEAR[-1], *features.derivatives, *forces]
+    return odd, [ONE, (f"z{features.speed}",), *features.coordinates[k:]]
 
 
-def odd_candidates(made: SlowFeatures) -> list[Names]:
+def odd_candidates(features: SlowFeatures) -> list[Names]:
     """Odd terms that the equations may need besides."""
-    found = [*CUBIC, *FASTER]
+    terms = [*CUBIC, *FASTER]
     for axle in (0, 1):
-        found += [("m", f"F{axle}"), ("m", f"M{axle}")]
-        found += [(f"GD{axle}",)] if "GD" in made.forces else []
-        factors = [kind for kind in ("G", "FD") if kind in made.forces]
-        found += [(f"{kind}{axle}", a) for kind in factors for a in ARGUMENTS]
-        found += [(f"F{axle}", *pair) for pair in SQUARE]
-    moved = (*ARGUMENTS, "F0", "F1")
-    return [*found, *((*own, a) for own in made.coordinates[made.lateral :] for a in moved)]
+        terms += [("m", f"F{axle}"), ("m", f"M{axle}")]
+        terms += [(f"GD{axle}",)] if "GD" in features.forces else []
+        kinds = [kind for kind in ("G", "FD") if kind in features.forces]
+        terms += [(f"{kind}{axle}", a) for kind in kinds for a in ARGUMENTS]
+        terms += [(f"F{axle}", *pair) for pair in SQUARE]
+    factors = (*ARGUMENTS, "F0", "F1")
+    symmetric = features.coordinates[features.lateral :]
+    return [*terms, *((*coordinate, a) for coordinate in symmetric for a in factors)]
 
 
-def even_candidates(made: SlowFeatures) -> list[Names]:
+def even_candidates(features: SlowFeatures) -> list[Names]:
     """Even terms that the equations may need besides; zero in straight running at any speed."""
-    found = [*SQUARE, *FASTER_SQUARE]
+    terms = [*SQUARE, *FASTER_SQUARE]
     for axle in (0, 1):
-        found += [(f"{kind}{axle}",) for kind in ("FD", "MD") if kind in made.forces]
+        terms += [(f"{kind}{axle}",) for kind in ("FD", "MD") if kind in features.forces]
         force, moment = f"F{axle}", f"M{axle}"
-        found += [(force, force)]
-        found += [(*kind, a) for kind in ((force,), (moment,), ("m", force)) for a in ARGUMENTS]
-    return [*found, *((*rate, a) for rate in made.derivatives for a in ARGUMENTS)]
+        terms += [(force, force)]
+        terms += [(*kind, a) for kind in ((force,), (moment,), ("m", force)) for a in ARGUMENTS]
+    return [*terms, *((*rate, a) for rate in features.derivatives for a in ARGUMENTS)]

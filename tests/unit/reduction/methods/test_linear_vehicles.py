@@ -56,7 +56,7 @@ def relative_errors(shape, method, amplitude, **settings):
 def steady_turn(shape):
     """Yaw rate per steering of the whole linearised model; the speed's zero eigenvalue is cut."""
     linear = shape.linearised
-    return linear.motion_a[0] @ -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
+    return linear.velocity_a[0] @ -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
 
 
 def test_all_lateral_modes_give_the_vehicle_at_small_amplitude(shape):
@@ -106,7 +106,7 @@ def test_steering_without_its_derivatives_drives_lateral_modes_alone(shape):
 def test_static_correction_keeps_steady_cornering(shape):
     kept, follow = truncated(shape, *lateral_modes(shape), ModalVehicleSettings(fastest=20.0))
     moved = follow[:, 0] - kept.right @ np.linalg.solve(kept.rates, kept.input_matrix)
-    assert shape.linearised.motion_a[0] @ moved == pytest.approx(steady_turn(shape), rel=1e-5)
+    assert shape.linearised.velocity_a[0] @ moved == pytest.approx(steady_turn(shape), rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_without_steering_the_car_drives_straight_at_its_own_speed(shape, method
     backwards = replace(reduced, coefficients=-reduced.coefficients)
     fastest = np.linalg.eigvals(rates).real.min()
     assert backwards.spectral_abscissa == pytest.approx(-fastest, rel=1e-5)
-    assert reduced.offline.evaluations == 2 * (len(shape.kept) + len(model.inputs))
+    assert reduced.offline.evaluations == 2 * (len(shape.indices) + len(model.inputs))
 
 
 def test_too_few_states_are_refused(shape):

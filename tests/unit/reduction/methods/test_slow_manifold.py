@@ -86,7 +86,7 @@ def test_rates_of_the_shape_do_not_know_place_and_heading(car):
     run, shape = car.simulate(maneuver), VehicleShape(car)
     rows = slice(60, 200, 20)
     shapes, u = shape.of(run.states[rows]), np.ascontiguousarray(run.inputs[rows])
-    rates, motion = shape.motion(shapes, u)
+    rates, motion = shape.rates(shapes, u)
     # The same by the full equations at another heading: chain rule of the rotation.
     moved = shape.states(shapes, np.tile([100.0, -7.0, 2.0], (len(shapes), 1)))
     step = 1e-6
@@ -181,7 +181,7 @@ def test_heave_and_pitch_are_linear_in_straight_running(reduced):
     z[:, k:8] = np.random.default_rng(4).normal(size=(3, 4))
     columns = feature_columns(reduced.features, z, np.zeros((3, 1)), reduced.parameters)
     rates = columns @ reduced.coefficients
-    forward = shape.speed + z[:, k:8] @ (shape.linearised.motion_a[1] @ modes.right[:, k:])
+    forward = shape.speed + z[:, k:8] @ (shape.linearised.velocity_a[1] @ modes.right[:, k:])
     np.testing.assert_allclose(rates[:, k:8], z[:, k:8] @ modes.rates[k:, k:].T, atol=1e-9)
     np.testing.assert_allclose(rates[:, 10], forward, atol=1e-9)
 

@@ -104,8 +104,8 @@ def test_who_steers_before_the_car_has_settled_is_told(reduced, begin):
 
 def test_a_drop_has_settled_when_training_runs_were_steered(reduced):
     excited = reduced.excited(reduced.model.start("dropped"))
-    assert reduced.reach.settled(excited) >= 0.99 * reduced.reach.faded > 0.5
-    assert reduced.reach.settled(excited * [[[1.0]], [[1e-3]]]) < 0.1
+    assert reduced.reach.decay_time(excited) >= 0.99 * reduced.reach.faded > 0.5
+    assert reduced.reach.decay_time(excited * [[[1.0]], [[1e-3]]]) < 0.1
     trust = reduced.simulate(held(reduced, 1.0, 0.3), "dropped").trust
     told = ("heave and pitch", "lateral motion begins earlier")
     assert trust.until < 0.5
@@ -116,14 +116,14 @@ def test_a_drop_has_settled_when_training_runs_were_steered(reduced):
 def test_a_start_has_settled_when_its_transient_is_as_in_training_runs(first, second, rate):
     known = replace(NOTHING_KNOWN, decaying=np.array([1.0, 0.5]))
     excited = np.array([[[-rate, 3.0], [-2.0 * rate, 0.0]], [[0.0, first], [second, 0.0]]])
-    time = known.settled(excited)
+    time = known.decay_time(excited)
     parts = np.exp(excited[0, :, 0] * time) * [first, second] / known.decaying
     assert parts.max() == pytest.approx(1.0) or (time == 0.0 and parts.max() <= 1.0)
 
 
 def test_a_wheel_out_of_place_is_told(reduced):
     model, state = reduced.model, np.array(reduced.model.start("equilibrium"))
-    assert reduced.known(state, np.zeros(len(model.inputs))).told[1] < 0.1
+    assert reduced.known(state, np.zeros(len(model.inputs))).start_trust[1] < 0.1
     state[model.coordinates.index("z_RL" if "z_RL" in model.coordinates else "xi_FL")] += 0.05
     run = reduced.simulate(CARS[model.name].perturbed(1.0, 0.5), state)
     assert run.status == "untrusted"
