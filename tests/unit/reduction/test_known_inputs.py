@@ -87,7 +87,7 @@ def test_a_pulse_between_two_output_times_is_told_of_when_it_comes(size, hold):
 @pytest.mark.parametrize("name", [CAR, "high_fidelity_vehicle"])
 def test_steering_of_the_protocol_is_within_what_is_known(name):
     rom, protocol = shipped(name), load_protocol(f"predictive-{name}")
-    reach = getattr(rom.reduced, "fast", rom.reduced).reach
+    reach = getattr(rom.reduced, "reduced", rom.reduced).reach
     known = [*protocol.sets["training"], *protocol.sets["validation"]]
     plan = protocol.definition.drawn
     drawn_runs = sampled_runs(protocol.model, plan, (7, 1, 0), known)

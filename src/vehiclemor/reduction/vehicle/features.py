@@ -129,13 +129,12 @@ class FeatureListing(Listing):
         numbers_watched = [number for number, _ in watches]
         operations, renumbered = pruned(self.operations, [*numbers, *numbers_watched])
         named = [renumbered[n] for n in sorted(self.named) if n in renumbered]
-        terms = [renumbered[n] for n in numbers]
         return Features(
             states=len(self.z),
             inputs=len(self.u),
             operations=tuple(operations),
             named=tuple(named),
-            terms=tuple(terms),
+            terms=tuple(renumbered[n] for n in numbers),
             groups=groups,
             watched=tuple((renumbered[n], what) for n, what in watches),
             lateral=lateral,
