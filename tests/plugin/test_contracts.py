@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.models import TRUCK
 from tests.plugin.installation import installed, package
 from vehiclemor import contracts
 from vehiclemor.exceptions import InputError
@@ -18,7 +19,6 @@ from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.study.experiment import complete_settings
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "my_method.py"
-TRUCK = "flexible_truck"
 KINEMATIC = [name for name in names("model") if component("model", name).kind == "ae"]
 
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from sksundae.cvode import CVODE
 
+from tests.models import CAR, FIDELITY, VEHICLES
 from tests.oracles import high_fidelity_data, vehicle_lagrange
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -16,15 +17,14 @@ from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.workspaces import Solver
 
-PLAIN, FIDELITY = VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 LANE_CHANGE = {
-    PLAIN: component("maneuver", "lane_change"),
+    CAR: component("maneuver", "lane_change"),
     FIDELITY: component("maneuver", "rack_lane_change"),
 }
 # The same inputs as the oracles have them, and a sample of them.
-STEERING = {PLAIN: vehicle_lagrange.lane_change, FIDELITY: high_fidelity_data.lane_change}
-MIRROR = {PLAIN: vehicle_lagrange.mirror, FIDELITY: high_fidelity_data.mirror}
-INPUTS = {PLAIN: np.array([0.3]), FIDELITY: np.array([0.02, 0.1, 1.0])}
+STEERING = {CAR: vehicle_lagrange.lane_change, FIDELITY: high_fidelity_data.lane_change}
+MIRROR = {CAR: vehicle_lagrange.mirror, FIDELITY: high_fidelity_data.mirror}
+INPUTS = {CAR: np.array([0.3]), FIDELITY: np.array([0.02, 0.1, 1.0])}
 STARTS = ("equilibrium", "dropped")
 # The pulse of the steering is not smooth at its ends.
 EDGES = (0.0, 1.0, 3.5, 4.0)
@@ -44,7 +44,7 @@ def integrate(model, start, solver="dopri5", tolerance=1e-9, longest_step=None, 
 @cache
 def exact(name: str, start: str = "equilibrium") -> np.ndarray:
     model = build(name)
-    return integrate(model, model.start(start), tolerance=1e-13 if name == PLAIN else 1e-12).states
+    return integrate(model, model.start(start), tolerance=1e-13 if name == CAR else 1e-12).states
 
 
 def turn(model, x: np.ndarray, angle: float) -> np.ndarray:
@@ -133,11 +133,11 @@ def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian():
 @pytest.mark.parametrize(("solver", "order"), [("dopri5", 5), ("rodas4", 4), ("etdrk4", 4)])
 def test_the_path_in_the_plane_converges_with_the_order_of_the_method(solver, order):
     """Though the Jacobian leaves out how the path turns with the heading."""
-    model, errors = build(PLAIN), []
+    model, errors = build(CAR), []
     # Fixed steps, where the explicit pair is stable and rounding plays no part.
     for step in (0.008, 0.004) if solver == "dopri5" else (0.04, 0.02):
         found = integrate(model, model.start(), solver, 1e6, step).states
-        errors.append(np.abs(found - exact(PLAIN))[1:, [0, 1]].max())
+        errors.append(np.abs(found - exact(CAR))[1:, [0, 1]].max())
     assert np.log2(errors[0] / errors[1]) > order - 1.2, errors
 
 

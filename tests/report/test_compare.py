@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from tests.models import MODELS, VEHICLES
 from vehiclemor.cli import main
 from vehiclemor.registry import component, names
 from vehiclemor.report import comparison
@@ -22,9 +23,6 @@ from vehiclemor.report.published import load_published
 from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings
 from vehiclemor.study.run import run_studies
-
-VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
-MODELS = ("double_wishbone", *VEHICLES)
 
 
 @pytest.fixture(scope="module")

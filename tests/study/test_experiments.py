@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vehiclemor as vm
+from tests.models import CAR
 from vehiclemor import provenance
 from vehiclemor.codegen import cache
 from vehiclemor.exceptions import ConvergenceError, InputError
@@ -23,7 +24,6 @@ from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Scenario, speed_of
 
-CAR = "independent_suspension_vehicle"
 HEAVY = (("sprung_mass", 1500.0), ("initial_speed", 25.0))
 MOVED = (("tie_rod_inner.z", -0.09),)
 

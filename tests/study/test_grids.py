@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.models import CAR, WISHBONE
 from tests.study.small import small_study
 from vehiclemor.study.plans.grid import expand, sampled
 from vehiclemor.study.plans.loading import load_studies, read_study, write_study
@@ -11,8 +12,6 @@ from vehiclemor.study.plans.results import flattened
 from vehiclemor.study.plans.study_file import study_from
 from vehiclemor.study.plans.study_runs import Sampling
 from vehiclemor.study.run import run_studies
-
-CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"
 
 
 def grid_of(**given):

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
+from tests.models import VEHICLES
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.study.evaluate import evaluate
 from vehiclemor.study.experiment import complete_settings, make_experiment
@@ -25,7 +26,6 @@ from vehiclemor.study.plans.protocol import (
 from vehiclemor.study.plans.study_file import Bound
 from vehiclemor.study.plans.study_runs import FACTORS, Box, Draw, Group
 
-VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 SAME_POINT = "f 1.01, a 1.435, equilibrium, 18.548 m/s"
 BOX = Box(maneuver="sine_travel", frequency=[0.7, 1.8], amplitude=[0.5, 1.1], start=["equilibrium"])
 

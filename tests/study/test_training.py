@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.models import CAR, WISHBONE
 from tests.study.small import small_study
 from vehiclemor.cli.app import main
 from vehiclemor.reduction.methods import replay
@@ -15,7 +16,6 @@ from vehiclemor.simulation.build import build
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
 
-WISHBONE, CAR = "double_wishbone", "independent_suspension_vehicle"
 OWN = component("maneuver", "sine_travel")
 OTHER = component("maneuver", "chirp_travel")
 

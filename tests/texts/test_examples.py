@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.models import VEHICLES
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-CARS = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 
 
 def example(name):
     return SimpleNamespace(**runpy.run_path(str(EXAMPLES / f"{name}.py")))
 
 
-@pytest.fixture(scope="module", params=CARS)
+@pytest.fixture(scope="module", params=VEHICLES)
 def cars(request):
     reduced = vm.rom(request.param)
     return reduced, vm.reduce(reduced.model, "full_order")

@@ -9,10 +9,10 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from vehiclemor.exceptions import VehiclemorError
+from tests.models import CAR, WISHBONE
+from tests.refusing import refused
 from vehiclemor.inputs.maneuver import Maneuver
 
-SUSPENSION, CAR = "double_wishbone", "independent_suspension_vehicle"
 STEER = vm.Signal.from_samples([0.0, 0.1, 0.2], [0.0, 0.01, 0.0], inputs=["delta"])
 TRUCK, LIMITS = "flexible_truck", (2**63, 5e-324, 0.0, np.nan, "1")
 MASKED = np.ma.array([1.0, 2.0], mask=[True, False])
@@ -26,16 +26,6 @@ NO_JOBS = ("2", 0, 1.5, True, 10**39, np.timedelta64(3, "s"), *WRONG)
 NO_FLAGS = (1, "yes", np.nan, *NONE, *WRONG)
 
 
-def refused(call, *words):
-    with pytest.raises(VehiclemorError) as error:
-        call()
-    text = str(error.value)
-    assert text.isprintable()
-    assert len(text) < 600
-    for word in words:
-        assert word in text, text
-
-
 @cache
 def car():
     return vm.model(CAR)
@@ -43,17 +33,17 @@ def car():
 
 def simulated(name):
     """A call of `simulate` with one argument."""
-    return lambda value: vm.simulate(**{"model": SUSPENSION, "method": "pod", name: value})
+    return lambda value: vm.simulate(**{"model": WISHBONE, "method": "pod", name: value})
 
 
 def trained(points):
-    return vm.simulate(SUSPENSION, "pod", training="set", training_set=points)
+    return vm.simulate(WISHBONE, "pod", training="set", training_set=points)
 
 
 @pytest.mark.parametrize(
     ("call", "values", "word"),
     [
-        (simulated("model"), [3, [SUSPENSION], None, {}], "unknown model"),
+        (simulated("model"), [3, [WISHBONE], None, {}], "unknown model"),
         (simulated("method"), [None, ["pod"]], "unknown method"),
         (simulated("maneuver"), [3, np.sin, "", "lane_change"], "maneuver"),
         (simulated("start"), ["", [0.0] * 8], "start"),
@@ -77,7 +67,7 @@ def trained(points):
         (trained, [[(1, np.nan)]], "amplitude factor"),
         (simulated("rtol"), ["1e-3"], "rtol"),
         (simulated("rtol"), [1e300], "tolerance is 1e+300"),
-        (lambda v: vm.simulate(SUSPENSION, rtol=v, tolerance=v), [1e-3], "the same setting"),
+        (lambda v: vm.simulate(WISHBONE, rtol=v, tolerance=v), [1e-3], "the same setting"),
         (vm.model, [None, {}], "unknown model"),
         (lambda v: vm.model(CAR, v), [[1], {1: 2}, *WRONG], "parameter"),
         (lambda v: vm.model(CAR, {"sprung_mass": v}), [*NO_NUMBERS, None, [2.0]], "sprung_mass"),
@@ -188,7 +178,7 @@ def test_what_is_just_allowed_is_run():
     lane_change = vm.maneuver("lane_change")
     largest = np.abs(lane_change.at(lane_change.times)).max()
     vm.simulate(car(), amplitude=1.066 / largest * 0.999)
-    assert vm.simulate(SUSPENSION, frequency=300.0)["status"].item() == "ok"
+    assert vm.simulate(WISHBONE, frequency=300.0)["status"].item() == "ok"
 
 
 def maneuver(name, value):

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, interp1d
 
 import vehiclemor as vm
+from tests.models import CAR
 from vehiclemor.exceptions import InputError, VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -65,7 +66,6 @@ def of_inputs(**given):
 
 TABLE = "time,delta\n0,1\n1,2\n"
 COMMAS = "time;delta\n0,5;90,0\n1,5;180,0\n"
-CAR = "independent_suspension_vehicle"
 BEYOND = vm.Signal.from_samples([0.0, 1.0], [0.0, 2.0])
 SQUARE = vm.Signal.from_samples([0.0, 1.0], np.eye(2))
 HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]

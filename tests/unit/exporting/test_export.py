@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 
 import vehiclemor as vm
+from tests.models import CAR
 from tests.reducing import fitted
 from tests.unit.exporting.programs import in_use, relative
 from vehiclemor.cli import main
@@ -96,9 +97,6 @@ def test_sympy(rng):
         rows = [function(x, u, values) for x, u in zip(states, inputs, strict=True)]
         found.append(np.array(rows))
     agree(found, states, model, inputs)
-
-
-CAR = "independent_suspension_vehicle"
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from tests.models import VEHICLES
 from tests.plugin.installation import registered
 from tests.unit import standard_problems
 from vehiclemor.exceptions import InputError
@@ -12,7 +13,6 @@ from vehiclemor.multibody import definition
 from vehiclemor.registry import component
 
 PLAIN = standard_problems.DEFINITION
-VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 
 
 @pytest.mark.parametrize(

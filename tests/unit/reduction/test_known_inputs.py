@@ -7,10 +7,10 @@ import pytest
 from scipy.signal import lfilter
 
 import vehiclemor as vm
+from tests.models import CAR
 from vehiclemor.exceptions import InputError
 from vehiclemor.study.plans.protocol import load_protocol, sampled_runs
 
-CAR = "independent_suspension_vehicle"
 # Steering (rad) that the 14-DOF vehicle allows, and about the largest that its model has learnt.
 ALLOWED, LEARNT = 1.066, 0.07
 

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.models import CAR, WISHBONE
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
 from vehiclemor.registry import component
 from vehiclemor.simulation.integrators.catalogue import MOST_CALLS
 from vehiclemor.study.scenario import Scenario
-
-CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"
 
 
 @pytest.fixture(scope="module")

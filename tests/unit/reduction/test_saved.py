@@ -18,6 +18,8 @@ import reduced_models
 import xarray as xr
 
 import vehiclemor as vm
+from tests.models import CAR
+from tests.refusing import refused
 from vehiclemor import netcdf_file
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.operations import KINDS, MOST_SIZE
@@ -31,7 +33,6 @@ from vehiclemor.simulation.build import build
 from vehiclemor.study.plans.protocol import protocol_names
 from vehiclemor.study.scenario import start_of
 
-CAR = "independent_suspension_vehicle"
 KERNELS = Kernels([])
 # What refers to no model.
 NOTHING: Any = SimpleNamespace()
@@ -117,11 +118,8 @@ def replaced(changes):
 
 
 def refusal(path):
-    with pytest.raises(FileError) as caught:
-        vm.load(path)
-    line = str(caught.value)
+    line = refused(lambda: vm.load(path), error=FileError)
     assert line.startswith(f"{path}: ")
-    assert "\n" not in line
     return line
 
 

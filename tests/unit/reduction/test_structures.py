@@ -8,12 +8,12 @@ import pytest
 from scipy.linalg import eigh
 
 import vehiclemor as vm
+from tests.models import TRUCK
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.projection.structural import ReducedStructure, modes_within
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.structures.model import relative_error
 
-TRUCK = "flexible_truck"
 HEIGHTS = ("road_FL", "road_FR", "road_RL", "road_RR")
 ROAD, SHORT = vm.road("C", 3), {"tolerance": 1e-2}
 

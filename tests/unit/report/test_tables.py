@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 import vehiclemor as vm
+from tests.models import MODELS
 from tests.unit import standard_problems
 from vehiclemor.registry import component, names
 from vehiclemor.report.default_studies import of_paper, smaller_rank
@@ -127,11 +128,10 @@ def test_a_simulation_prints_the_errors_of_each_output_and_a_zero_as_such():
 
 
 PLAIN = standard_problems.DEFINITION
-BUILT_IN = ("double_wishbone", "independent_suspension_vehicle", "high_fidelity_vehicle")
 NOMINAL = ("figures-6-7", "figures-2-4", "figures-9-10")
 
 
-@pytest.mark.parametrize(("name", "nominal"), [*zip(BUILT_IN, NOMINAL, strict=True)])
+@pytest.mark.parametrize(("name", "nominal"), [*zip(MODELS, NOMINAL, strict=True)])
 def test_rows_of_the_papers_models_exist_and_are_named_once(name, nominal):
     cases, model = timing_cases(component("model", name)), build(name)
     assert [case.id for case in cases[:2]] == ["baseline", "strongest"]
@@ -140,7 +140,7 @@ def test_rows_of_the_papers_models_exist_and_are_named_once(name, nominal):
     assert {case.method for case in cases} <= set(names("method"))
     assert set(of_kind(model.kind).counts) <= set(model.counts)
     assert of_paper(name) == nominal
-    assert set(tables_file().reduced) == set(BUILT_IN)
+    assert set(tables_file().reduced) == set(MODELS)
     # Settings of the paper are the defaults of POD.
     printed = [n for n in load_published().numbers.values() if n.model == name]
     assert smaller_rank(model, "pod") == {}
@@ -212,7 +212,7 @@ def test_the_fastest_ladder_counts_that_reaches_the_error():
 
 
 # Prefix of ids -> model.
-MODELS = {
+PREFIXES = {
     "gv": "independent_suspension_vehicle",
     "dw": "double_wishbone",
     "hfv": "high_fidelity_vehicle",
@@ -246,4 +246,4 @@ def test_numbers_are_as_printed_and_all_of_them_are_tested() -> None:
         assert (n.value, n.unit, n.quantity, n.page, n.figure, *behind) == expected, name
         assert n.kind == ("rms_error" if "_rms_" in name else "time_reduction"), name
     for entry in (*published.number, *published.claim):
-        assert entry.model == MODELS[entry.id.partition("_")[0]]
+        assert entry.model == PREFIXES[entry.id.partition("_")[0]]

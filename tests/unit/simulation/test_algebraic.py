@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.models import MODELS
 from tests.reducing import fitted
 from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
 from vehiclemor.reduction.methods.full_order import FullOrderMechanism
@@ -138,9 +139,6 @@ def test_wrong_arguments_are_named(model, call, arguments, named):
 def test_what_is_of_no_mechanism_is_refused(model, nominal, wrong, named):
     with pytest.raises(InputError, match=named):
         model.simulate(**({"maneuver": nominal} | wrong))
-
-
-MODELS = ("double_wishbone", "independent_suspension_vehicle", "high_fidelity_vehicle")
 
 
 @pytest.fixture(scope="module", params=MODELS)

@@ -7,13 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vehiclemor as vm
+from tests.models import CAR, WISHBONE
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 from vehiclemor.simulation import batches
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import FINISHED
 
-CAR, MECHANISM = "independent_suspension_vehicle", "double_wishbone"
 TIMES = np.linspace(0.0, 4.0, 41)
 KEPT = {"outputs": ["lateral_position", "Fz_FL", "u"], "times": [0.5, 1.0, 3.98]}
 
@@ -129,7 +129,7 @@ def test_maneuvers_of_different_lengths_share_chosen_times(full):
 
 @pytest.mark.parametrize("method", ["full_order", "path_map"])
 def test_mechanisms_in_batches(method):
-    model = vm.rom(MECHANISM) if method == "path_map" else vm.reduce(MECHANISM, method)
+    model = vm.rom(WISHBONE) if method == "path_map" else vm.reduce(WISHBONE, method)
     waves = 0.04 * np.sin(np.outer([1.0, 2.0, 2.5], TIMES))
     waves[2] *= 6.0
     signals = vm.many_signals(TIMES, np.stack([waves, 0.0 * waves], axis=2), "cubic")
@@ -177,7 +177,7 @@ def test_similar_cars_share_all_but_their_numbers(solver, monkeypatch):
 
 
 def test_points_are_parameters_by_run():
-    model = vm.model(MECHANISM)
+    model = vm.model(WISHBONE)
     name = next(n for n, q in model.definition.parameters.items() if q.size == 3)
     point = np.asarray(model.parameters[name])
     points = [point.tolist(), (point + 1e-3).tolist()]
@@ -185,7 +185,7 @@ def test_points_are_parameters_by_run():
     found = vm.simulate_many(model, signals, parameters={name: points})
     listed = vm.simulate_many(model, signals, parameters=[{name: p} for p in points])
     np.testing.assert_array_equal(found["values"], listed["values"])
-    other = vm.model(MECHANISM, parameters={name: points[1]}).simulate(signals[1])
+    other = vm.model(WISHBONE, parameters={name: points[1]}).simulate(signals[1])
     np.testing.assert_array_equal(found["values"][1], other.outputs)
 
 

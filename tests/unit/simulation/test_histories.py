@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.models import CAR, FIDELITY, VEHICLES
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.metrics import max_abs, rms, signal_range
@@ -85,9 +86,6 @@ def test_stored_seconds_name_their_clock(model, full):
     assert trajectory_dataset(model, full)["seconds"].attrs["clock"] == run_timer.CLOCK
 
 
-DYNAMIC = ("independent_suspension_vehicle", "high_fidelity_vehicle")
-
-
 # One model: its runs share what they are recorded in.
 model_of = cache(vm.model)
 
@@ -99,7 +97,7 @@ def run(name: str, solver: str = "etdrk4", amplitude: float = 1.0):
 
 
 @pytest.mark.parametrize("solver", ["dopri5", "etdrk4"])
-@pytest.mark.parametrize("name", DYNAMIC)
+@pytest.mark.parametrize("name", VEHICLES)
 def test_one_output_is_that_of_all(name, solver):
     one, all_of_them = run(name, solver), run(name, solver)
     whole = all_of_them.outputs
@@ -126,7 +124,7 @@ def test_copies_hold_the_same_histories():
 
 
 def test_an_unknown_output_is_refused():
-    for name in (*DYNAMIC, "double_wishbone"):
+    for name in (*VEHICLES, "double_wishbone"):
         with pytest.raises(InputError, match="steer_angle"):
             run(name, "newton" if name == "double_wishbone" else "etdrk4")["steer_angle"]
 
@@ -136,8 +134,7 @@ def test_a_run_is_no_sequence():
         list(run("independent_suspension_vehicle"))
 
 
-PLAIN, FIDELITY = VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
-RUNS = [(PLAIN, "lane_change"), (PLAIN, "step_steer")]
+RUNS = [(CAR, "lane_change"), (CAR, "step_steer")]
 RUNS += [(FIDELITY, "rack_lane_change"), (FIDELITY, "rack_step_steer")]
 # A tenth of the bounds of the predictive comparison, of the 14-DOF vehicle where they differ.
 TENTH = {

@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
+from tests.models import MODELS, VEHICLES
 from tests.oracles import complex_step
 from vehiclemor.codegen.derivatives import Sensitivity
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-
-VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
-MODELS = ("double_wishbone", *VEHICLES)
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 import vehiclemor as vm
+from tests.models import CAR
 
-CAR = "independent_suspension_vehicle"
 WHEELS = ("FL", "FR", "RL", "RR")
 HELD = {"X", "u", *(f"{name}_{wheel}" for name in ("gamma", "omega") for wheel in WHEELS)}
 

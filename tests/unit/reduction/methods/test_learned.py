@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.models import CAR
 from tests.reducing import training_runs
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change
@@ -20,7 +21,6 @@ LINEAR = {
     "sparse_identification": {"degree": 1, "threshold": 0.0, "ridge": 0.0},
     "dynamic_mode_decomposition": {"ridge": 1e-14},
 }
-CAR = "independent_suspension_vehicle"
 
 
 def learned(name, model, runs, **settings):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.models import CAR
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change, step_steer
@@ -163,9 +164,6 @@ def test_windows_refuse_runs_of_different_durations(model):
     runs = [TrainingRun(model, maneuver, "dropped") for maneuver in (lane_change, step_steer)]
     with pytest.raises(InputError, match="5, 25 s"):
         pod.fit(model, runs, settings)
-
-
-CAR = "independent_suspension_vehicle"
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.models import VEHICLES
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.reduction.vehicle.features import FeatureListing, feature_system
 from vehiclemor.simulation.build import build
@@ -12,7 +13,6 @@ from vehiclemor.simulation.integrators.step_kernels import exponential_step
 from vehiclemor.simulation.system import System
 
 # With pairs that turn with the heading and without; in the mirror image's two blocks.
-VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 PLACE = 60
 H = catalogue.STEP_GRID[PLACE]
 
