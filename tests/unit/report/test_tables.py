@@ -131,18 +131,25 @@ PLAIN = standard_problems.DEFINITION
 NOMINAL = ("figures-6-7", "figures-2-4", "figures-9-10")
 
 
-@pytest.mark.parametrize(("name", "nominal"), [*zip(MODELS, NOMINAL, strict=True)])
-def test_rows_of_the_papers_models_exist_and_are_named_once(name, nominal):
+@pytest.mark.parametrize("name", names("model"))
+def test_rows_of_costs_are_named_once_and_their_methods_take_the_settings(name):
     cases, model = timing_cases(component("model", name)), build(name)
     assert [case.id for case in cases[:2]] == ["baseline", "strongest"]
     for kind in ("id", "label"):
         assert len({getattr(case, kind) for case in cases}) == len(cases)
-    assert {case.method for case in cases} <= set(names("method"))
+    assert "replay" in {case.method for case in cases}
     assert set(of_kind(model.kind).counts) <= set(model.counts)
+    for case in cases:
+        settings = complete_settings(model, case.method, case.settings, case.preset)
+        assert set(settings) == set(component("method", case.method).names_of(model.kind))
+
+
+@pytest.mark.parametrize(("name", "nominal"), [*zip(MODELS, NOMINAL, strict=True)])
+def test_settings_of_the_paper_are_the_defaults_of_pod(name, nominal):
     assert of_paper(name) == nominal
     assert set(tables_file().reduced) == set(MODELS)
-    # Settings of the paper are the defaults of POD.
     printed = [n for n in load_published().numbers.values() if n.model == name]
+    model = build(name)
     assert smaller_rank(model, "pod") == {}
     settings = complete_settings(model, "pod")
     for number in printed:
@@ -209,41 +216,3 @@ def test_the_fastest_ladder_counts_that_reaches_the_error():
     assert continued.seconds == pytest.approx(expected, rel=1e-12)
     assert at_error([slow, fast], 5.0, "seconds") == (1.0, ("fast 1.0",))
     assert math.isnan(at_error([slow, fast], 1e-6, "seconds").seconds)
-
-
-# Prefix of ids -> model.
-PREFIXES = {
-    "gv": "independent_suspension_vehicle",
-    "dw": "double_wishbone",
-    "hfv": "high_fidelity_vehicle",
-    "all": None,
-}
-ANGLE = "second_euler_angle"
-
-# Typed from the paper, not from the file. id -> value, unit, quantity, page, figure; then states,
-# control period and snapshots behind the number, as far as the paper prints them.
-NUMBERS = {
-    "gv_rms_pitch": (5.18e-4, "rad", "pitch", "031007-3", 4, 3, 0.5, None),
-    "gv_rms_yaw": (7.59e-5, "rad", "yaw", "031007-3", 4, 3, 0.5, None),
-    "gv_time_reduction": (0.20, "1", "", "031007-4", None, 3, 0.5, None),
-    "dw_rms_spindle_y": (7.57e-5, "m", "spindle_y", "031007-4", 7, 3, 5.0, 10),
-    "dw_rms_second_euler_angle": (2.4e-5, "rad", ANGLE, "031007-4", 7, 3, 5.0, 10),
-    "dw_time_reduction_3": (0.65, "1", "", "031007-4", None, 3, 5.0, 10),
-    "dw_time_reduction_6": (0.50, "1", "", "031007-7", 14, 6, None, None),
-    "hfv_rms_lateral_speed": (0.0198, "m/s", "lateral_speed", "031007-5", 10, 1, 0.1, 5),
-    "hfv_rms_vertical_speed": (0.0143, "m/s", "vertical_speed", "031007-5", 10, 1, 0.1, 5),
-    "hfv_time_reduction": (0.23, "1", "", "031007-5", None, 1, 0.1, 5),
-}
-
-
-def test_numbers_are_as_printed_and_all_of_them_are_tested() -> None:
-    published = load_published()
-    kinds = ("rms_error", "time_reduction")
-    assert {n.id for n in published.number if n.kind in kinds} == set(NUMBERS)
-    for name, expected in NUMBERS.items():
-        n = published.numbers[name]
-        behind = n.states, n.control_period, n.snapshots
-        assert (n.value, n.unit, n.quantity, n.page, n.figure, *behind) == expected, name
-        assert n.kind == ("rms_error" if "_rms_" in name else "time_reduction"), name
-    for entry in (*published.number, *published.claim):
-        assert entry.model == PREFIXES[entry.id.partition("_")[0]]
