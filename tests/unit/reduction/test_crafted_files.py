@@ -1,0 +1,235 @@
+"""Saved models that somebody has changed: any part is refused in a line or changes nothing."""
+
+import json
+import math
+from contextlib import suppress
+from unittest import mock
+
+import netCDF4
+import numpy as np
+import pytest
+
+import vehiclemor as vm
+from tests.unit.reduction.saved_files import (
+    NOTHING,
+    content,
+    nothing_runs,
+    refused_untouched,
+    replaced,
+    rewritten,
+    written,
+)
+from vehiclemor import netcdf_file
+from vehiclemor.codegen.operations import KINDS, MOST_SIZE
+from vehiclemor.exceptions import FileError
+from vehiclemor.reduction import parts
+from vehiclemor.reduction.parts import Reader
+
+HARM = "__import__('pathlib').Path('harm').touch()"
+ROOM = "vehiclemor.reduction"
+VECTOR = {"array": "reduced.error_scale", "type": "float64", "shape": [6], "turned": False}
+SHAPES = ([-1], [5, -1], [True, 6], [2, 3], [1, 6], [10**9], [6.0], 6, None, "6")
+# Types are checked whatever else a part says of itself.
+HIDDEN = {"model": "none", "class": f"{ROOM}.interface:OfflineCost", "fields": {"seconds": "long"}}
+NAN = {"tuple": [{"tuple": [{"tuple": [math.nan]}, {"tuple": [1]}]}]}
+KERNEL = {"kernels": "def derivative(x, result): result[9] = x[9]"}
+# Of the bicycle: place -> what is no part that may stand there.
+PARTS = [
+    *(("input_range", wrong) for wrong in (None, {"tuple": [1.0]}, {"same": "reduced.offline"})),
+    *(("class", f"{ROOM}.vehicle.features:monomials"), ("fields", {}), ("offline", HIDDEN)),
+    *(("offline", {"function": f"{ROOM}.trust:trust_of"}), ("offline", {"code": HARM})),
+    *(("offline", KERNEL), ("offline", {"method": "encoded", "of": {"same": "reduced"}})),
+    *(("offline", {"same": same}) for same in ("reduced.nothing", [], "reduced.shape")),
+    *(("offline", {"model": name}) for name in ("parameters", "kernels")),
+    *(("offline.fields", {"minutes": 0.0}), ("features", {"same": "reduced.shape"})),
+    *(("features.terms.tuple", ["z0", 3]), ("features.groups", NAN)),
+    *(("coefficients", 3.0), ("coefficients", VECTOR | {"array": "reduced.nothing"})),
+    ("solver", VECTOR),
+    ("model", {"class": "vehiclemor.simulation.dynamic:DynamicModel", "fields": {}}),
+    *(("error_scale", VECTOR | {"shape": shape}) for shape in SHAPES),
+    *(("error_scale", VECTOR | {"type": kind}) for kind in ("int64", "object")),
+    *(("error_scale", VECTOR | {"array": name}) for name in ("parts", ["reduced.error_scale"])),
+]
+
+
+@pytest.mark.parametrize(("place", "value"), PARTS)
+def test_parts_that_would_do_harm_are_refused(saved, place, value):
+    whole = place if place == "input_range" else f"reduced.{place}"
+    refused_untouched(rewritten(saved, replaced({whole: value})))
+
+
+NAMES = [
+    *("os:system", "builtins:eval", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
+    *("vehiclemor.simulation.dynamic:DynamicModel", "vehiclemor.simulation.build:build"),
+    *("vehiclemor.simulation.system:System", f"{ROOM}.reduced_system:ReducedMechanism"),
+    *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.blocks", "PLANAR")),
+    # Defined elsewhere.
+    f"{ROOM}.vehicle.reduced_vehicle:Features",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_of_other_things_are_refused(name):
+    with pytest.raises(ValueError, match="there is no"):
+        parts.named(name)
+
+
+def arrays_instead(array):
+    """Arrays of other sizes and types, and of other numbers where these are whole."""
+    for axis in range(array.ndim):
+        yield array.swapaxes(0, axis)[:-1].swapaxes(0, axis)
+    yield from (array[:0], array[None], np.concatenate([array, array]))
+    if array.dtype.kind == "i":
+        yield from (-1 - array, array + 10**6, array.astype(float))
+    else:
+        yield array.real.astype(int)
+
+
+def values_instead(value):
+    """What may stand in a text in the place of a value."""
+    match value:
+        case bool():
+            return None, 1.0
+        case int():
+            return None, True, -1 - value, value + 1, value + 10**6, str(value)
+        case float():
+            return None, True, str(value)
+        case str():
+            return None, 1, f"{value}x"
+        case list():
+            return None, value[:-1], [], value + value
+        case dict():
+            return None, dict([*value.items()][1:])
+    return 1, "text"
+
+
+def mutations(node, arrays, place):
+    """Changes of every part of a model, each of one place; of lists the first entry alone."""
+    if isinstance(node, dict) and "array" in node:
+        array = Reader(NOTHING, arrays).value(node, "")
+        for other in arrays_instead(array):
+            if other.dtype != array.dtype or not np.array_equal(other, array):
+                yield {place: other}
+        return
+    for value in values_instead(node):
+        yield {place: value}
+    children = enumerate(node[:1]) if isinstance(node, list) else ()
+    for key, part in node.items() if isinstance(node, dict) else children:
+        yield from mutations(part, arrays, f"{place}.{key}")
+
+
+# A basis may have fewer vectors.
+SMALLER = "reduced.fields.bases.tuple.0.fields.vectors"
+
+
+@pytest.mark.parametrize("name", ["bicycle", "car", "map", "pod", "windows", "replay"])
+def test_any_other_part_is_refused_in_a_line_or_changes_nothing(name, contents, tmp_path):
+    """Arrays that don't fit are refused before code is compiled or run."""
+    (path := tmp_path / "model.nc").write_bytes(contents[name])
+    dataset, expected = content(path), vm.load(path).simulate().outputs
+    arrays = {str(name): variable.values for name, variable in dataset.items()}
+    tree = json.loads(dataset["parts"].item())
+    for change in (c for root in tree for c in mutations(tree[root], arrays, root)):
+        written(path, dataset, replaced(change))
+        ((place, value),) = change.items()
+        with nothing_runs() as used, suppress(FileError):
+            vm.load(path)
+        if not used():
+            continue
+        exact = isinstance(value, np.ndarray) and place != SMALLER
+        if exact:
+            np.testing.assert_array_equal(vm.load(path).simulate().outputs, expected, str(change))
+        else:
+            with suppress(FileError):
+                vm.load(path)
+
+
+def nan(array):
+    return np.nan * array
+
+
+# File, word of the check that sees it, places that are changed together.
+TOGETHER = [
+    ("bicycle", "modes", {f"transient.{n}": np.ones((22, 21)) for n in ("left", "right")}),
+    ("car", "transient", {f"transient.{n}": lambda a: a[:, :-1] for n in ("left", "right")}),
+    ("car", "lasted", {f"reach.{n}": lambda a: a[:-1] for n in ("decaying", "steered")}),
+    ("car", "lasted", {"reach.left": lambda a: a[:-1], "reach.starts": lambda a: a[:, :-1]}),
+    ("map", "ranges", {"ranges": nan}),
+    *(("map", "cells", {f"cells.{n}": nan}) for n in ("centres", "scales")),
+    ("map", "cells", {f"cells.{n}": lambda a: a[:1] for n in ("centres", "scales", "numbers")}),
+    ("map", "degree", {"moving.tuple": [], "cells.coefficients": lambda a: a[:, :1]}),
+    ("pod", "formulation", {"spaces.formulation": "full"}),
+    ("pod", "spaces", {f"spaces.{n}": lambda a: a[..., :-1] for n in ("means", "trial_basis")}),
+    ("windows", "bases", {f"bases.1.{n}": lambda a: a[:-1] for n in ("mean", "vectors")}),
+    ("windows", "rank", {"bases.0.vectors": lambda a: np.ones((len(a), len(a) + 1))}),
+]
+TOGETHER[0][2]["transient.rates"] = np.ones(22)
+
+
+@pytest.mark.parametrize(("file", "word", "change"), TOGETHER)
+def test_parts_that_dont_fit_one_another_are_refused(file, word, change, contents, tmp_path):
+    (path := tmp_path / "model.nc").write_bytes(contents[file])
+    changes = {f"reduced.{place}": value for place, value in change.items()}
+    assert word in refused_untouched(rewritten(path, replaced(changes)))
+
+
+def with_row(number, *values):
+    """Operations of which one has other arguments."""
+    return {"arguments": lambda a: np.vstack([a[:number], [values], a[number:][1:]])}
+
+
+def repeated(kind):
+    """Only operations of one kind, on the first one, so many that they take long to compile."""
+    more, number = MOST_SIZE // 150, [*KINDS].index(kind)
+    return {
+        "kinds": lambda a: np.append(a, np.full(more, number)),
+        "arguments": lambda a: np.vstack([a, np.zeros((more, 3), dtype=int)]),
+        "numbers": lambda a: np.append(a, np.zeros(more)),
+    }
+
+
+# Operations 0, 1 and 2 of the bicycle are reduced coordinates, the last one multiplies.
+OPERATIONS = [
+    {"kinds": lambda a: a + 99},
+    # What they were not given, and what is not there yet.
+    *(with_row(0, *entry) for entry in ((0, 9, 0), (1, 9, 0), (2, 99999, 0), (3, 0, 0))),
+    with_row(-1, 0, 9999, 0),
+    # A comparison for a number, and a number for a comparison.
+    {"kinds": lambda a: np.where(a == 2, [*KINDS].index("<"), a)},
+    {"kinds": lambda a: np.append(a[:-1], len(KINDS) - 1)},
+    # More than compiles soon.
+    *map(repeated, ("sqrt", "atan2", "power")),
+]
+
+
+@pytest.mark.parametrize("change", OPERATIONS, ids=range(len(OPERATIONS)))
+def test_operations_that_are_more_than_arithmetic_of_what_is_given_are_refused(change, saved):
+    inner = "reduced.features.operations.operations"
+    changes = {f"{inner}.{name}": value for name, value in change.items()}
+    refused_untouched(rewritten(saved, replaced(changes)))
+
+
+def test_what_is_huge_where_it_is_written_small_is_refused_soon(saved):
+    # Never written: it takes no space in the file.
+    with netCDF4.Dataset(saved, "r+") as file:
+        for axis in "ab":
+            file.createDimension(axis, 10**9)
+        file.createVariable("huge", "f8", ("a", "b"), chunksizes=(1000, 1000))
+    content = saved.read_bytes()
+    saved.write_bytes(content + netcdf_file.SEAL + netcdf_file._digest(content))
+    assert "its variables have more than" in refused_untouched(saved)
+
+
+def test_parts_that_stand_for_ever_more_are_refused_soon(saved):
+    twice = [{"tuple": [{"same": f"reduced.offline.{number}"}] * 2} for number in range(60)]
+    many = replaced({"reduced.offline": {"tuple": [{"tuple": [1.0, 2.0]}, *twice]}})
+    assert "too many parts" in refused_untouched(rewritten(saved, many))
+    deep = replaced({"reduced.offline": json.loads("[" * 900 + "]" * 900)})
+    refused_untouched(rewritten(saved, deep))
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "1" * 5_000, "[" + "0," * 2_000_001 + "0]"])
+def test_texts_that_are_deep_or_long_are_refused_soon(text, saved):
+    with mock.patch.object(json, "dumps", return_value=text):
+        rewritten(saved, lambda *_: None)
+    refused_untouched(saved)
