@@ -45,7 +45,7 @@ def of_runs(model, method, training, tests, **settings):
 def _nothing_kept():
     """What an earlier test has fitted or solved is not used again."""
     evaluation.cached_reference.cache_clear()
-    evaluation._KEPT.clear()
+    evaluation._FITS.clear()
 
 
 @pytest.fixture(scope="module")
