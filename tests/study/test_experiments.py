@@ -216,6 +216,10 @@ def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
     assert len(raised) == 3
 
 
+def test_a_fit_for_a_model_of_another_kind_is_a_failure(vehicle):
+    assert isinstance(cached_fit(vehicle, experiment(vehicle, "path_map")), Failure)
+
+
 MODELS = {
     "independent_suspension_vehicle": "lane_change",
     "high_fidelity_vehicle": "rack_multisine",

@@ -16,6 +16,7 @@ from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.fallback import with_fallback
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
+from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.trust import InputRange, input_range
 from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
 from vehiclemor.registry import component
@@ -184,7 +185,7 @@ def _new_fit(fit: Fit) -> FittedModel | Failure:
     method: Method = component("method", fit.method)
     if method.variant_of:
         method = component("method", method.variant_of)
-    integration = method.settings[fit.model.kind].integration
+    integration = method.settings.get(fit.model.kind, Settings).integration
     defaults = default_settings(fit.model, method.name)
     read_later = [name for name in (*integration, *FALLBACK) if name in settings]
     common = settings | {name: defaults[name] for name in read_later}
@@ -257,7 +258,7 @@ def _tested(
     if many:
         return Outcome(judged, reference)
     if judged.status != run.status:
-        # A study shows what a protocol would not trust; the status is the method's own.
+        # A study shows what a protocol would not trust; the status is that of the method.
         remark = "; ".join(filter(None, (run.remark, f"not to be trusted: {judged.message}")))
         judged = replace(judged, status=run.status, message=run.message, remark=remark)
     if reference is None:
