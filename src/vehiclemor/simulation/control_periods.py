@@ -7,7 +7,7 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.integrators.structures import Spans, Subspaces
+from vehiclemor.simulation.loop_arguments import Spans, Subspaces
 from vehiclemor.sizes import require, shaped, within
 
 # Lists of spans that are kept.

@@ -16,7 +16,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import checked_path
 
-PATH_LOOPS = ("simulation.integrators.structures", "simulation.path_loops")
+PATH_LOOPS = ("simulation.loop_arguments", "simulation.path_loops")
 # Places of the arguments of a kernel.
 STATE, INPUTS, CONSTANTS = range(3)
 PLACES = {"state": STATE, "inputs": INPUTS}

@@ -11,7 +11,7 @@ from vehiclemor.codegen.loop_types import (
     call_lanes,
 )
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.simulation.integrators.structures import (
+from vehiclemor.simulation.loop_arguments import (
     NODE_1,
     NODE_2,
     NODES,
@@ -62,7 +62,7 @@ def watched(
     """The first sample at which each of some outputs is outside of its range; else their number.
 
     States are those at the points of a run (points, n or more), which are the samples where there
-    are no places, see `structures.Output`; results (points, results) of the kernel are scratch
+    are no places, see `loop_arguments.Output`; results (points, results) of the kernel are scratch
     space.
     """
     samples = len(places) if len(places) else len(states)

@@ -179,7 +179,7 @@ def test_another_source_kernel_size_or_compiler_is_another_file(monkeypatch):
         {"kernels": other},
         {"sizes": (("N", 1),)},
         {"sizes": (("N", 2),)},
-        {"modules": ("simulation.integrators.structures", "simulation.path_loops")},
+        {"modules": ("simulation.loop_arguments", "simulation.path_loops")},
     ):
         ask(**given)
     for name in ("source_digest", "compiler_identity"):
