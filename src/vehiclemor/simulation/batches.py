@@ -14,7 +14,7 @@ import numpy as np
 from vehiclemor.arguments import MOST_JOBS, count, quoted, real_array
 from vehiclemor.exceptions import ConvergenceError, InputError, VehiclemorError
 from vehiclemor.failure import Failure, attempt
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.provenance import attributes
 from vehiclemor.registry import choice
@@ -57,7 +57,7 @@ REPORTED = {
 
 def simulate_many(
     model: str | Model | Any,
-    signals: Sequence[Maneuver],
+    signals: Sequence[Excitation],
     starts: Start | Sequence[Start] | None = None,
     parameters: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     *,
@@ -131,7 +131,7 @@ def simulate_many(
     )
 
 
-def _about(given: Any, full: Model, signals: Sequence[Maneuver]) -> dict[str, Any]:
+def _about(given: Any, full: Model, signals: Sequence[Excitation]) -> dict[str, Any]:
     """Attributes of the result: of which model with which settings it is."""
     others = {"structural": (SOLVER, TIGHT), "ae": ("newton", NEWTON_TOLERANCE)}
     solver, tolerance = others.get(full.kind, (REFERENCE_SOLVER, REFERENCE_TOLERANCE))
@@ -150,7 +150,7 @@ def _report(done: Trajectory | Failure, model: Model) -> tuple:
     return *own, *done.counts.values()
 
 
-def _whole_run(model: Any, signal: Maneuver, start: Start, names: tuple[str, ...]) -> Trajectory:
+def _whole_run(model: Any, signal: Excitation, start: Start, names: tuple[str, ...]) -> Trajectory:
     """A run with some outputs alone; it may have diverged."""
     try:
         return model.simulate(signal, start, outputs=names)
@@ -162,10 +162,10 @@ def _whole_run(model: Any, signal: Maneuver, start: Start, names: tuple[str, ...
 
 def _count_of(signals: Any, model: Model) -> int:
     """Number of runs; `InputError` if something else than inputs of the model is given."""
-    if isinstance(signals, Maneuver) or not isinstance(signals, Sequence) or not len(signals):
+    if isinstance(signals, Excitation) or not isinstance(signals, Sequence) or not len(signals):
         raise InputError(f"signals is {quoted(signals)}, not a list with a signal for each run")
     for run, signal in enumerate(signals):
-        if not isinstance(signal, Maneuver):
+        if not isinstance(signal, Excitation):
             raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
         if signal.for_inputs(model.inputs).inputs != model.inputs:
             raise InputError(
@@ -183,7 +183,7 @@ def _names(model: Model, outputs: Names) -> tuple[str, ...]:
 
 
 def _kept_times(
-    given: Any, signals: Sequence[Maneuver]
+    given: Any, signals: Sequence[Excitation]
 ) -> tuple[np.ndarray, list[slice | np.ndarray]]:
     """Times in s of the result, and which samples of each run these are."""
     first = signals[0]

@@ -12,8 +12,7 @@ import numpy as np
 from vehiclemor.arguments import loop_array, number
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import recorded_inputs
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.simulation.checks import left_validity, lifted_wheels
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.evaluation import By, chosen
@@ -147,7 +146,7 @@ class DynamicModel(Model):
 
     def simulate(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,
@@ -186,7 +185,7 @@ class DynamicModel(Model):
 
     def integrate(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         state: np.ndarray,
         windows: ControlPeriods,
         how: Solver,
@@ -201,7 +200,7 @@ class DynamicModel(Model):
             self.require("second_order", "speeds")
         run = self.system.run(maneuver, state, windows, how, 0.0)
         whole = how.times is None and not how.begin
-        inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
+        inputs = maneuver.recorded_inputs[1] if whole else maneuver.at(run.times)
         found = self.recorded(maneuver, run, inputs, run.whole, outputs=outputs)
         run.give_back()
         return found
@@ -221,7 +220,7 @@ class DynamicModel(Model):
 
     def recorded(
         self,
-        maneuver: Maneuver | None,
+        maneuver: Excitation | None,
         run: Run,
         inputs: np.ndarray,
         states: np.ndarray,

@@ -14,7 +14,7 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
@@ -154,7 +154,7 @@ class Model(ShortRepr):
     @abstractmethod
     def simulate(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,

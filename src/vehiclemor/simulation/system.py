@@ -13,8 +13,7 @@ from vehiclemor.codegen.loops import Prepared, Ready, ready
 from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import recorded_inputs, signal_of
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, output_times
 from vehiclemor.simulation.control_periods import ControlPeriods
@@ -154,7 +153,7 @@ class System(ShortRepr):
 
     def run(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         state: np.ndarray,
         windows: ControlPeriods,
         solver: Solver,
@@ -179,7 +178,7 @@ class System(ShortRepr):
             length = maneuver.duration, maneuver.samples
             kind = length, id(windows), name, tolerance, longest, direct_until
             space, left = self._pool.taken(kind, make), partial(self._pool.give_back, kind)
-            if space.signal is not signal_of(maneuver):
+            if space.signal is not maneuver.packed_pieces:
                 space.take(self._drive(maneuver, windows, space.output.samples))
         self._set_constants(space.call)
         output = space.output
@@ -196,7 +195,7 @@ class System(ShortRepr):
 
     def workspace(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         windows: ControlPeriods,
         solver: Solver,
         direct_until: float = np.inf,
@@ -216,13 +215,13 @@ class System(ShortRepr):
         return self.packed(windows, solver, drive, output)
 
     def _drive(
-        self, maneuver: Maneuver, windows: ControlPeriods, times: np.ndarray, begin: float = 0.0
+        self, maneuver: Excitation, windows: ControlPeriods, times: np.ndarray, begin: float = 0.0
     ) -> DrivenBy:
         """What of a maneuver goes into a run."""
-        signal = signal_of(maneuver)
+        signal = maneuver.packed_pieces
         end = float(times[-1]) if len(times) else maneuver.duration
         spans = windows.spans(signal.bundle.edges, end, begin)
-        return DrivenBy(signal, spans, recorded_inputs(maneuver)[1])
+        return DrivenBy(signal, spans, maneuver.recorded_inputs[1])
 
     def packed(
         self, windows: ControlPeriods, solver: Solver, drive: DrivenBy, output: Output
