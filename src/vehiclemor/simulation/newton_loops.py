@@ -144,19 +144,16 @@ def failure(q):
 
 def stopped(counts, iterations, jacobians, status):
     """Status of a loop that ends; writes its counts."""
-    counts[ITERATIONS], counts[RESIDUALS], counts[LINEAR_SOLVES] = (
-        iterations,
-        iterations,
-        iterations,
-    )
+    counts[ITERATIONS] = iterations
+    counts[RESIDUALS] = iterations
+    counts[LINEAR_SOLVES] = iterations
     counts[JACOBIANS] = jacobians
     return status
 
 
 def newton(q, u, mechanism, iteration, work):
     """Newton's method from q, which it changes: its iterations, negative where it has failed."""
-    n = len(q)
-    constants, step, full = mechanism.constants, work.step, work.full
+    n, constants, step, full = len(q), mechanism.constants, work.step, work.full
     first, second = 0.0, 0.0
     for count in range(1, iteration.limit + 1):
         call_kernel(mechanism.kernels, STEP, q, u, constants, step)
