@@ -13,8 +13,7 @@ from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, lo
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
 from vehiclemor.inputs.checks import checked_maneuver
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import kept, recorded_inputs
+from vehiclemor.inputs.excitation import Excitation, cached
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import choice
 from vehiclemor.simulation import newton_loops
@@ -167,7 +166,7 @@ class AlgebraicModel(Model):
 
     def simulate(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,
@@ -187,7 +186,7 @@ class AlgebraicModel(Model):
         run = self._solved(sampled, "newton" if solver is None else solver, tolerance)
         return run if outputs is None else run.chosen(outputs)
 
-    def sampled(self, maneuver: Maneuver) -> Sampled:
+    def sampled(self, maneuver: Excitation) -> Sampled:
         """Output times in s of a maneuver and its inputs, ready for loops; to be read only."""
         return _sampled(checked_maneuver(maneuver, self.definition))
 
@@ -322,9 +321,9 @@ def _iteration(tolerance: float, shortest: float) -> Ready:
     return ready(newton_loops.Iteration(tolerance, *limits))
 
 
-@kept
-def _sampled(maneuver: Maneuver) -> Sampled:
-    times, inputs = recorded_inputs(maneuver)
+@cached
+def _sampled(maneuver: Excitation) -> Sampled:
+    times, inputs = maneuver.recorded_inputs
     checked_inputs(inputs, times, maneuver.inputs)
     return times, inputs, ready(newton_loops.Samples(inputs))
 

@@ -24,7 +24,7 @@ from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
 from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value
 from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.exceptions import InputError, UnreachableError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.map_loops import REPORTED, Cells
 from vehiclemor.reduction.reduced_system import ReducedMechanism
@@ -143,7 +143,7 @@ class PathMapModel(ReducedMechanism):
         call.words[call.address("space") + 1] = size
         return call
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """Polynomials at the maneuver's output times."""
         self.model.check_start(start)
         return self._evaluated(*self.model.sampled(maneuver))

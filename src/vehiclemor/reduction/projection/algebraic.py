@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
 from vehiclemor.reduction.projection.bases import (
@@ -119,7 +119,7 @@ class AlgebraicProjection(ReducedMechanism):
         failure = (status, int(counts[SAMPLE])) if status else None
         return model.trajectory(times, inputs, path, counts.tolist(), seconds, failure)
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """Solve the reduced equations at the maneuver's output times."""
         times, inputs, _ = self.model.sampled(maneuver)
         return self.solved_at(times, inputs, self.model.start(start))
