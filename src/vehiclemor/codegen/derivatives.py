@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.cache import digest_of, fetched, once
+from vehiclemor.codegen.cache import cached_by_one_thread, digest_of, from_cache
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.operations import (
     COMPARISONS,
@@ -78,7 +78,7 @@ def derivative(kernel: Kernel, arguments: Sequence[str]) -> Kernel:
         return json.dumps(asdict(_derived(kernel, arguments))).encode()
 
     parts = repr(kernel), *arguments, source_digest(("codegen",))
-    content = fetched(f"derivatives/{kernel.name}-{digest_of(parts)}.json", make)
+    content = from_cache(f"derivatives/{kernel.name}-{digest_of(parts)}.json", make)
     return Kernel.read(json.loads(content))
 
 
@@ -286,7 +286,7 @@ def _rows(count: int) -> int:
     return count if count <= FEW else -(-count // DIRECTIONS) * DIRECTIONS
 
 
-@once
+@cached_by_one_thread
 def _function(kernel: Kernel, lanes: int) -> Callable[..., None]:
     """Machine code of a derivative as a C function; for many directions it takes row lengths."""
     kinds: list[Any] = [ctypes.c_void_p] * len(kernel.arguments)
@@ -294,7 +294,7 @@ def _function(kernel: Kernel, lanes: int) -> Callable[..., None]:
     return ctypes.CFUNCTYPE(None, *kinds)(Kernels([kernel]).address(kernel.name, lanes))
 
 
-@once
+@cached_by_one_thread
 def jacobian_product(kernel: Kernel, argument: str, size: int, width: int) -> JacobianProduct:
     """Of a kernel's result of `size` floats by an argument of `width`, such as `_x`."""
     return JacobianProduct(derivative(kernel, (argument,)), size, width)

@@ -18,7 +18,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.cache import cache_folder, compiler_identity, digest_of, fetched, once
+from vehiclemor.codegen.cache import (
+    cache_folder,
+    cached_by_one_thread,
+    compiler_identity,
+    digest_of,
+    from_cache,
+)
 from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import plug_in_digest, source_digest
 from vehiclemor.short_repr import ShortRepr
@@ -127,7 +133,7 @@ class MachineCode:
         return found
 
 
-@once
+@cached_by_one_thread
 def _target() -> Any:
     import llvmlite.binding as llvm
 
@@ -139,7 +145,7 @@ def _target() -> Any:
 _of = lru_cache(maxsize=64)(Kernel.of)
 
 
-@once
+@cached_by_one_thread
 def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
     """Address and C function of a kernel, and what owns its machine code."""
     parts = repr(kernel), str(lanes), source_digest(("codegen",)), compiler_identity()
@@ -150,7 +156,7 @@ def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
 
         return compiled_module(kernel_module([kernel], lanes))
 
-    code = MachineCode(fetched(f"kernels/{kernel.name}-{digest_of(parts)}.o", make))
+    code = MachineCode(from_cache(f"kernels/{kernel.name}-{digest_of(parts)}.o", make))
     address = code.address(kernel.name)
     pointers = [ctypes.c_void_p] * len(kernel.arguments)
     # It keeps the lock of the interpreter, which takes longer to get back than one call lasts.
@@ -198,7 +204,7 @@ def derivation(name: str, derive: Callable[[], Program]) -> Derivation:
 
         return json.dumps([asdict(kernel) for kernel in kernels_of(derive()).values()]).encode()
 
-    return _read(fetched(_file(name, derive), make))
+    return _read(from_cache(_file(name, derive), make))
 
 
 def is_derived(name: str, derive: Callable[[], Program]) -> bool:

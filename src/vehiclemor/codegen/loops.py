@@ -14,7 +14,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from vehiclemor.codegen.cache import compiler_identity, digest_of, fetched, once
+from vehiclemor.codegen.cache import cached_by_one_thread, compiler_identity, digest_of, from_cache
 from vehiclemor.codegen.kernels import MachineCode
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.sources import source_digest
@@ -142,7 +142,7 @@ def _flat(value: Any) -> list[Any]:
     return [part for field in value for part in _flat(field)]
 
 
-@once
+@cached_by_one_thread
 def loops(modules: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, Loop]:
     """Compiled entries, functions with declared types, of modules of loops.
 
@@ -157,7 +157,7 @@ def loops(modules: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, Loop]
 
         return compiled_loops(imported, entries)
 
-    code = MachineCode(fetched(f"loops/{modules[-1].rpartition('.')[2]}-{key}.o", make))
+    code = MachineCode(from_cache(f"loops/{modules[-1].rpartition('.')[2]}-{key}.o", make))
     functions = {name: _entry(imported, name) for name in entries}
     return {
         name: Loop(name, declared_arguments(function), code) for name, function in functions.items()
