@@ -31,7 +31,7 @@ ARRAYS = [struct.Struct(f"{dimensions + 1}q") for dimensions in range(4)]
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """A bundle of arrays and numbers, taken apart once for many runs; it must not change."""
+    """A bundle of arrays and numbers in words, for many runs; it must not change."""
 
     bundle: Any
     words: bytes
@@ -127,9 +127,9 @@ def _part(loop: str, kind: Kind, part: Any) -> bytes:
         and part.dtype == DTYPES[code]
         and (flags := part.flags).c_contiguous
     ):
-        found = f"{part.dtype}{part.shape}" if hasattr(part, "dtype") else type(part)
+        kind_of_part = f"{part.dtype}{part.shape}" if hasattr(part, "dtype") else type(part)
         raise TypeError(
-            f"{loop}: {name} must be a C-contiguous array {code}[{dimensions}], not {found}"
+            f"{loop}: {name} must be a C-contiguous array {code}[{dimensions}], not {kind_of_part}"
         )
     address = address_of_array(part) if flags.writeable and part.size else part.ctypes.data
     return ARRAYS[dimensions].pack(address, *part.shape)

@@ -250,7 +250,7 @@ class AlgebraicModel(Model):
         n, inputs, m = len(self.coordinates), len(self.inputs), len(self.outputs)
         lane_kernels = self.addresses("newton_step", "outputs", lanes=LANES)
         solution = newton_loops.Solution(np.empty((0, n + m)), new_counts())
-        buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 2))
+        buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 1))
         loop = kinematic_loop("lane_path")
         shared = self._ready_mechanism, samples, lane_kernels, iteration
         call = loop.prepared(*shared, solution, buffer)
