@@ -45,16 +45,18 @@ def ready(bundle: Any) -> Ready:
 class Prepared:
     """A loop with its arguments in words, some of which may be replaced from run to run."""
 
-    __slots__ = ("_entry", "_given", "_kept", "_places", "words")
+    __slots__ = ("_arguments", "_entry", "_given", "_offsets", "words")
 
     def __init__(
         self,
         entry: Callable[[Any], int],
         packed: bytes,
-        places: Mapping[str, int],
+        offsets: Mapping[str, int],
         arguments: tuple[Any, ...],
     ) -> None:
-        self._entry, self._places, self._kept = entry, places, arguments
+        self._entry, self._offsets = entry, offsets
+        # They own the memory at the addresses in the words.
+        self._arguments = arguments
         self._given: dict[str, Ready] = {}
         self.words = (ctypes.c_int64 * (len(packed) // 8)).from_buffer_copy(packed)
 
@@ -64,13 +66,13 @@ class Prepared:
 
     def give(self, name: str, bundle: Ready) -> None:
         """Replace an argument that is a bundle."""
-        place = ctypes.addressof(self.words) + LONG.size * self._places[name]
-        ctypes.memmove(place, bundle.words, len(bundle.words))
+        address = ctypes.addressof(self.words) + LONG.size * self._offsets[name]
+        ctypes.memmove(address, bundle.words, len(bundle.words))
         self._given[name] = bundle
 
     def address(self, name: str) -> int:
-        """Number of the word that is the address of an array; its shape follows."""
-        return self._places[name]
+        """Index of the word with the address of an array; its shape follows."""
+        return self._offsets[name]
 
 
 class Loop:
@@ -80,19 +82,20 @@ class Loop:
         self.name = name
         self._kinds = [_kinds(kind, argument) for argument, kind in declared.items()]
         self._entry, self._code = _ENTRY(code.address(name)), code
-        self._places, place = {}, 0
+        # Index of the first word of each argument and of each part of a bundle.
+        self._offsets, offset = {}, 0
         for argument, kinds in zip(declared, self._kinds, strict=True):
-            self._places[argument] = place
+            self._offsets[argument] = offset
             for part, _, dimensions in kinds:
-                self._places[part] = place
-                place += dimensions + 1
+                self._offsets[part] = offset
+                offset += dimensions + 1
 
     def __call__(self, *arguments: Any) -> int:
         """Run the loop; the lock of the interpreter is released meanwhile."""
         return self.prepared(*arguments)()
 
     def prepared(self, *arguments: Any) -> Prepared:
-        """The loop with its arguments, which it keeps alive; `TypeError` if one does not fit."""
+        """The loop with its arguments; `TypeError` if one does not fit."""
         name = self.name
         packed = b"".join(
             [
@@ -100,11 +103,11 @@ class Loop:
                 for kinds, value in zip(self._kinds, arguments, strict=True)
             ]
         )
-        return Prepared(self._entry, packed, self._places, arguments)
+        return Prepared(self._entry, packed, self._offsets, arguments)
 
 
 def address_of_array(array: np.ndarray) -> int:
-    """Where a C-contiguous array that can be written and holds something begins."""
+    """Address of the first entry of a writable C-contiguous array that is not empty."""
     # In a third of the time of `array.ctypes.data`.
     return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
 
@@ -171,7 +174,10 @@ def loops_digest(modules: Sequence[str]) -> str:
 
 
 def _entry(modules: Sequence[ModuleType], name: str) -> Any:
-    return next(found for m in reversed(modules) if inspect.isfunction(found := vars(m).get(name)))
+    for module in reversed(modules):
+        if inspect.isfunction(entry := vars(module).get(name)):
+            return entry
+    raise ImportError(f"no module of loops has the entry {name}")
 
 
 @cache

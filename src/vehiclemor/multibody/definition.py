@@ -68,7 +68,7 @@ class Structure:
     # Cq, Cv, Ca (outputs, n) and Cf (outputs, p).
     outputs: tuple[csc_array, csc_array, csc_array, csc_array]
 
-    def held(self, stiffness: np.ndarray) -> csc_array:
+    def with_port_springs(self, stiffness: np.ndarray) -> csc_array:
         """K (n, n) with springs of these stiffnesses (p,) at the ports."""
         return self.stiffness + self.ports @ (stiffness[:, None] * self.ports.T)
 

@@ -101,7 +101,7 @@ class MovingFrame:
             bias = bias + coriolis + relative.bias
         return Motion(g.named(tape, velocity), columns, g.named(tape, bias))
 
-    def turning(self, tape: Tape, relative: Motion) -> Motion:
+    def angular_velocity_of(self, tape: Tape, relative: Motion) -> Motion:
         """Angular velocity of a body that turns relative to the frame; biases are accelerations."""
         turn = self.angular_velocity
         columns = {3 + i: UNIT[i] for i in range(3)} | dict(relative.columns)

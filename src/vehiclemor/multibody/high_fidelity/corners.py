@@ -130,7 +130,7 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
         design = _arm_tensor(tape, v, k, part, name)
         tensor = m.turned_tensor(tape, design, part.axis(tape), part.angle)
         centre = frame.point(tape, centre_now, carried(tape, STILL, turn, lever))
-        rotation = m.with_inertia(tape, tensor, frame.turning(tape, turn))
+        rotation = m.with_inertia(tape, tensor, frame.angular_velocity_of(tape, turn))
         return Body(p[f"{name}_arm_mass"], centre, m.ZERO, rotation, tensor)
 
     along_rod, transverse = p["tie_rod_axial_inertia"], p["tie_rod_transverse_inertia"]
@@ -144,7 +144,7 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
             carried(tape, motions.rack_end, motions.rod, half),
         ),
         m.ZERO,
-        m.with_inertia(tape, tensor, frame.turning(tape, motions.rod)),
+        m.with_inertia(tape, tensor, frame.angular_velocity_of(tape, motions.rod)),
         tensor,
     )
     mass, centre, tensor = _with_wheel(tape, v, k, "carrier", diagonal(p, "carrier_inertia"))
@@ -208,7 +208,7 @@ def _wheeled_body(tape: Tape, v: Vehicle, k: int, part: _WheelCarrier) -> tuple[
         frame.point(tape, point, carried(tape, part.motion, part.turn, lever))
         for point, lever in zip(positions, levers, strict=True)
     )
-    turning = frame.turning(tape, part.turn)
+    turning = frame.angular_velocity_of(tape, part.turn)
     height = tape.let(v.q[2] + tape.let(v.attitude.road_normal @ positions[1]))
     on_road = tilted_wheel(
         tape, v.attitude.road_normal, height, axle, wheel.value, turning.value, v.rates[spin], v.p
