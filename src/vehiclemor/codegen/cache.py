@@ -26,7 +26,7 @@ from typing import Any, TypeVar
 
 from vehiclemor.exceptions import FileError, MachineError
 from vehiclemor.files import write_whole
-from vehiclemor.progress import making
+from vehiclemor.progress import compiling
 
 Made = TypeVar("Made")
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
@@ -119,8 +119,9 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
         return content
     if reason:
         _LOG.warning("%s is made again: %s", path, reason)
-    told = nullcontext() if name.startswith("sources") else making(path.stem.partition("-")[0])
-    with told, locked(path), _no_collection():
+    quick = name.startswith("sources")
+    spoken = nullcontext() if quick else compiling(path.stem.partition("-")[0])
+    with spoken, locked(path), _no_collection():
         content, _ = _checked(path, name)
         if content is None:
             content = make()

@@ -14,7 +14,7 @@ import xarray as xr
 
 from vehiclemor.arguments import MOST_JOBS, count
 from vehiclemor.exceptions import FileError, InputError
-from vehiclemor.progress import tell, telling
+from vehiclemor.progress import announced, tell
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
@@ -84,7 +84,7 @@ def _plans(study: str, seed: int | None) -> list[Grid | Protocol | tuple[str, St
         else:
             large = definition.points >= LARGE
             text = f"{name}: checking {definition.points} grid points"
-            with telling(text) if large else nullcontext():
+            with announced(text) if large else nullcontext():
                 plans.append(expand(name, definition))
     return plans
 
