@@ -14,7 +14,7 @@ from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.validation import checked_run, validated
+from vehiclemor.reduction.validation import checked_run, fitted, validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build, check_equations
@@ -139,7 +139,7 @@ def check_method(name: str, model_name: str) -> None:
         for policy in ("matched", "nominal"):
             test = maneuver if policy == "matched" else maneuver.perturbed(1.1, 0.9)
             trained = TrainingRun(model, test if policy == "matched" else maneuver, model.starts[0])
-            reduced = method.fit(model, (trained,), settings)
+            reduced = fitted(method, model, (trained,), settings)
             where = f"{name} ({preset}, {policy}) on {model_name}"
             try:
                 first, again = (checked_run(model, test, model.starts[0], reduced) for _ in "12")

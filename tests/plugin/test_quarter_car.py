@@ -25,8 +25,7 @@ from vehiclemor.resources import data_folder
 from vehiclemor.simulation.build import build
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
-SOLVERS = {"dopri5": 1e-10, "rodas4": 1e-9, "ros34pw2": 1e-8, "etdrk4": 1e-8}
-SOLVERS["exponential_adams"] = 1e-9
+SOLVERS = {"dopri5": 1e-10, "rodas4": 1e-9, "etdrk4": 1e-8}
 
 
 @pytest.fixture(scope="module")
@@ -77,9 +76,9 @@ def test_an_installed_plug_in_is_listed_in_a_new_process():
 
 @pytest.mark.parametrize("frequency", [0.88, 0.9, 0.92])
 def test_loose_steps_from_rest_do_not_pass_over_the_road(car, frequency):
-    # The W-method's error estimate of one step over the whole run is zero by chance at 0.9.
+    # An error estimate of one step over the whole run may be zero by chance.
     road = component("maneuver", car.definition.maneuver).perturbed(frequency, 1.0)
-    run = car.simulate(road, solver="ros34pw2", tolerance=2e-3)
+    run = car.simulate(road, solver="etdrk4", tolerance=2e-3)
     expected = exact(car, np.zeros(4), sine(frequency), run.times)
     assert run.counts["steps"] > 50
     np.testing.assert_allclose(run.states, expected, atol=0.05 * np.abs(expected).max())
@@ -223,7 +222,7 @@ def test_a_name_stands_wherever_the_template_has_its_own(here, capsys):
         (["my_car", "--out", "file"], "file exists: it is not replaced"),
         (["my_car", "--out", "no/where"], "no/where: the folder no does not exist"),
         (["my_car", "--out", "file/x"], "file/x: "),
-        (["my_car", "--out", "a" * 300], "can't be written"),
+        (["my_car", "--out", "a" * 300], "is not a path"),
     ],
 )
 def test_what_cannot_be_made_is_one_line(plug_in_package, here, capsys, arguments, words):

@@ -64,6 +64,10 @@ def offline_cost(
     return OfflineCost(time.process_time() - began, evaluations)
 
 
+# What every fitted model has.
+MEMBERS = ("simulate", "best_approximation", "offline", "order")
+
+
 class FittedModel(Protocol):
     """What `fit` returns: whole runs.
 
@@ -118,10 +122,6 @@ def _selects(kind: type) -> bool:
     return "outputs" in signature(kind.simulate).parameters  # type: ignore[attr-defined]
 
 
-# Gives the method of a name with its settings, fitted to the same training runs.
-FitOther = Callable[[str, Any], FittedModel]
-
-
 def never_refused(model: Any) -> str:  # noqa: ARG001
     """Every model of a kind that the method has settings for can be reduced."""
     return ""
@@ -161,8 +161,8 @@ class Method(ShortRepr):
     follows_time
         Whether what it fits belongs to the times of the training runs, as a basis for each control
         period does: then a run is known where its inputs are those of a training run.
-    fits_others
-        Whether `fit` takes a `FitOther` too, by which it fits what it is made of.
+    variant_of
+        Name of the method with the same `fit`, if this one differs from it in defaults alone.
     check
         (model, settings): raises `InputError` if valid settings don't fit the model or each other.
     presets
@@ -186,7 +186,7 @@ class Method(ShortRepr):
     own_limits: bool = False
     band: str = ""
     follows_time: bool = False
-    fits_others: bool = False
+    variant_of: str = ""
     presets: Mapping[str, Presets] = field(default_factory=dict)
     packages: tuple[str, ...] = ()
 

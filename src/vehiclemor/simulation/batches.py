@@ -21,7 +21,7 @@ from vehiclemor.registry import choice
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.build import build, reparametrised
 from vehiclemor.simulation.checks import checked_path
-from vehiclemor.simulation.dynamic import reference_solver
+from vehiclemor.simulation.dynamic import REFERENCE_SOLVER, REFERENCE_TOLERANCE
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
 from vehiclemor.simulation.structures.model import SOLVER, TIGHT
@@ -133,9 +133,8 @@ def simulate_many(
 
 def _about(given: Any, full: Model, signals: Sequence[Excitation]) -> dict[str, Any]:
     """Attributes of the result: of which model with which settings it is."""
-    solver, tolerance = reference_solver(signals[0])
     others = {"structural": (SOLVER, TIGHT), "ae": ("newton", NEWTON_TOLERANCE)}
-    solver, tolerance = others.get(full.kind, (solver, tolerance))
+    solver, tolerance = others.get(full.kind, (REFERENCE_SOLVER, REFERENCE_TOLERANCE))
     runs, default = len(signals), {"solver": solver, "tolerance": tolerance}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
     title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}

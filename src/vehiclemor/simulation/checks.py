@@ -61,9 +61,8 @@ def checked_inputs(value: Any, times: np.ndarray, names: Sequence[str]) -> np.nd
 
 def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
     """Raise `InputError` if a value is no finite positive number, or is below the smallest."""
-    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
-        value, bool
-    )
+    number = isinstance(value, int | float | np.integer | np.floating)
+    number = number and not isinstance(value, bool | np.timedelta64)
     # An integer may be too large for a float.
     if not (number and 0.0 < value <= LARGEST and value >= smallest):  # type: ignore[operator]
         bound = f"at least {smallest:g}" if smallest else "positive"

@@ -69,8 +69,8 @@ class Scenario:
     @property
     def content(self) -> dict[str, Any]:
         """Everything that determines the run of a given model, for a hash."""
-        own = {} if self.parameters == () else {"parameters": self.parameters}
-        return own | {
+        changed = {} if self.parameters == () else {"parameters": self.parameters}
+        return changed | {
             "maneuver": self.maneuver.name,
             "frequency": self.maneuver.frequency_factor,
             "amplitude": self.maneuver.amplitude_factor,
@@ -110,7 +110,7 @@ class Scenario:
 def _sent(maneuver: Excitation) -> Excitation | tuple[str, float, float]:
     """What goes to another process: the name of a registered maneuver, and its factors.
 
-    Its functions would be new ones each time: what was fitted or solved with it were not found.
+    Its functions would be new ones each time: fits and references with it would not be reused.
     """
     sent = maneuver.name, maneuver.frequency_factor, maneuver.amplitude_factor
     with suppress(InputError):
@@ -148,7 +148,7 @@ def input_hash(maneuver: Excitation) -> str:
 
 
 class Values(dict[str, Any]):
-    """Values by name that many experiments share: their canonical JSON text is made once."""
+    """Values by name that many experiments share: their canonical JSON text is written once."""
 
     @cached_property
     def text(self) -> str:
@@ -170,12 +170,12 @@ def model_of_run(model: Model, scenario: Scenario) -> Model:
 # More than the runs of a protocol, over which all rows go.
 @lru_cache(maxsize=1024)
 def with_parameters(model: Model, parameters: Overrides) -> Model:
-    """The model with some of its parameters changed; kept, since many runs are of one sample."""
+    """The model with some of its parameters changed; cached, since many runs are of one sample."""
     return reparametrised(model, dict(parameters)) if parameters else model
 
 
 def start_of(model: Model, scenario: Scenario) -> Start:
-    """What a run starts from: a name, or at another speed than the model's own the state (n,)."""
+    """What a run starts from: a name, or at another speed than that of the model the state (n,)."""
     if scenario.speed is None or scenario.speed == own_speed(model_of_run(model, scenario)):
         return scenario.start
     return _state_at(model, (*scenario.parameters, (SPEED, scenario.speed)), scenario.start)

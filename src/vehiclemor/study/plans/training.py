@@ -78,7 +78,7 @@ def _checked(model: Model, scenario: Scenario) -> Scenario:
 
 
 def _of_protocol(model: str, method: str) -> tuple[Scenario, ...]:
-    """What a method learns from in a model's own protocol; nothing if it does not compete."""
+    """What a method learns from in the protocol of a model; nothing if it does not compete."""
     if model not in protocol_names():
         return ()
     entries = _protocol_of(model).entries
