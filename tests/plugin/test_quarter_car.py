@@ -20,7 +20,6 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
-from vehiclemor.report.labels import main_outputs, of_kind, tabled_outputs, timing_cases
 from vehiclemor.resources import data_folder
 from vehiclemor.simulation.build import build
 
@@ -103,23 +102,6 @@ def test_runs_are_those_of_the_linear_system(car, start, frequency):
     np.testing.assert_allclose(rates[:, 2:] @ [250.0, 45.0], outputs[:, 2], rtol=0, atol=1e-9)
     np.testing.assert_array_equal(car.mass_matrix(x[7]), np.diag([250.0, 45.0]))
     np.testing.assert_array_equal(car.speeds_of_rates(x[7]), x[7, 2:])
-
-
-def test_it_gets_rows_and_columns_of_every_table_by_its_kind():
-    definition = component("model", "quarter_car")
-    cases = timing_cases(definition)
-    ids = [case.id for case in cases]
-    assert ids[:2] == ["baseline", "strongest"]
-    assert len(set(ids)) == len(ids)
-    assert {"full_order", "replay", "pod", "fixed_basis"} == {case.method for case in cases}
-    # Of two coordinates, one is a reduction.
-    assert {case.settings["rank"] for case in cases if "rank" in case.settings} == {1}
-    outputs = ("body_acceleration", "suspension_travel", "tire_force")
-    assert tabled_outputs(definition) == main_outputs(definition) == outputs
-    assert set(of_kind(definition.kind).counts) <= set(build("quarter_car").counts)
-    for case in cases:
-        data = vm.simulate("quarter_car", case.method, preset=case.preset, **case.settings)
-        assert data["status"].item() == "ok", case.id
 
 
 def test_windows_at_rest_have_no_growth_rate_and_the_others_have(car):
