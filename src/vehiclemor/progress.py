@@ -12,6 +12,8 @@ from contextvars import ContextVar
 from time import perf_counter
 
 _LOG = logging.getLogger("vehiclemor")
+# Compilation of a lone kernel within this time (s) is not mentioned.
+QUICK = 1.0
 
 
 class StandardError(logging.Handler):
@@ -37,9 +39,9 @@ class FirstUse:
         self.what, self.announced, self.seconds = what, False, 0.0
 
     @contextmanager
-    def compiling(self) -> Iterator[None]:
-        """A part of its code that is missing: the first one is announced, all are timed."""
-        if not self.announced:
+    def compiling(self, announce: bool) -> Iterator[None]:
+        """A part of its code that is missing, timed."""
+        if announce and not self.announced:
             self.announced = True
             _LOG.info("first use of %s: compiling, cached for later runs", self.what)
         begin = perf_counter()
@@ -64,14 +66,18 @@ def first_use(what: str) -> Iterator[FirstUse]:
         yield use
     finally:
         _CURRENT.reset(token)
-    if use.announced:
+    if use.announced or use.seconds > QUICK:
         _LOG.info("%s: compiled in %.1f s", what, use.seconds)
 
 
 @contextmanager
-def compiling(what: str) -> Iterator[None]:
-    """Derivation or compilation of something that is missing in the cache."""
-    with first_use(what) as use, use.compiling():
+def compiling(what: str, slow: bool = True) -> Iterator[None]:
+    """Derivation or compilation of something that is missing in the cache.
+
+    It is announced if it is slow, or part of a first use.
+    """
+    announce = slow or _CURRENT.get() is not None
+    with first_use(what) as use, use.compiling(announce):
         yield
 
 

@@ -251,6 +251,8 @@ def test_a_first_use_is_announced_when_it_compiles_and_its_end_if_it_has_one(cap
     caplog.set_level(logging.INFO, "vehiclemor")
     with first_use("what is in the cache"):
         pass
+    with compiling("a kernel", slow=False):
+        pass
     with suppress(ZeroDivisionError), first_use("what fails"), compiling("kernel"):
         assert "first use of what fails" in caplog.messages[0]
         raise ZeroDivisionError

@@ -17,7 +17,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
@@ -119,9 +119,9 @@ def fetched(name: str, make: Callable[[], bytes]) -> bytes:
         return content
     if reason:
         _LOG.warning("%s is made again: %s", path, reason)
-    quick = name.startswith("sources")
-    spoken = nullcontext() if quick else compiling(path.stem.partition("-")[0])
-    with spoken, locked(path), _no_collection():
+    # Loops take seconds, most kernels a tenth of one.
+    announced = compiling(path.stem.partition("-")[0], slow=name.startswith("loops"))
+    with announced, locked(path), _no_collection():
         content, _ = _checked(path, name)
         if content is None:
             content = make()
