@@ -15,12 +15,11 @@ from pathlib import Path
 
 import pytest
 
-from vehiclemor import progress
 from vehiclemor.codegen import cache
 from vehiclemor.codegen.cache import cache_folder, cached_by_one_thread, from_cache
 from vehiclemor.exceptions import MachineError
 from vehiclemor.files import remove_leftovers, temporary_path, write_text, write_whole
-from vehiclemor.progress import first_use, making
+from vehiclemor.progress import compiling, first_use
 
 PACKAGE = Path(cache.__file__).parents[1]
 NAME = "kernels/some-0123.o"
@@ -246,31 +245,26 @@ def test_what_threads_ask_for_together_is_made_once_and_tried_again_if_it_fails(
 
 LOOP = """
 import logging
-from vehiclemor import progress
-progress.QUIET = 0.0
 from vehiclemor.codegen.loops import loops
 {before}
 loops(("simulation.path_loops",), ("kernel_path",))
 """
 
 
-def test_what_takes_long_is_told_of_and_its_end_if_it_has_one(monkeypatch, caplog):
+def test_a_first_use_is_announced_when_it_compiles_and_its_end_if_it_has_one(caplog):
     caplog.set_level(logging.INFO, "vehiclemor")
-    with first_use("a model"), making("kernel"):
+    with first_use("what is in the cache"):
         pass
-    assert not caplog.messages
-    monkeypatch.setattr(progress, "QUIET", 0.3)
-    with suppress(ZeroDivisionError), first_use("what fails"), making("kernel"):
-        time.sleep(0.4)
+    with compiling("a kernel", slow=False):
+        pass
+    with suppress(ZeroDivisionError), first_use("what fails"), compiling("kernel"):
+        assert "first use of what fails" in caplog.messages[0]
         raise ZeroDivisionError
-    # No part of it takes so long, but both do; a second time it is no first use.
-    for _ in "12":
-        with first_use("a model"):
-            for part in ("derivation", "kernel"):
-                with making(part):
-                    time.sleep(0.2)
-    failed, began, ended = caplog.messages
-    assert "first use of what fails" in failed
+    with first_use("a model"):
+        for part in ("derivation", "kernel"):
+            with compiling(part):
+                time.sleep(0.2)
+    _, began, ended = caplog.messages
     assert "first use of a model" in began
     assert "a model: compiled in" in ended
     assert float(ended.split()[-2]) >= 0.4

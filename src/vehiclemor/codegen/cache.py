@@ -18,7 +18,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
@@ -27,7 +27,7 @@ from typing import Any, TypeVar
 
 from vehiclemor.exceptions import FileError, MachineError
 from vehiclemor.files import write_whole
-from vehiclemor.progress import making
+from vehiclemor.progress import compiling
 
 Result = TypeVar("Result")
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
@@ -123,10 +123,9 @@ def from_cache(name: str, compute: Callable[[], bytes]) -> bytes:
         return content
     if reason:
         _LOG.warning("%s is made again: %s", path, reason)
-    progress = nullcontext()
-    if not name.startswith("sources"):
-        progress = making(path.stem.partition("-")[0])
-    with progress, locked(path), _no_collection():
+    # Loops take seconds, most kernels a tenth of one.
+    announced = compiling(path.stem.partition("-")[0], slow=name.startswith("loops"))
+    with announced, locked(path), _no_collection():
         content, _ = _checked(path, name)
         if content is None:
             content = compute()

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import Field, field_validator
 
+from vehiclemor.array_shapes import require
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import Structure
@@ -35,7 +36,6 @@ from vehiclemor.simulation.structures.model import (
 )
 from vehiclemor.simulation.structures.system import StructuralSystem, factored
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.sizes import require
 
 # Modes that are looked for at first.
 FIRST_MODES = 16
