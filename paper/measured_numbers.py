@@ -2,7 +2,8 @@
 
 Usage: python paper/measured_numbers.py [--results DIR] [--texts] [--list PATTERN]
 
-A name is a place in a table: `predictive.double_wishbone.path_map.misses`.  Nothing is computed
+A name is an address in a table: `predictive.double_wishbone.path_map.misses`.  The file holds the
+numbers that texts ask for; `--list` shows all names that stored results offer.  Nothing is computed
 anew.  Numbers whose file the results folder lacks stay as they are, and the script says which.
 """
 
@@ -12,16 +13,16 @@ import argparse
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence, Set
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typst
 import xarray as xr
 from number_tables import (
     Entry,
-    benchmark,
     comparison,
     named_values,
     operations,
@@ -29,7 +30,7 @@ from number_tables import (
     published,
     studies,
 )
-from numbers_by_name import FILE, load, render
+from numbers_by_name import FILE, load, names_in, render
 
 from vehiclemor.files import write_text
 from vehiclemor.registry import component, names
@@ -37,11 +38,9 @@ from vehiclemor.report.printed_numbers import TIMING
 
 ROOT = FILE.parents[1]
 # Last part of a name -> its unit; an error has that of its output.
-UNITS = {"us": "us", "offline_us": "us", "ns_per_sample": "ns", "median": "s"}
-UNITS |= {"worst_m": "m", "worst_deg": "deg"}
+UNITS = {"us": "us", "offline_us": "us", "worst_m": "m", "worst_deg": "deg"}
 UNITS |= {"growth_rate": "1/s", "growth_largest": "1/s"}
-UNITS |= {"largest_lateral_position_without_steering": "m"}
-ERRORS = ("rms_error", "floor", "smallest", "largest", "natural")
+ERRORS = ("rms_error", "smallest", "largest", "natural")
 
 
 @cache
@@ -72,7 +71,6 @@ def sources(results: Path) -> Iterator[tuple[str, str, Callable[[], Iterator[Ent
     for name in ("in_use", "other_steering"):
         file = f"{name}.nc"
         yield file, f"python paper/{name}.py", partial(of_file, partial(named_values, name), file)
-    yield "benchmark.json", "tox -e bench", partial(of_file, benchmark, "benchmark.json")
     yield "peers.json", "tox -e peers", partial(of_file, peers, "peers.json")
     for name, make in studies():
         command = "compare paper" if name in TIMING.values() else f"run {name}"
@@ -80,24 +78,40 @@ def sources(results: Path) -> Iterator[tuple[str, str, Callable[[], Iterator[Ent
         yield file, f"vehiclemor {command}", partial(of_file, make, file)
 
 
-def measured(results: Path, known: dict[str, Any]) -> dict[str, Any]:
-    """All numbers by name; those whose file is missing as they are `known`."""
-    numbers: dict[str, Any] = {}
+def offered(results: Path) -> Iterator[tuple[str, str, Sequence[Entry]]]:
+    """Source, command and numbers of what the results folder holds; says what it lacks."""
     for source, command, make in sources(results):
         try:
-            found = [(name, float(value), *units) for name, value, *units in make()]
+            yield source, command, list(make())
         except FileNotFoundError as error:
-            old = {name: entry for name, entry in known.items() if entry["source"] == source}
-            print(
-                f"{error.filename}: missing; {len(old)} numbers stay as they are", file=sys.stderr
-            )
-            numbers |= old
-            continue
-        for name, value, *units in found:
-            if np.isfinite(value):
-                head = {"value": float(f"{value:.6g}"), "unit": units[0] if units else unit(name)}
+            print(f"{error.filename}: missing; its numbers stay as they are", file=sys.stderr)
+
+
+def measured(results: Path, names: Set[str], known: dict[str, Any]) -> dict[str, Any]:
+    """Numbers of these names; those whose file is missing as they are `known`."""
+    numbers: dict[str, Any] = {}
+    read: set[str] = set()
+    for source, command, entries in offered(results):
+        read.add(source)
+        for name, value, *units in entries:
+            if name in names and np.isfinite(value):
+                rounded = float(f"{float(value):.6g}")
+                head = {"value": rounded, "unit": units[0] if units else unit(name)}
                 numbers[name] = head | {"source": source, "command": command}
+    for name in names & known.keys():
+        if known[name]["source"] not in read:
+            numbers[name] = known[name]
     return dict(sorted(numbers.items()))
+
+
+def asked(root: Path) -> set[str]:
+    """Names that the pages and the paper ask for."""
+    names: set[str] = set()
+    for source in (root / "docs").glob("*.md.in"):
+        names |= names_in(source.read_text(encoding="utf-8"))
+    paper, how = root / "paper" / "paper.typ", {"names": ""}
+    found = typst.query(paper, "<number>", field="value", root=root, sys_inputs=how)
+    return names.union(json.loads(found))
 
 
 def texts(root: Path, numbers: dict[str, Any]) -> Iterator[tuple[Path, str]]:
@@ -115,13 +129,15 @@ def main() -> None:
     parser.add_argument("--texts", action="store_true", help="only put numbers into the texts")
     parser.add_argument("--list", metavar="PATTERN", help="only list names that match")
     wanted = parser.parse_args()
-    known = load() if FILE.exists() else {}
     if wanted.list is not None:
-        for name in filter(re.compile(wanted.list).search, known):
-            print(f"{name} = {known[name]['value']:g} {known[name]['unit']}")
+        for _, _, entries in offered(wanted.results):
+            for name, *_ in entries:
+                if re.search(wanted.list, name):
+                    print(name)
         return
+    known = load() if FILE.exists() else {}
     if not wanted.texts:
-        known = measured(wanted.results, known)
+        known = measured(wanted.results, asked(ROOT), known)
         rows = (f"{json.dumps(name)}: {json.dumps(entry)}" for name, entry in known.items())
         write_text(FILE, "{\n" + ",\n".join(rows) + "\n}\n")
     for path, text in texts(ROOT, known):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,22 @@ def render(text: str, numbers: Entries | None = None, name: str = "text") -> str
         value = entries[key]["value"]
         return shown(value, form) if form else value
 
+    return _rendered(text, n)
+
+
+def names_in(text: str) -> set[str]:
+    """Names of the numbers that a text asks for."""
+    names: set[str] = set()
+
+    def n(key: str, form: str = "") -> float | str:
+        names.add(key)
+        return shown(2.0, form) if form else 2.0
+
+    _rendered(text, n)
+    return names
+
+
+def _rendered(text: str, n: Callable[..., float | str]) -> str:
     environment = jinja2.Environment(  # noqa: S701 - Markdown of this repository, no HTML
         undefined=jinja2.StrictUndefined, keep_trailing_newline=True
     )

@@ -28,6 +28,14 @@ def choose(points: Points, target: float) -> Mapping[str, Any] | None:
     return min(good, key=lambda p: p["seconds"], default=None)
 
 
+def seconds_at(case: Mapping[str, Any], delivers: str, target: float) -> dict[str, float]:
+    """Seconds of one run, step or run of a batch at a target error, of all who reach it."""
+    count = case.get("per", ONCE)[0]
+    curves = {k: c["points"] for k, c in case["curves"].items() if c["delivers"] == delivers}
+    chosen = {label: choose(points, target) for label, points in curves.items()}
+    return {label: point["seconds"] / count for label, point in chosen.items() if point}
+
+
 def rows(case: Mapping[str, Any], target: float, delivers: str) -> list[tuple[str, ...]]:
     """Rows of all who deliver this at a target error, the fastest first; then who can't."""
     curves = {k: c for k, c in case["curves"].items() if c["delivers"] == delivers}

@@ -6,8 +6,19 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from drawings import look
-from drawings.look import BLUE, GREEN, ORANGE, PINK, RED, THIN, TWO, Results, legend, panels, titles
+from drawings.look import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PINK,
+    RED,
+    THIN,
+    TWO,
+    Results,
+    decades,
+    legend,
+    lettered,
+)
 from vehiclemor.report.figures.costs import figure_size as figure_of_sizes
 from vehiclemor.report.figures.theme import tick_decades
 from vehiclemor.report.labels import declared
@@ -24,14 +35,15 @@ MODELS = {
 
 def figure_pareto(results: Results) -> Figure:
     """Worst error on the test set over the time of a whole call: every method, all four models."""
-    figure, grid = panels(1, 4, TWO, 2.9)
+    figure, grid = lettered(1, 4, TWO, 2.9, MODELS.values())
     for axis, model in zip(grid.flat, MODELS, strict=True):
-        found: dict[tuple[str, str], dict[str, Any]] = {}
+        methods: dict[tuple[str, str], dict[str, Any]] = {}
         for study in (f"contenders-{model}", f"predictive-{model}"):
             data = results[study]
             # Times of the protocol's study count where both have a row.
-            found |= {(r["method"], r["label"]): r for r in method_rows(data, protocol_of(data))}
-        rows = [r for r in found.values() if r["seconds"] > 0.0 and np.isfinite(r["score"])]
+            for row in method_rows(data, protocol_of(data)):
+                methods[row["method"], row["label"]] = row
+        rows = [r for r in methods.values() if r["seconds"] > 0.0 and np.isfinite(r["score"])]
         full = _least((r["score"], r["seconds"]) for r in rows if r["role"] == FULL_ORDER)
         _draw_front(axis, full)
         for row in rows:
@@ -41,10 +53,9 @@ def figure_pareto(results: Results) -> Figure:
         axis.set_xscale("log")
         axis.set_yscale("log")
         axis.set_ylim(bottom=max(axis.get_ylim()[0], 1e-3))
-        look.decades(axis, 1)
+        decades(axis.yaxis, 1)
         axis.set_xlabel("whole call (ms)")
     grid[0, 0].set_ylabel("worst error / bound")
-    titles(grid, MODELS.values())
     legend(figure, grid.flat, 5)
     return figure
 
@@ -90,7 +101,8 @@ PEERS: Mapping[str, tuple[str, Any, str]] = {
 
 def figure_peers(results: Mapping[str, Any]) -> Figure:
     """CPU time over error of both vehicles in other tools: a run, a step and a run of a batch."""
-    figure, grid = panels(2, 3, TWO, 3.6, sharex="col")
+    texts = ["a run", "a step of 10 ms", "a run of a batch of 200"] * 2
+    figure, grid = lettered(2, 3, TWO, 3.6, texts, sharex="col")
     models = "independent_suspension_vehicle", "high_fidelity_vehicle"
     for row, model in zip(grid, models, strict=True):
         for axis, part in zip(row, ("", "-steps", "-batch"), strict=True):
@@ -105,7 +117,6 @@ def figure_peers(results: Mapping[str, Any]) -> Figure:
         row[0].set_ylabel(f"{MODELS[model]}\nCPU time (ms)")
     for axis in grid[-1]:
         axis.set_xlabel("largest error of the position (m)")
-    titles(grid, ["a run", "a step of 10 ms", "a run of a batch of 200"] * 2)
     legend(figure, grid.flat, 4)
     return figure
 
@@ -114,25 +125,20 @@ def _front(
     case: Mapping[str, Any], beginning: str, shown: tuple[float, float]
 ) -> list[tuple[float, float]]:
     """Errors and least milliseconds of curves with this beginning, outputs left out."""
-    curves = [
-        curve
-        for label, curve in case["curves"].items()
-        if label.startswith(beginning) and curve["delivers"] != "outputs"
-    ]
     count = case.get("per", (1, ""))[0]
-    points = [
-        (p["error"], 1e3 * p["seconds"] / count)
-        for curve in curves
-        for p in curve["points"]
-        if shown[1] <= p["error"] <= shown[0]
-    ]
+    points: list[tuple[float, float]] = []
+    for label, curve in case["curves"].items():
+        if not label.startswith(beginning) or curve["delivers"] == "outputs":
+            continue
+        near = [p for p in curve["points"] if shown[1] <= p["error"] <= shown[0]]
+        points.extend((p["error"], 1e3 * p["seconds"] / count) for p in near)
     return _least(points)
 
 
 def _least(points: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
     """Of points (error, time) those that no point of smaller error undercuts in time."""
-    kept: list[tuple[float, float]] = []
+    front: list[tuple[float, float]] = []
     for point in sorted(points):
-        if not kept or point[1] < kept[-1][1]:
-            kept.append(point)
-    return kept
+        if not front or point[1] < front[-1][1]:
+            front.append(point)
+    return front

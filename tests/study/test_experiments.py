@@ -18,7 +18,7 @@ from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
-from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, known_inputs
+from vehiclemor.study.evaluate import cached_fit, evaluate, fresh_fit, known_inputs
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Scenario, speed_of
@@ -44,7 +44,7 @@ def of_runs(model, method, training, tests, **settings):
 @pytest.fixture(autouse=True)
 def _nothing_kept():
     """What an earlier test has fitted or solved is not used again."""
-    evaluation.kept_reference.cache_clear()
+    evaluation.cached_reference.cache_clear()
     evaluation._KEPT.clear()
 
 
@@ -185,9 +185,9 @@ def fits(monkeypatch):
 
 def test_one_fit_serves_all_solvers_tolerances_and_fallbacks(vehicle, fits):
     quick = {"terms": 2, "steps": 0}
-    alone = kept_fit(vehicle, experiment(vehicle, "slow_manifold", **quick))
-    loose = kept_fit(vehicle, experiment(vehicle, "slow_manifold", tolerance=5e-3, **quick))
-    guarded = kept_fit(vehicle, experiment(vehicle, "guarded", fallback="dopri5", **quick))
+    alone = cached_fit(vehicle, experiment(vehicle, "slow_manifold", **quick))
+    loose = cached_fit(vehicle, experiment(vehicle, "slow_manifold", tolerance=5e-3, **quick))
+    guarded = cached_fit(vehicle, experiment(vehicle, "guarded", fallback="dopri5", **quick))
     assert len(fits) == 1
     assert (loose.tolerance, guarded.reduced.tolerance) == (5e-3, 2e-3)
     assert (guarded.full.solver, guarded.full.tolerance) == ("dopri5", 1e-4)
@@ -197,7 +197,7 @@ def test_one_fit_serves_all_solvers_tolerances_and_fallbacks(vehicle, fits):
     anew = fresh_fit(vehicle, experiment(vehicle, "guarded", **quick))
     assert anew.reduced.coefficients is not alone.coefficients
     np.testing.assert_array_equal(anew.reduced.coefficients, alone.coefficients)
-    failed = kept_fit(vehicle, experiment(vehicle, "guarded", terms=FAILING, steps=0))
+    failed = cached_fit(vehicle, experiment(vehicle, "guarded", terms=FAILING, steps=0))
     assert failed == Failure("diverged", "no fit")
 
 
@@ -211,7 +211,7 @@ def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
     broken = replace(method, fit=fit)
     monkeypatch.setattr("vehiclemor.study.evaluate.component", lambda *_: broken)
     wanted = experiment(vehicle, "slow_manifold", terms=1, steps=0)
-    found = [kept_fit(vehicle, wanted).status for _ in range(4)]
+    found = [cached_fit(vehicle, wanted).status for _ in range(4)]
     assert found == ["error", "error", "diverged", "diverged"]
     assert len(raised) == 3
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 
 import measured_numbers
 import numbers_by_name
@@ -17,6 +18,11 @@ def test_texts_hold_their_numbers():
     assert {"README.md", "findings.md"} <= {path.name for path in texts}
     for path, text in texts.items():
         assert path.read_text(encoding="utf-8") == text, "run `paper/measured_numbers.py --texts`"
+
+
+def test_the_file_holds_what_texts_ask_for():
+    # Written anew by `paper/measured_numbers.py`, which also drops what no text asks for.
+    assert measured_numbers.asked(measured_numbers.ROOT) == set(NUMBERS)
 
 
 def test_readme_is_short_and_keeps_its_commands():
@@ -62,20 +68,27 @@ def results(tmp_path, monkeypatch):
 
 
 def test_the_script_reads_what_is_stored_and_keeps_the_rest(results, monkeypatch, capsys):
-    old = {"value": 2.0, "unit": "s", "source": "benchmark.json", "command": "tox -e bench"}
-    known = {"benchmark.x.median": old, "in_use.gone": old | {"source": "in_use.nc"}}
-    found = measured_numbers.measured(results, known)
+    old = {"value": 2.0, "unit": "s", "source": "peers.json", "command": "tox -e peers"}
+    known = {"peers.x.seconds": old, "peers.unused": old, "in_use.gone": old}
+    known["in_use.gone"] = old | {"source": "in_use.nc"}
+    names = {"peers.x.seconds", "in_use.gone", "in_use.gv.step"}
+    found = measured_numbers.measured(results, names, known)
     new = {"value": 12.3457, "unit": "us", "source": "in_use.nc"}
     new |= {"command": "python paper/in_use.py"}
-    assert found == {"benchmark.x.median": old, "in_use.gv.step": new}
-    assert "benchmark.json: missing; 1 numbers stay" in capsys.readouterr().err
+    assert found == {"peers.x.seconds": old, "in_use.gv.step": new}
+    assert "peers.json: missing; its numbers stay" in capsys.readouterr().err
 
     monkeypatch.setattr(measured_numbers, "FILE", results / "numbers.json")
     monkeypatch.setattr(measured_numbers, "ROOT", results)
     (results / "docs").mkdir()
     (results / "docs/README.md.in").write_text('a step takes {{ n("in_use.gv.step", "d") }} us\n')
+    (results / "paper").mkdir()
+    (results / "paper/paper.typ").write_text("none")
     monkeypatch.setattr("sys.argv", ["measured_numbers.py", "--results", str(results)])
     measured_numbers.main()
     assert (results / "README.md").read_text() == "a step takes 12 us\n"
     assert json.loads((results / "numbers.json").read_text()) == {"in_use.gv.step": new}
+    monkeypatch.setattr("sys.argv", [*sys.argv, "--list", "step$"])
+    measured_numbers.main()
+    assert capsys.readouterr().out == "in_use.gv.step\n"
     assert numbers_by_name.load(results / "numbers.json") == {"in_use.gv.step": new}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
@@ -54,7 +54,7 @@ class FallbackModel(ShortRepr):
         return self.reduced.best_approximation(states)
 
     def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """The reduced run; where it can't be trusted, that of the full order."""
         run = simulated(self.reduced, maneuver, start, outputs)

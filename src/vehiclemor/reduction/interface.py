@@ -15,7 +15,7 @@ import numpy as np
 
 from vehiclemor.arguments import line_of_text, quoted
 from vehiclemor.exceptions import InputError, blamed
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.settings import Settings, Value
 from vehiclemor.reduction.trust import InputRange, band_range
 from vehiclemor.registry import choice
@@ -85,7 +85,7 @@ class FittedModel(Protocol):
         """Largest number of reduced coordinates in any window; n for a full-order model."""
         ...
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """Trajectory at the maneuver's output times.
 
         It may take `outputs`, the names (a tuple) of all that is kept of it; see `simulated`.
@@ -106,7 +106,7 @@ def lower_rank(settings: Mapping[str, Any], reduced: FittedModel) -> str:
 
 
 def simulated(
-    reduced: FittedModel, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None
+    reduced: FittedModel, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None
 ) -> Trajectory:
     """A run of a reduced model, with some outputs alone."""
     if outputs is None:

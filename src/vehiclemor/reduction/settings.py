@@ -78,7 +78,7 @@ Tolerance = Annotated[
 class OnlineSettings(Settings):
     """How a reduced system is integrated."""
 
-    solver: Solver = "ros34pw2"
+    solver: Solver = "etdrk4"
     tolerance: Tolerance = 1e-3
 
 

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError, PlugInError, blamed
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.fallback import with_fallback
 from vehiclemor.reduction.interface import MEMBERS, FittedModel, Method, OfflineCost
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
@@ -102,7 +102,7 @@ def checked_fit(method: str, reduced: Any) -> Any:
     return reduced
 
 
-def checked_run(model: Model, maneuver: Maneuver, start: Start, reduced: Any) -> Trajectory:
+def checked_run(model: Model, maneuver: Excitation, start: Start, reduced: Any) -> Trajectory:
     """A run of a reduced model at the output times; `PlugInError` if it gives none."""
     whose = f"{type(reduced).__module__}.{type(reduced).__name__}: simulate"
     with blamed(whose, reduced):

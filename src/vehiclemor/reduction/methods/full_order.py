@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import ConvergenceError, InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import Method, OfflineCost, Presets
 from vehiclemor.reduction.projection.structural import StructuralRuns, StructuralSettings
 from vehiclemor.reduction.reduced_system import ReducedMechanism, ReducedSystem
@@ -51,10 +51,9 @@ class DynamicSettings(OnlineSettings):
     """How equations of motion are integrated."""
 
     solver: AnyIntegrator = Field(
-        "exponential_adams",
+        "dopri5",
         description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
-        "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; with the same "
-        "etdrk4: exponential method of order 4; exponential_adams: of order 6, for high accuracy",
+        "Jacobians; etdrk4: exponential method of order 4, one Jacobian for all runs",
     )
     tolerance: Tolerance = 1e-8
 
@@ -104,7 +103,7 @@ class FullOrder:
         return len(self.model.coordinates)
 
     def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """Full-order trajectory at the output times; it may have diverged."""
         how = {"solver": self.solver, "tolerance": self.tolerance, "outputs": outputs}

@@ -144,8 +144,8 @@ def draw_inputs(axis: Axes, run: xr.Dataset, meanings: Mapping[str, str]) -> Non
     axis.set_ylabel(textwrap.fill(f"{text} ({unit})", MEANING))
 
 
-def draw_history(axis: Axes, runs: Runs, output: str) -> None:
-    """One output of all runs, of which is seen what is near the full-order signal."""
+def draw_history(axis: Axes, runs: Runs, output: str) -> str:
+    """One output of all runs near the full-order signal; gives the unit of the axis."""
     full = runs.full["reference_outputs"].sel(output=output)
     histories = [curve.run["outputs"].sel(output=output) for curve in runs.curves]
     low, high = float(full.min()), float(full.max())
@@ -171,6 +171,7 @@ def draw_history(axis: Axes, runs: Runs, output: str) -> None:
     axis.set_ylabel(labels.axis_label(runs.full, output, unit))
     axis.ticklabel_format(style="plain")
     axis.locator_params(axis="y", nbins=6)
+    return unit
 
 
 def _plot_until_it_leaves(
@@ -265,7 +266,7 @@ def figure_paths(dataset: xr.Dataset) -> Figure:
     for number, (axis, title) in enumerate(zip(axes.flat, titles, strict=True)):
         axis.set_title(theme.letter(number, title))
         if title:
-            _draw_distances(axis, runs.curves)
+            draw_distances(axis, runs.curves)
         else:
             draw_paths(axis, runs)
             axis.set_ylabel("Y (m)")
@@ -288,7 +289,7 @@ def draw_paths(axis: Axes, runs: Runs) -> None:
         axis.plot(*positions(curve.run["outputs"]), label=curve.text, **curve.style)
 
 
-def _draw_distances(axis: Axes, curves: Sequence[Curve]) -> None:
+def draw_distances(axis: Axes, curves: Sequence[Curve]) -> None:
     """Distance between the places of a reduced and the full vehicle at the same time, over X."""
     for curve in curves:
         x, y = positions(curve.run["reference_outputs"])
