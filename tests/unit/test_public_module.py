@@ -15,33 +15,18 @@ SOURCES = [
     *(data_folder() / "plugin_template").rglob("*.py"),
     *(EXAMPLES / f"{name}.py" for name in ("my_model", "my_method")),
 ]
-STABLE = [
-    "AT_MOST_COORDINATES",
-    "Declared",
-    "Maneuver",
-    "Method",
-    "ModelDefinition",
-    "OfflineCost",
-    "Quantity",
-    "ReducedMechanism",
-    "ReducedSystem",
-    "Settings",
-    "Structure",
-    "Tape",
-    "Trust",
-    "assemble",
-    "check_method",
-    "check_model",
-    "clock",
-    "offline_cost",
-]
+STABLE = (
+    *("Declared", "Maneuver", "Method", "ModelDefinition", "OfflineCost", "Quantity", "Settings"),
+    *("ReducedMechanism", "ReducedSystem", "Structure", "Tape", "Trust", "AT_MOST_COORDINATES"),
+    *("assemble", "check_method", "check_model", "clock", "offline_cost"),
+)
 
 
 def test_it_has_the_names_that_stay_stable():
     assert set(STABLE) <= set(dir(plugin))
     for name in dir(plugin):
         assert getattr(plugin, name, None) is not None, name
-    with pytest.raises(AttributeError, match="no attribute 'no_such'"):
+    with pytest.raises(AttributeError, match="no_such"):
         _ = plugin.no_such
 
 
