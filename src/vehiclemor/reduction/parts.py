@@ -85,7 +85,7 @@ class Parts:
     def _write_array(self, value: np.ndarray, path: str) -> dict[str, Any]:
         # Products of matrices are rounded as their numbers stand in memory.
         turned = value.ndim > 1 and value.flags.f_contiguous and not value.flags.c_contiguous
-        stored = np.array(value.T if turned else value, order="C")
+        stored: Any = np.array(value.T if turned else value, order="C")
         if stored.dtype == complex:
             stored = np.stack([stored.real, stored.imag], axis=-1)
         self.arrays[path] = stored.astype(STORED[value.dtype.name])
