@@ -62,8 +62,8 @@ def watched(
     """The first sample at which each of some outputs is outside of its range; else their number.
 
     States are those at the points of a run (points, n or more).  Without `node_of_sample`, see
-    `loop_arguments.Output`, the points are the samples.  Results (points, results) of the kernel are
-    scratch space.
+    `loop_arguments.Output`, the points are the samples.  Results (points, results) of the kernel
+    are scratch space.
     """
     samples = len(node_of_sample) if len(node_of_sample) else len(states)
     for k in range(len(result)):
