@@ -116,7 +116,7 @@ class FullOrder:
                 raise
             return error.trajectory
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray:
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """The states themselves: the full space holds them."""
         return states
 
@@ -165,14 +165,17 @@ class FullOrderStructure(StructuralRuns, FullOrder):
     @property
     def order(self) -> int:
         """Number of coordinates."""
-        return self.solved[0].size
+        return self.remade.size
 
     @cached_property
+    def remade(self) -> Any:
+        """The model with the parameters that differ."""
+        return reparametrised(self.model, self.parameters) if self.parameters else self.model
+
+    @property
     def solved(self) -> tuple[StructuralModel, None]:
-        """The model with the parameters that differ, in its own coordinates."""
-        if not self.parameters:
-            return self.model, None
-        return reparametrised(self.model, self.parameters), None
+        """The model with these parameters, in its coordinates."""
+        return self.remade, None
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """The states themselves; another mesh has others."""
