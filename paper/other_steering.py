@@ -25,7 +25,7 @@ import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.registry import component
-from vehiclemor.study.evaluate import kept_fit, model_of
+from vehiclemor.study.evaluate import cached_fit, model_of
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names
 from vehiclemor.study.scenario import Scenario, start_of
 
@@ -120,7 +120,7 @@ def counted(name: str, count: int, seed: int) -> Iterator[tuple[str, float]]:
     contestant = next(c for c in protocol.entries if c.label == label)
     experiment = contestant.experiment(protocol.model, candidate, protocol.sets["validation"])
     model = cast("Any", model_of(experiment))
-    reduced = cast("Any", kept_fit(model, experiment))
+    reduced = cast("Any", cached_fit(model, experiment))
     nominal, rng = component("maneuver", model.definition.maneuver), np.random.default_rng(seed)
     for kind, durations in DURATIONS.items():
         counts: Counter[str] = Counter(dict.fromkeys(COUNTS, 0))

@@ -36,7 +36,7 @@ COMPILATIONS = (
 import vehiclemor as vm
 from vehiclemor.inputs.steering import straight_ahead
 car = vm.model("independent_suspension_vehicle")
-for solver in ("dopri5", "ros34pw2", "etdrk4", "exponential_adams"):
+for solver in ("dopri5", "etdrk4"):
     car.simulate(straight_ahead, times=[0.1], solver=solver, tolerance=1e-2)
 """,
     """

@@ -248,7 +248,7 @@ def batch(name: str, runs: int = 200) -> Case:
     maneuver = replace(maneuver, duration=10.0, samples=501)
     factors = np.random.default_rng(1).uniform([0.8, 0.5], [1.2, 1.2], (runs, 2))
     signals = [maneuver.perturbed(*pair) for pair in factors.tolist()]
-    exact = vm.reduce(model, "full_order", solver="exponential_adams", tolerance=1e-10)
+    exact = vm.reduce(model, "full_order", solver="dopri5", tolerance=1e-10)
     found = vm.simulate_many(exact, signals, "equilibrium", outputs=["lateral_position"])
     title, reference = f"{name}, {runs} lane changes of 10 s", found["values"].values[:, :, 0]
     how = {"more": signals, "per": (runs, "run"), "clock": "process_time"}

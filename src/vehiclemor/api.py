@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from vehiclemor.inputs.maneuver import Maneuver
+    from vehiclemor.inputs.excitation import Excitation
     from vehiclemor.reduction.reduced_model import ReducedOrderModel
     from vehiclemor.simulation.model import Model
     from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -170,7 +170,7 @@ def simulate(
     model: str | Model,
     method: str = "full_order",
     *,
-    maneuver: str | Maneuver | None = None,
+    maneuver: str | Excitation | None = None,
     start: Start | None = None,
     frequency: float = 1.0,
     amplitude: float = 1.0,
@@ -248,11 +248,14 @@ def simulate(
 
 
 def _scenario(
-    model: Model, maneuver: str | Maneuver | None, start: Start | None, factors: tuple[float, float]
+    model: Model,
+    maneuver: str | Excitation | None,
+    start: Start | None,
+    factors: tuple[float, float],
 ) -> Scenario:
     """What is simulated, checked."""
     from vehiclemor.inputs.checks import checked_maneuver
-    from vehiclemor.inputs.maneuver import FACTORS, checked_factor
+    from vehiclemor.inputs.excitation import FACTORS, checked_factor
     from vehiclemor.study.scenario import Scenario, check
 
     chosen = model.definition.maneuver if maneuver is None else maneuver

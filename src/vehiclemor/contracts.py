@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.training import TrainingRun
-from vehiclemor.reduction.validation import checked_run, validated
+from vehiclemor.reduction.validation import checked_run, fitted, validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build, check_equations
@@ -27,7 +27,7 @@ def _definition(name: str) -> ModelDefinition:
     return component("model", name)
 
 
-def _nominal(model: Model) -> Maneuver:
+def _nominal(model: Model) -> Excitation:
     return component("maneuver", _definition(model.name).maneuver)
 
 
@@ -58,7 +58,7 @@ def check_model(name: str) -> None:
         _check_dynamic(model, maneuver)
 
 
-def _check_algebraic(model: AlgebraicModel, maneuver: Maneuver) -> None:
+def _check_algebraic(model: AlgebraicModel, maneuver: Excitation) -> None:
     name = model.name
     trajectory = model.simulate(maneuver)
     assert np.isfinite(trajectory.coordinates).all(), f"{name}: coordinates are not finite"
@@ -78,7 +78,7 @@ def _check_algebraic(model: AlgebraicModel, maneuver: Maneuver) -> None:
     assert error < 1e-8 * size, f"{name}: the Jacobian differs from differences by {error:.1e}"
 
 
-def _check_dynamic(model: Any, maneuver: Maneuver) -> None:
+def _check_dynamic(model: Any, maneuver: Excitation) -> None:
     name = model.name
     size = len(model.coordinates) + len(model.speeds)
     u = maneuver.at(maneuver.times)[0]
@@ -95,7 +95,7 @@ def _check_dynamic(model: Any, maneuver: Maneuver) -> None:
         assert np.isfinite(history).all(), f"{name}: the nominal run is not finite"
 
 
-def _check_structural(model: StructuralModel, maneuver: Maneuver) -> None:
+def _check_structural(model: StructuralModel, maneuver: Excitation) -> None:
     name, structure = model.name, model.system.structure
     p, k = len(model.definition.ports), len(model.outputs)
     assert not wrong_matrices(structure, p, k), f"{name}: {wrong_matrices(structure, p, k)}"
@@ -139,7 +139,7 @@ def check_method(name: str, model_name: str) -> None:
         for policy in ("matched", "nominal"):
             test = maneuver if policy == "matched" else maneuver.perturbed(1.1, 0.9)
             trained = TrainingRun(model, test if policy == "matched" else maneuver, model.starts[0])
-            reduced = method.fit(model, (trained,), settings)
+            reduced = fitted(method, model, (trained,), settings)
             where = f"{name} ({preset}, {policy}) on {model_name}"
             try:
                 first, again = (checked_run(model, test, model.starts[0], reduced) for _ in "12")

@@ -2,13 +2,12 @@
 
 import os
 import platform
-from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from vehiclemor.codegen.sources import plug_in_digest, source_digest
-from vehiclemor.registry import component, names
+from vehiclemor.registry import component
 
 PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4")
 # Layers whose source determines results; tables, figures and the command line come after them.
@@ -70,20 +69,15 @@ def _own_source() -> str:
     return source_digest(LAYERS, FILES)
 
 
-def code_digest(model: str, method: str, settings: Mapping[str, object]) -> str:
+def code_digest(model: str, method: str) -> str:
     """Hash of the source that computes a result: results of other source are never taken for it.
 
     These are the layers of this package and, for a plug-in, all of its top-level package; and the
-    versions of the packages that the method declares.  Of a method that fits others, they are of
-    those that its settings name too.
+    versions of the packages that the method declares.
     """
-    used = [component("method", method)]
-    if used[0].fits_others:
-        named = sorted({*names("method")} & {v for v in settings.values() if isinstance(v, str)})
-        used += [component("method", name) for name in named]
-    plug_ins = plug_in_digest((component("model", model), *used))
-    packages = [_version(package) for method in used for package in method.packages]
-    return " ".join([_own_source(), plug_ins, *packages])
+    used = component("method", method)
+    plug_ins = plug_in_digest((component("model", model), used))
+    return " ".join([_own_source(), plug_ins, *map(_version, used.packages)])
 
 
 @cache

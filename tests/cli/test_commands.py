@@ -27,6 +27,7 @@ from vehiclemor.resources import data_names
 from vehiclemor.study import run as study_run
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.plans.study_file import GridFile
 from vehiclemor.toml_files import FileSchema
 
 
@@ -174,9 +175,10 @@ def test_a_maneuver_shows_its_inputs_and_the_models_it_drives(name):
 def test_a_study_shows_its_grid():
     for name in data_names("studies"):
         shown, definitions = vm.describe(name), load_studies(name)
-        if name in definitions and definitions[name].grid:
-            assert shown["grid points"] == definitions[name].points
-            assert [row["dimension"] for row in shown["grid"]] == list(definitions[name].grid)
+        definition = definitions.get(name)
+        if isinstance(definition, GridFile):
+            assert shown["grid points"] == definition.points
+            assert [row["dimension"] for row in shown["grid"]] == list(definition.grid)
     members = {row["study"]: row["runs"] for row in vm.describe("paper")["studies"]}
     assert members["figure-13-frequency"] == 31 * 5
     assert vm.describe("paper")["runs"] == sum(members.values())
@@ -189,13 +191,23 @@ def test_a_study_shows_its_grid():
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_the_schema_of_a_file_has_every_key(name):
     shown = vm.describe(name)
-    assert [row["name"] for row in shown["keys"]] == list(SCHEMAS[name].model_fields)
-    tables = {part.__name__: part for part in FileSchema.__subclasses__()}
-    inner = SCHEMAS[name].model_json_schema().get("$defs", ())
-    for title, part in [("keys", SCHEMAS[name]), *((key, tables[key]) for key in inner)]:
-        for row, field in zip(shown[title], part.model_fields.values(), strict=True):
+    parts = dict(SCHEMAS[name])
+    for schema in SCHEMAS[name].values():
+        for part in schema.model_json_schema().get("$defs", ()):
+            parts[part] = subclasses(FileSchema)[part]
+    for title, part in parts.items():
+        for row, (key, field) in zip(shown[title], part.model_fields.items(), strict=True):
+            assert row["name"] == key
             assert row["meaning"] == (field.description or "")
             assert (row["default"] == "required") is field.is_required()
+
+
+def subclasses(schema):
+    """Name -> class of a schema and all schemas that are derived from it."""
+    found = {schema.__name__: schema}
+    for derived in schema.__subclasses__():
+        found |= subclasses(derived)
+    return found
 
 
 STUDY = """

@@ -22,7 +22,7 @@ from vehiclemor.reduction.reduced_model import ReducedOrderModel, load
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import own_speed
 from vehiclemor.reduction.trust import input_range
-from vehiclemor.reduction.validation import validated
+from vehiclemor.reduction.validation import fitted, validated
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -55,7 +55,7 @@ TRAINED_ON: dict[str, tuple[tuple[float, float], ...]] = dict.fromkeys(
 # Quick enough for a test; trusted as far as these runs go.
 SETTINGS: dict[str, dict[str, object]] = {
     "slow_manifold": {"steps": 1, "reversal": 1.0},
-    "guarded": {"fast_settings": "steps = 1, reversal = 1.0"},
+    "guarded": {"steps": 1, "reversal": 1.0},
     "deim": {"rank": 2, "rows": 4},
     # With four it has a mode of 550 1/s, which takes long at tight tolerances.
     "irka": {"rank": 2},
@@ -90,7 +90,7 @@ class Pair:
         factors = TRAINED_ON.get(self.name, ())
         policy = "set" if factors else "nominal"
         runs = training_runs(self.model, self.maneuver, policy, factors)
-        reduced = self.method.fit(self.model, runs, settings)
+        reduced = fitted(self.method, self.model, runs, settings)
         assert settings == before
         return reduced
 
@@ -262,8 +262,8 @@ def test_steps_are_the_run(pair, zero):
     pair.space()
     # So that what is left is no error of the integration.
     tight = {"tolerance": 1e-9} if "tolerance" in pair.method.names_of(pair.model.kind) else {}
-    # A guarded model steps its fast one, which hands over whole runs that are steered like this.
-    reduced = replace(getattr(pair.fit(), "fast", pair.fit()), **tight)
+    # With a fallback the reduced model is stepped; runs that are steered like this are not its own.
+    reduced = replace(getattr(pair.fit(), "reduced", pair.fit()), **tight)
     count, dt = 8, 0.13
     times = 2.0 * dt * np.arange(count + 1)
     inputs = pair.maneuver.at(np.linspace(0.0, 3.0, count + 1))
@@ -323,7 +323,7 @@ def test_rates_are_those_of_the_steps(pair):
     pair.space()
     if pair.model.kind == "ae":
         pytest.skip("there are no rates")
-    fitted, time, dt = getattr(pair.fit(), "fast", pair.fit()), 1.63, 1e-5
+    fitted, time, dt = getattr(pair.fit(), "reduced", pair.fit()), 1.63, 1e-5
     space = replace(fitted, tolerance=1e-11)
     u = pair.maneuver.at(np.array([time]))[0]
     state = space.step(space.begin(pair.model.starts[0], u), u, 0.1, time - 0.1)

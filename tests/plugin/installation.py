@@ -5,11 +5,33 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
 
 from vehiclemor import registry
+
+ENTRIES = 'project.entry-points."vehiclemor.methods"'
+
+
+def package(folder: Path, **methods: str) -> Path:
+    """A folder, now also of a plug-in with these methods: name -> `module:attribute`."""
+    entries = "".join(f'{name} = "{value}"\n' for name, value in methods.items())
+    text = f'[project]\nname = "example"\nversion = "1"\n[{ENTRIES}]\n{entries}'
+    (folder / "pyproject.toml").write_text(text)
+    return folder
+
+
+@contextmanager
+def registered(kind: str, name: str, value: str) -> Iterator[None]:
+    """One more component of a kind in this process, by its entry point `module:attribute`."""
+    entries, added = registry._entries, EntryPoint(name, value, registry.GROUPS[kind])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            registry, "_entries", lambda of: entries(of) | ({name: added} if of == kind else {})
+        )
+        yield
 
 
 @contextmanager

@@ -20,13 +20,11 @@ from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
-from vehiclemor.report.labels import main_outputs, of_kind, tabled_outputs, timing_cases
 from vehiclemor.resources import data_folder
 from vehiclemor.simulation.build import build
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
-SOLVERS = {"dopri5": 1e-10, "rodas4": 1e-9, "ros34pw2": 1e-8, "etdrk4": 1e-8}
-SOLVERS["exponential_adams"] = 1e-9
+SOLVERS = {"dopri5": 1e-10, "rodas4": 1e-9, "etdrk4": 1e-8}
 
 
 @pytest.fixture(scope="module")
@@ -77,9 +75,9 @@ def test_an_installed_plug_in_is_listed_in_a_new_process():
 
 @pytest.mark.parametrize("frequency", [0.88, 0.9, 0.92])
 def test_loose_steps_from_rest_do_not_pass_over_the_road(car, frequency):
-    # The W-method's error estimate of one step over the whole run is zero by chance at 0.9.
+    # An error estimate of one step over the whole run may be zero by chance.
     road = component("maneuver", car.definition.maneuver).perturbed(frequency, 1.0)
-    run = car.simulate(road, solver="ros34pw2", tolerance=2e-3)
+    run = car.simulate(road, solver="etdrk4", tolerance=2e-3)
     expected = exact(car, np.zeros(4), sine(frequency), run.times)
     assert run.counts["steps"] > 50
     np.testing.assert_allclose(run.states, expected, atol=0.05 * np.abs(expected).max())
@@ -104,23 +102,6 @@ def test_runs_are_those_of_the_linear_system(car, start, frequency):
     np.testing.assert_allclose(rates[:, 2:] @ [250.0, 45.0], outputs[:, 2], rtol=0, atol=1e-9)
     np.testing.assert_array_equal(car.mass_matrix(x[7]), np.diag([250.0, 45.0]))
     np.testing.assert_array_equal(car.speeds_of_rates(x[7]), x[7, 2:])
-
-
-def test_it_gets_rows_and_columns_of_every_table_by_its_kind():
-    definition = component("model", "quarter_car")
-    cases = timing_cases(definition)
-    ids = [case.id for case in cases]
-    assert ids[:2] == ["baseline", "strongest"]
-    assert len(set(ids)) == len(ids)
-    assert {"full_order", "replay", "pod", "fixed_basis"} == {case.method for case in cases}
-    # Of two coordinates, one is a reduction.
-    assert {case.settings["rank"] for case in cases if "rank" in case.settings} == {1}
-    outputs = ("body_acceleration", "suspension_travel", "tire_force")
-    assert tabled_outputs(definition) == main_outputs(definition) == outputs
-    assert set(of_kind(definition.kind).counts) <= set(build("quarter_car").counts)
-    for case in cases:
-        data = vm.simulate("quarter_car", case.method, preset=case.preset, **case.settings)
-        assert data["status"].item() == "ok", case.id
 
 
 def test_windows_at_rest_have_no_growth_rate_and_the_others_have(car):
@@ -223,7 +204,7 @@ def test_a_name_stands_wherever_the_template_has_its_own(here, capsys):
         (["my_car", "--out", "file"], "file exists: it is not replaced"),
         (["my_car", "--out", "no/where"], "no/where: the folder no does not exist"),
         (["my_car", "--out", "file/x"], "file/x: "),
-        (["my_car", "--out", "a" * 300], "can't be written"),
+        (["my_car", "--out", "a" * 300], "is not a path"),
     ],
 )
 def test_what_cannot_be_made_is_one_line(plug_in_package, here, capsys, arguments, words):

@@ -195,6 +195,6 @@ def test_a_rack_beyond_reach_ends_the_run(vehicle, factor):
 
 def test_a_maneuver_that_goes_on_after_the_run_is_remarked(vehicle):
     late = LANE_CHANGE.perturbed(frequency=0.2)
-    run = vehicle.simulate(late, solver="ros34pw2", tolerance=1e-3)
+    run = vehicle.simulate(late, solver="etdrk4", tolerance=1e-3)
     assert "13.5 s" in run.remark
-    assert not vehicle.simulate(LANE_CHANGE, solver="ros34pw2", tolerance=1e-3).remark
+    assert not vehicle.simulate(LANE_CHANGE, solver="etdrk4", tolerance=1e-3).remark

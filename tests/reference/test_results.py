@@ -32,6 +32,6 @@ def test_results_are_those_of_the_reference(name):
             if isinstance(value, int):
                 assert abs(found[key] - value) <= few + share * value, (run, key)
             else:
-                # Tolerances of the integrators: 1e-6, and that of the preset for the W-method.
+                # Tolerances of the integrators: 1e-6, and that of the strongest preset.
                 close = {"rtol": 0, "atol": 2e-3} if key == "last" else errors
                 np.testing.assert_allclose(found[key], value, err_msg=f"{run}, {key}", **close)

@@ -101,7 +101,7 @@ def test_the_run_does_not_depend_on_the_heading(name, solver):
     model = build(name)
     x, angle = model.start("dropped"), 2.0
     # The explicit pair and the formulas of many steps are stable with short ones.
-    step = {"dopri5": 0.002, "exponential_adams": 0.004}.get(solver, 0.01)
+    step = {"dopri5": 0.002}.get(solver, 0.01)
     plain = integrate(model, x, solver, 1e9, step)
     turned = integrate(model, turn(model, x, angle), solver, 1e9, step)
     size = 1e-6 if name == FIDELITY else 1e-3
@@ -111,14 +111,13 @@ def test_the_run_does_not_depend_on_the_heading(name, solver):
         assert np.abs(plain.states - exact(name, "dropped")).max() > 1e-5
 
 
-@pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4"])
-def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(solver):
+def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian():
     """Its steps are at the limit of stability, where rounding changes their number, too."""
     model = build(FIDELITY)
     x = model.start()
 
     def calls(of, start: np.ndarray, tolerance: float) -> int:
-        return integrate(of, start, solver, tolerance).counts["rhs_calls"]
+        return integrate(of, start, "etdrk4", tolerance).counts["rhs_calls"]
 
     for tolerance in (1e-3, 1e-4, 1e-5):
         expected = pytest.approx(calls(model, x, tolerance), rel=0.1)
@@ -131,9 +130,7 @@ def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian(solver):
 # Accuracy
 
 
-@pytest.mark.parametrize(
-    ("solver", "order"), [("dopri5", 5), ("rodas4", 4), ("ros34pw2", 3), ("etdrk4", 4)]
-)
+@pytest.mark.parametrize(("solver", "order"), [("dopri5", 5), ("rodas4", 4), ("etdrk4", 4)])
 def test_the_path_in_the_plane_converges_with_the_order_of_the_method(solver, order):
     """Though the Jacobian leaves out how the path turns with the heading."""
     model, errors = build(PLAIN), []
@@ -162,8 +159,7 @@ def case(request):
     return model, start, np.array(path)
 
 
-TOLERANCES = {"dopri5": 1e-10, "rodas4": 1e-8, "ros34pw2": 1e-9, "etdrk4": 1e-7}
-TOLERANCES["exponential_adams"] = 1e-9
+TOLERANCES = {"dopri5": 1e-10, "rodas4": 1e-8, "etdrk4": 1e-7}
 
 
 def test_compiled_solvers_and_sundials_agree_with_lsoda(case):

@@ -1,12 +1,10 @@
 """A reduction method whose runs end as they are told: full order, a little off."""
 
 from dataclasses import dataclass, replace
-from importlib.metadata import EntryPoint
 from typing import Any
 
 import numpy as np
 
-from vehiclemor import registry
 from vehiclemor.exceptions import InputError, UnreachableError
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.reduction.interface import Method, OfflineCost
@@ -65,10 +63,3 @@ def fit(model, training, settings):
 
 
 METHOD = Method("endings", "ends as it is told", dict.fromkeys(KINDS, EndSettings), fit)
-
-
-def register(patch):
-    """Register the method for as long as the patch lasts."""
-    real = registry._entries
-    own = {"endings": EntryPoint("endings", f"{__name__}:METHOD", registry.GROUPS["method"])}
-    patch.setattr(registry, "_entries", lambda kind: real(kind) | (own if kind == "method" else {}))

@@ -2,7 +2,6 @@
 
 import json
 import re
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +9,8 @@ import pandas as pd
 import pytest
 
 import vehiclemor as vm
+from tests.plugin.installation import registered
 from tests.report.figure_texts import checked
-from vehiclemor import registry
 from vehiclemor.cli import main
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import component
@@ -239,12 +238,8 @@ def test_figures_are_those_of_every_model(folder, tmp_path, capsys, monkeypatch)
     assert all(np.fromfile(path, dtype=np.uint8).size > 10_000 for path in written)
 
 
-def test_a_plug_ins_method_stands_beside_the_others(tmp_path, monkeypatch):
-    real = registry._entries
-    known = real("method")
-    mine = EntryPoint("mine", known["fixed_basis"].value, registry.GROUPS["method"])
-    entries = {"method": {**known, "mine": mine}}
-    monkeypatch.setattr(registry, "_entries", lambda kind: entries.get(kind) or real(kind))
-    table = study_comparison(nominal(CAR, tmp_path), tmp_path).set_index("label")
+def test_a_plug_ins_method_stands_beside_the_others(tmp_path):
+    with registered("method", "mine", "vehiclemor.reduction.methods.pod:FIXED_BASIS"):
+        table = study_comparison(nominal(CAR, tmp_path), tmp_path).set_index("label")
+        assert 'method = "mine"' in Path(unseen(CAR, tmp_path)).read_text()
     assert list(table.loc["mine", "largest"]) == list(table.loc["fixed_basis", "largest"])
-    assert 'method = "mine"' in Path(unseen(CAR, tmp_path)).read_text()

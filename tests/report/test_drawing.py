@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from tests.report import endings
+from tests.plugin.installation import registered
 from tests.report.figure_texts import checked, varied
 from vehiclemor.cli import main
 from vehiclemor.exceptions import InputError
@@ -17,6 +17,7 @@ from vehiclemor.report.figures import result_plot, theme
 from vehiclemor.report.figures.result_plot import plot_result
 
 ENDS = ("ok", "untrusted", "diverged", "rejected", "unreachable", "error", "exact")
+ENDINGS = "tests.report.endings:METHOD"
 CURVE = "frequency_factor = [0.8, 1.0, 1.25]"
 MAP = f"{CURVE}\namplitude_factor = [-0.5, 1.0, 1.2]"
 # Factor of the amplitude -> of the runs beyond it none comes well to its end.
@@ -55,8 +56,7 @@ def folder(tmp_path_factory):
         (folder / f"{name}.toml").write_text(text)
     members = json.dumps([str(folder / f"{name}.toml") for name in STUDIES])
     (folder / "collection.toml").write_text(f'title = "c"\nstudies = {members}\n')
-    with pytest.MonkeyPatch.context() as patch:
-        endings.register(patch)
+    with pytest.MonkeyPatch.context() as patch, registered("method", "endings", ENDINGS):
         patch.setattr(theme, "FORMATS", ("png",))
         # Cells with the status error are told of.
         assert main(["run", str(folder / "collection.toml"), "--results", str(folder)]) == 1

@@ -14,11 +14,11 @@ from vehiclemor.codegen import cache
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.failure import Failure
 from vehiclemor.inputs.suspension import sine_travel
-from vehiclemor.reduction.methods import pod, slow_manifold
+from vehiclemor.reduction.methods import pod
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
-from vehiclemor.study.evaluate import evaluate, fresh_fit, kept_fit, known_inputs
+from vehiclemor.study.evaluate import cached_fit, evaluate, fresh_fit, known_inputs
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Scenario, speed_of
@@ -44,7 +44,7 @@ def of_runs(model, method, training, tests, **settings):
 @pytest.fixture(autouse=True)
 def _nothing_kept():
     """What an earlier test has fitted or solved is not used again."""
-    evaluation.kept_reference.cache_clear()
+    evaluation.cached_reference.cache_clear()
     evaluation._KEPT.clear()
 
 
@@ -94,17 +94,6 @@ def test_versions_count_where_a_method_declares_them(cell, monkeypatch):
         monkeypatch.setattr(provenance, "version", lambda _: "0.0")
         assert key() == cell.key
     assert len({cell.key, *keys}) == 3
-
-
-def test_a_method_that_fits_others_has_their_source_in_its_key(vehicle, monkeypatch):
-    def code(method) -> str:
-        return make_cell(vehicle, component("maneuver", "lane_change"), method, {}).code
-
-    before = {name: code(name) for name in ("guarded", "pod")}
-    changed = dataclasses.replace(slow_manifold.METHOD, packages=("scipy",))
-    monkeypatch.setattr(slow_manifold, "METHOD", changed)
-    assert code("pod") == before["pod"]
-    assert code("guarded") != before["guarded"]
 
 
 def test_a_run_is_measured_the_same_way_in_grids_and_protocols(vehicle):
@@ -194,23 +183,21 @@ def fits(monkeypatch):
     return found
 
 
-def guarded(terms):
-    words = f"terms = {terms}, steps = 0"
-    return {"fast": "slow_manifold", "fast_settings": words, "tolerance": 5e-3}
-
-
-def test_a_guarded_model_is_fitted_around_the_fast_one_that_stands_beside_it(vehicle, fits):
-    alone = kept_fit(vehicle, experiment(vehicle, "slow_manifold", terms=2, steps=0))
-    both = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
+def test_one_fit_serves_all_solvers_tolerances_and_fallbacks(vehicle, fits):
+    quick = {"terms": 2, "steps": 0}
+    alone = cached_fit(vehicle, experiment(vehicle, "slow_manifold", **quick))
+    loose = cached_fit(vehicle, experiment(vehicle, "slow_manifold", tolerance=5e-3, **quick))
+    guarded = cached_fit(vehicle, experiment(vehicle, "guarded", fallback="dopri5", **quick))
     assert len(fits) == 1
-    assert both.fast.tolerance == 5e-3
-    assert both.fast.coefficients is alone.coefficients
-    assert both.offline.seconds == pytest.approx(alone.offline.seconds)
+    assert (loose.tolerance, guarded.reduced.tolerance) == (5e-3, 2e-3)
+    assert (guarded.full.solver, guarded.full.tolerance) == ("dopri5", 1e-4)
+    assert guarded.reduced.coefficients is loose.coefficients is alone.coefficients
+    assert guarded.offline == alone.offline
     # What a user fits is fitted for itself, and is the same.
-    anew = fresh_fit(vehicle, experiment(vehicle, "guarded", **guarded(2)))
-    assert anew.fast.coefficients is not alone.coefficients
-    np.testing.assert_array_equal(anew.fast.coefficients, alone.coefficients)
-    failed = kept_fit(vehicle, experiment(vehicle, "guarded", **guarded(FAILING)))
+    anew = fresh_fit(vehicle, experiment(vehicle, "guarded", **quick))
+    assert anew.reduced.coefficients is not alone.coefficients
+    np.testing.assert_array_equal(anew.reduced.coefficients, alone.coefficients)
+    failed = cached_fit(vehicle, experiment(vehicle, "guarded", terms=FAILING, steps=0))
     assert failed == Failure("diverged", "no fit")
 
 
@@ -224,7 +211,7 @@ def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
     broken = replace(method, fit=fit)
     monkeypatch.setattr("vehiclemor.study.evaluate.component", lambda *_: broken)
     wanted = experiment(vehicle, "slow_manifold", terms=1, steps=0)
-    found = [kept_fit(vehicle, wanted).status for _ in range(4)]
+    found = [cached_fit(vehicle, wanted).status for _ in range(4)]
     assert found == ["error", "error", "diverged", "diverged"]
     assert len(raised) == 3
 

@@ -6,12 +6,11 @@ import pytest
 import vehiclemor as vm
 from tests.study.small import small_study
 from vehiclemor.study.plans.grid import expand, sampled
-from vehiclemor.study.plans.loading import load_studies, write_study
+from vehiclemor.study.plans.loading import load_studies, read_study, write_study
 from vehiclemor.study.plans.results import flattened
-from vehiclemor.study.plans.study_file import StudyFile
+from vehiclemor.study.plans.study_file import study_from
 from vehiclemor.study.plans.study_runs import Sampling
 from vehiclemor.study.run import run_studies
-from vehiclemor.toml_files import read_toml
 
 CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"
 
@@ -19,7 +18,7 @@ CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"
 def grid_of(**given):
     """A grid of a study with these entries."""
     study = {"title": "t", "model": WISHBONE, "keep": "metrics", "methods": [{"method": "pod"}]}
-    return expand("mine", StudyFile.model_validate(study | given))
+    return expand("mine", study_from(study | given))
 
 
 def test_a_method_that_a_setting_does_not_concern_is_computed_once():
@@ -96,4 +95,4 @@ def test_a_study_that_is_written_is_the_same_again(tmp_path, protocol_text):
     names = ["figure-11", "vehicle-perturbations", "predictive", str(tmp_path / "a.toml")]
     for definition in (study for name in names for study in load_studies(name).values()):
         path = write_study(definition, tmp_path / "b.toml")
-        assert read_toml(path, StudyFile) == definition
+        assert read_study(path) == definition

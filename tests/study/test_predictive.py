@@ -107,7 +107,7 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
     inputs = {training_run(protocol.model, s).maneuver.at(TIMES).tobytes() for s in hidden}
     seen, trained, simulate = [], [], AlgebraicModel.simulate
     # What an earlier test has solved or fitted would not be again.
-    evaluate.kept_reference.cache_clear()
+    evaluate.cached_reference.cache_clear()
     evaluate._KEPT.clear()
 
     def recorded(self, maneuver, *arguments, **named):

@@ -60,9 +60,22 @@ def test_a_study_that_extends_another_has_its_sets_and_the_rows_it_names(
     assert (found.definition.title, found.definition.targets) == ("more", [])
     assert found.test_set == protocol.test_set
     assert (found.sets, sampled_sets(found)) == (protocol.sets, sampled_sets(protocol))
+    again = """
+        title = "again"
+        extends = "more.toml"
+        rows = { "small.toml" = ["newton"], "more.toml" = ["one vector", "replay"] }
+        seed = 3
+    """
+    (tmp_path / "again.toml").write_text(again)
+    third = load_protocol("again.toml")
+    assert [entry.label for entry in third.entries] == ["newton", "one vector", "replay"]
+    assert third.test_set == "small-1, seed 3"
+    assert third.definition.bounds == protocol.definition.bounds
     for old, new, words in (
-        ("replay", "rerun", "unknown row of the extended study 'rerun'"),
+        ("replay", "rerun", "rows: unknown row of small.toml 'rerun'"),
         ("small.toml", "none.toml", "none.toml: no such file"),
+        ("small.toml", "paper", "extends: paper is a collection"),
+        ('["replay", "newton"]', "3", "rows: give a list of labels of the extended study"),
         (
             'rows = ["replay", "newton"]\n        targets = []',
             "",
@@ -71,11 +84,36 @@ def test_a_study_that_extends_another_has_its_sets_and_the_rows_it_names(
                 "newton, replay, fixed basis"
             ),
         ),
-        ("small.toml", "other.toml", "other.toml extends a study itself, or is a collection"),
+        ("small.toml", "other.toml", "extends: other.toml extends itself"),
     ):
         (tmp_path / "other.toml").write_text(more.replace(old, new, 1))
         with pytest.raises(FileError, match=re.escape(words)):
             load_protocol("other.toml")
+
+
+def test_short_forms_say_the_same(tmp_path, protocol_text, protocol):
+    text = protocol_text
+    for old, new in (
+        (
+            """bounds.spindle_y = { measure = "rms", bound = 7.57e-5 }
+bounds.second_euler_angle = { measure = "max", bound = 2.4e-5 }
+""",
+            """bounds = [
+    { outputs = ["spindle_y"], measure = "rms", bound = 7.57e-5 },
+    { outputs = ["second_euler_angle"], measure = "max", bound = 2.4e-5 },
+]
+""",
+        ),
+        ("[{ tolerance = 1e-12 }, { tolerance = 1e-6 }]", "{ tolerance = [1e-12, 1e-6] }"),
+        (
+            "frequency = [0.7, 2.0], amplitude = [1.3, 1.4] }]",
+            "amplitude = [1.3, 1.4] }]\ncommon = { amplitude = [9.0], frequency = [0.7, 2.0] }",
+        ),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "small.toml").write_text(text)
+    assert load_protocol(str(tmp_path / "small.toml")).definition == protocol.definition
 
 
 # What the files of the package say

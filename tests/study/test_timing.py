@@ -8,7 +8,6 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import vehiclemor as vm
-from vehiclemor.inputs.polynomials import recorded_inputs
 from vehiclemor.reduction.methods.full_order import FullOrder
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
@@ -117,8 +116,8 @@ def test_an_input_of_the_timing_pass_is_like_one_that_was_just_made(steering):
     new = as_new(steering)
     np.testing.assert_array_equal(new.at(new.times), steering.at(steering.times))
     first = car.simulate(steering)
-    assert recorded_inputs(steering)[1] is recorded_inputs(steering)[1]
-    assert recorded_inputs(new)[1] is not recorded_inputs(steering)[1]
+    assert steering.recorded_inputs[1] is steering.recorded_inputs[1]
+    assert new.recorded_inputs[1] is not steering.recorded_inputs[1]
     np.testing.assert_array_equal(car.simulate(new).outputs, first.outputs)
 
 

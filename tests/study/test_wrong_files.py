@@ -22,6 +22,7 @@ test = [{ maneuver = "sine_travel", points = [[0.9, 1.0]] }]
 bounds = { spindle_y = { measure = "rms", bound = 1e-4 } }
 methods = [{ label = "newton", method = "full_order", role = "full order" }]
 """
+BOUND = '{ outputs = ["spindle_y"], measure = "rms", bound = 1e-4 }'
 # Part of the file -> what stands in its place, and what the line must say.
 STUDIES = {
     "rank = [3]": [
@@ -39,6 +40,7 @@ STUDIES = {
         ('method = "dmd"', "unknown method"),
         ('method = "pod"\n[[methods]]\nmethod = "pod"', "used twice"),
         ('method = "pod"\nsettings = {rank = 2}', "rank is set twice"),
+        ('method = "pod"\nrole = "baseline"', "methods.0.role"),
     ],
     'title = "for the tests"': [
         ("x = " + 2000 * "[" + 2000 * "]", "nested too deeply"),
@@ -51,11 +53,16 @@ STUDIES = {
     'model = "double_wishbone"': [
         ('model = "double_wishbone"\nmaneuver = "lane_change"', "gives inputs delta"),
     ],
-    "[grid]": [('training = "set"\n[grid]', "training_set"), ("keep = 'all'\n[grid]", "keep")],
+    "[grid]": [
+        ('training = "set"\n[grid]', "training_set"),
+        ("keep = 'all'\n[grid]", "keep"),
+        ("timed = 3\n[grid]", "timed is not a key of a grid: it belongs to a study with bounds"),
+    ],
     STUDY: [
         ('title = "mine"\nstudies = ["double_wishbon"]', "unknown study"),
         ('title = "mine"\nstudies = ["absent.toml"]', "absent.toml"),
-        ('title = "x"\nmodel = "x"\nstudies = ["double_wishbone"]', "nothing else"),
+        ('title = "x"\nmodel = "x"\nstudies = ["a"]', "model is not a key of a collection: it"),
+        ('title = "x"\nstudies = []', "studies: "),
     ],
 }
 PROTOCOLS = {
@@ -76,18 +83,28 @@ PROTOCOLS = {
         ("candidates = [{ rank = 3 }]", "unknown setting of full_order"),
         ('candidates = [{ preset = "best" }]', "unknown preset"),
         ("candidates = [{}, {}]", "the same candidate twice"),
+        ("candidates = { tolerance = 1e-3 }", "has a list of values"),
         ('training = ["lane_change"]', "training of"),
     ],
     "title =": [
         ('targets = [{ against = "me", ratio = 2.0 }]\ntitle =', "target is against"),
-        ("rounds = 3\ntitle =", "rounds"),
-        ('keep = "metrics"\ntitle =', "keep"),
+        ("rounds = 3\ntitle =", "rounds is not a key of a study with bounds: "),
+        (
+            'keep = "metrics"\ntitle =',
+            "keep is not a key of a study with bounds: it belongs to a grid",
+        ),
+        ("report = ['toe']\ntitle =", "did you mean reported"),
     ],
     '"for the tests"': [('""', "title: ''")],
     'label = "newton"': [('label = "a\\nb"', r"label: 'a\nb'")],
     '"double_wishbone"': [('"double_wishbon"', "unknown model")],
     "spindle_y": [("spindl_y", "unknown output")],
     "bound = 1e-4": [("bound = 0.0", "bounds.spindle_y.bound")],
+    'bounds = { spindle_y = { measure = "rms", bound = 1e-4 } }': [
+        ("bounds = {}", "bounds: "),
+        ('bounds = [{ measure = "rms", bound = 1e-4 }]', "has a list of outputs"),
+        (f"bounds = [{', '.join(2 * [BOUND])}]", "spindle_y is in two tables"),
+    ],
     '"full_order"': [('"full_ordr"', "unknown method")],
 }
 CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"

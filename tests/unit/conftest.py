@@ -1,24 +1,16 @@
 """Fixtures of the unit tests: plug-in models with known solutions."""
 
-from importlib.metadata import EntryPoint
-
 import pytest
 
-from vehiclemor import registry
+from tests.plugin.installation import registered
 from vehiclemor.simulation.build import build as built
 
 
 def builder(name):
     """Builder of a model of the tests: parameter values -> model."""
-    entry = EntryPoint(name, f"tests.unit.{name}:DEFINITION", "vehiclemor.models")
-    known = {**registry._entries("model"), name: entry}
-    real = registry._entries
 
     def build(**values):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(
-                registry, "_entries", lambda kind: known if kind == "model" else real(kind)
-            )
+        with registered("model", name, f"tests.unit.{name}:DEFINITION"):
             return built(name, overrides=values)
 
     return build

@@ -125,3 +125,35 @@ def test_what_is_no_file_is_refused_at_once(other, name):
     for read in READERS[name]:
         with pytest.raises(VehiclemorError):
             read(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [("a" * 2_000_000, "bytes"), (".".join(["a"] * 50_000) + " = 1", "a key has more than")],
+    ids=["large", "deep"],
+)
+def test_study_files_that_would_take_minutes_to_read_are_refused(tmp_path, text, reason):
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    with pytest.raises(FileError, match=reason):
+        vm.status(path)
+
+
+def test_keys_of_few_parts_and_long_lists_are_read(tmp_path):
+    path = tmp_path / "study.toml"
+    values = ",".join(f"{1.0 + k / 100}" for k in range(60))
+    path.write_text(
+        'title = "many"\nmodel = "double_wishbone"\n'
+        f'grid.frequency_factor = [{values}]\n[[methods]]\nmethod = "full_order"\n'
+    )
+    assert vm.status(str(path))["study"].runs == 60
+
+
+def test_studies_are_named_by_paths_too(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text('title = "one"\nmodel = "double_wishbone"\n[[methods]]\nmethod = "pod"\n')
+    results = tmp_path / "results"
+    assert len(vm.compare(path, results=results)) > 0
+    assert vm.figures([path], results=results)
+    assert vm.write_report([path], results=results, out=tmp_path / "page.html").exists()
+    assert vm.describe(path) is not None

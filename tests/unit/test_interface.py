@@ -58,7 +58,7 @@ def with_inputs(run, factor, shift=0.0):
 
 
 def test_inputs_that_differ_by_rounding_are_the_same(car):
-    run = car.simulate(vm.maneuver("lane_change"), solver="ros34pw2", tolerance=1e-3)
+    run = car.simulate(vm.maneuver("lane_change"), solver="etdrk4", tolerance=1e-3)
     for full in (with_inputs(run, 1.0 + 1e-7), with_inputs(run, 1.0, 1e-10)):
         assert vm.errors(run, full)["max_error"].max() == 0.0
 
@@ -86,7 +86,7 @@ def test_inputs_that_differ_by_rounding_are_the_same(car):
     ],
 )
 def test_what_a_run_does_not_have_is_one_line(car, call, word):
-    run = car.simulate(vm.maneuver("lane_change"), solver="ros34pw2", tolerance=1e-3)
+    run = car.simulate(vm.maneuver("lane_change"), solver="etdrk4", tolerance=1e-3)
     with pytest.raises(vm.VehiclemorError, match=word):
         call(run)
 

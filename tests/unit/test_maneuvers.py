@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import vehiclemor as vm
@@ -44,6 +44,7 @@ def test_sine_travel_is_the_papers_input(nominal):
 
 @settings(max_examples=30)
 @given(frequency=factors, amplitude=amplitudes)
+@example(frequency=3.516026232433491, amplitude=-2.7134626451811217)
 @pytest.mark.parametrize("name", ["sine_travel", "travel_and_rack", "travel_and_rack_multisine"])
 def test_factors_scale_time_and_values_and_do_not_pile_up(name, frequency, amplitude):
     nominal = vm.maneuver(name)
@@ -51,7 +52,10 @@ def test_factors_scale_time_and_values_and_do_not_pile_up(name, frequency, ampli
     assert perturbed == nominal.perturbed(frequency, amplitude)
     assert perturbed.perturbed() == nominal
     expected = amplitude * nominal.at(frequency * times)
-    np.testing.assert_allclose(perturbed.at(times), expected, rtol=0, atol=1e-14)
+    # Factors and time are rounded differently: by a few digits of the largest phase (rad).
+    phase = 2.0 * np.pi * 1.4 * frequency * times[-1]
+    rounding = 4.0 * np.finfo(float).eps * phase * 0.1 * abs(amplitude)
+    np.testing.assert_allclose(perturbed.at(times), expected, rtol=0, atol=rounding + 1e-16)
     # The run's length and its output times stay.
     np.testing.assert_array_equal(perturbed.times, times)
 

@@ -8,7 +8,7 @@ process would have to import it (0.2 s).  A test names the versions with which i
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from types import FunctionType, ModuleType
 from typing import Any, get_args
@@ -25,9 +25,7 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
 from vehiclemor.codegen.llvm_arithmetic import DOUBLE
-from vehiclemor.codegen.llvm_kernels import Rows, emit
 from vehiclemor.codegen.loop_types import declared_arguments
-from vehiclemor.codegen.operations import Kernel
 
 # Straight-line kernels are one long block: with its own limits the compiler finds half of what left
 # and right have in common.
@@ -103,17 +101,14 @@ def compiled_module(module: ir.Module, libraries: Sequence[Any] = ()) -> bytes:
     return library.emit_native_object()
 
 
-def compiled_loops(
-    modules: Sequence[ModuleType], entries: Sequence[str], given: Mapping[str, Any]
-) -> bytes:
+def compiled_loops(modules: Sequence[ModuleType], entries: Sequence[str]) -> bytes:
     """Object code of the entries of modules of loops.
 
     Each entry becomes a C function of one pointer to 64-bit words: the arguments in order, an array
     as its address and its shape, see `loops.words`.  Functions know one another by name, those of a
-    later module take the place of earlier ones; `given` are further names, of sizes and inlined
-    kernels.
+    later module take the place of earlier ones.
     """
-    functions = linked(modules, given)
+    functions = linked(modules)
     outer, libraries = ir.Module("loops"), []
     for name in entries:
         declared = declared_arguments(functions[name].py_func)
@@ -125,7 +120,7 @@ def compiled_loops(
     return compiled_module(outer, libraries)
 
 
-def linked(modules: Sequence[ModuleType], given: Mapping[str, Any]) -> dict[str, Any]:
+def linked(modules: Sequence[ModuleType]) -> dict[str, Any]:
     """Functions of modules of loops, to be compiled, by name."""
     functions: dict[str, Any] = {}
     namespaces = [dict(vars(module)) for module in modules]
@@ -138,7 +133,7 @@ def linked(modules: Sequence[ModuleType], given: Mapping[str, Any]) -> dict[str,
                 options = OPTIONS | {"forceinline": name in inlined}
                 functions[name] = _Dispatcher(copied, targetoptions=options)
     for namespace in namespaces:
-        namespace.update(functions | INTRINSICS | dict(given))
+        namespace.update(functions | INTRINSICS)
     return functions
 
 
@@ -221,79 +216,63 @@ def _view(kind: Any) -> Callable[..., Any]:
 
 
 @intrinsic
-def call_kernel(
-    typing_context: Any, kernels: Any, place: Any, x: Any, u: Any, constants: Any, result: Any
-) -> Any:
-    """See `loop_types.call_kernel`; the arrays must be as long as the kernel wants them."""
+def call_kernel(typing_context: Any, kernels: Any, index: Any, *arrays: Any) -> Any:
+    """See `loop_types.call_kernel`."""
     del typing_context
-    _require_plain(x, u, constants, result)
-    return types.void(kernels, place, x, u, constants, result), _call
+    _require_plain(*arrays)
+    packed = types.StarArgTuple.from_types(arrays)
+    return types.void(kernels, index, packed), _call_kernel
+
+
+def _call_kernel(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    pointers = []
+    packed, kinds = args[2], sig.args[2]
+    for value, kind in zip(cgutils.unpack_tuple(builder, packed, len(kinds)), kinds, strict=True):
+        pointers.append(context.make_array(kind)(context, builder, value).data)
+    # A step executes other kernels of the list; all others don't see this argument.
+    kernels = context.make_array(sig.args[0])(context, builder, args[0])
+    pointers.append(builder.bitcast(kernels.data, DOUBLE.as_pointer()))
+    return _call_address(context, builder, sig, args, pointers)
 
 
 @intrinsic
 def call_lanes(
     typing_context: Any,
     kernels: Any,
-    place: Any,
+    index: Any,
     path: Any,
     inputs: Any,
     constants: Any,
     result: Any,
     first: Any,
 ) -> Any:
-    """See `loop_types.call_lanes`; the matrices must have as many rows and columns."""
+    """See `loop_types.call_lanes`."""
     del typing_context
     _require_plain(path, inputs, constants, result)
-    return types.void(kernels, place, path, inputs, constants, result, first), _call
+    return types.void(kernels, index, path, inputs, constants, result, first), _call_lanes
 
 
-def _call(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    """Call a kernel; of matrices from a row on, the last argument, with the lengths of rows."""
-    place = context.cast(builder, args[1], sig.args[1], types.intp)
-    kernels, *arrays = [
-        context.make_array(sig.args[k])(context, builder, args[k]) for k in (0, 2, 3, 4, 5)
-    ]
-    arguments = [array.data for array in arrays]
-    if len(args) > 6:
-        first = context.cast(builder, args[6], sig.args[6], types.intp)
-        for k, array in enumerate(arrays):
-            if sig.args[2 + k].ndim == 2:
-                arguments.append(cgutils.unpack_tuple(builder, array.shape)[1])
-                arguments[k] = builder.gep(array.data, [builder.mul(first, arguments[-1])])
-    else:
-        # Steps execute others themselves; a kernel that takes no such argument doesn't see it.
-        arguments.append(builder.bitcast(kernels.data, DOUBLE.as_pointer()))
+def _call_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    first = context.cast(builder, args[6], sig.args[6], types.intp)
+    pointers, row_lengths = [], []
+    for value, kind in zip(args[2:6], sig.args[2:6], strict=True):
+        array = context.make_array(kind)(context, builder, value)
+        pointer = array.data
+        if kind.ndim == 2:
+            row_lengths.append(cgutils.unpack_tuple(builder, array.shape)[1])
+            pointer = builder.gep(pointer, [builder.mul(first, row_lengths[-1])])
+        pointers.append(pointer)
+    return _call_address(context, builder, sig, args, pointers + row_lengths)
+
+
+def _call_address(context: Any, builder: Any, sig: Any, args: Any, arguments: Sequence[Any]) -> Any:
+    """Call the function at an index of a list of addresses, the first two arguments."""
+    kernels = context.make_array(sig.args[0])(context, builder, args[0])
+    index = context.cast(builder, args[1], sig.args[1], types.intp)
+    address = builder.load(builder.gep(kernels.data, [index]))
     function = ir.FunctionType(ir.VoidType(), [argument.type for argument in arguments])
-    address = builder.load(builder.gep(kernels.data, [place]))
-    address = builder.inttoptr(address, function.as_pointer())
-    builder.call(address, arguments, attrs=("nounwind",))
+    builder.call(builder.inttoptr(address, function.as_pointer()), arguments, attrs=("nounwind",))
     return context.get_dummy_value()
-
-
-def inlined_kernel(kernel: Kernel) -> Any:
-    """A kernel whose instructions are written where a loop calls it, given its arrays."""
-
-    @intrinsic
-    def execute(typing_context: Any, *arrays: Any) -> Any:
-        del typing_context
-        _require_plain(*arrays)
-        if len(arrays) != len(kernel.arguments):
-            raise TypingError(f"{kernel.name} takes {', '.join(kernel.arguments)}")
-
-        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            kinds = sig.args[0]
-            given = cgutils.unpack_tuple(builder, args[0], len(kinds))
-            rows = [
-                Rows(context.make_array(kind)(context, builder, value).data)
-                for kind, value in zip(kinds, given, strict=True)
-            ]
-            emit(kernel, builder, dict(zip(kernel.arguments, rows, strict=True)))
-            return context.get_dummy_value()
-
-        void: Any = types.void
-        return void(types.StarArgTuple.from_types(arrays)), generate
-
-    return execute
 
 
 def _require_plain(*arrays: Any) -> None:

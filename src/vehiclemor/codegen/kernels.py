@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 LAYERS = ("multibody", "symbolic", "codegen")
 # Kernels beside the functions of a program.
-BESIDE = ("constants", "tangent_parts", "tangent")
+BESIDE = ("constants", "jacobian_entries", "jacobian_product")
 
 
 class BareKernel(NamedTuple):

@@ -30,16 +30,14 @@ def matrix(buffer: Vector, first: int, rows: int, columns: int) -> Matrix:
     return buffer[first : first + rows * columns].reshape(rows, columns)
 
 
-def call_kernel(
-    kernels: IntVector, place: int, x: Vector, u: Vector, constants: Vector, result: Any
-) -> None:
-    """Call the kernel whose address stands at a place in the list; nothing is checked."""
+def call_kernel(kernels: IntVector, index: int, *arrays: Any) -> None:
+    """Call a kernel, by its index in a list of addresses, with its arrays; nothing is checked."""
     raise NotImplementedError(COMPILED_ONLY)
 
 
 def call_lanes(
     kernels: IntVector,
-    place: int,
+    index: int,
     path: Matrix,
     inputs: Matrix,
     constants: Vector,

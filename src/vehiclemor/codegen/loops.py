@@ -17,7 +17,6 @@ import numpy as np
 from vehiclemor.codegen.cache import compiler_identity, digest_of, fetched, once
 from vehiclemor.codegen.kernels import MachineCode
 from vehiclemor.codegen.loop_types import declared_arguments
-from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import source_digest
 
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
@@ -143,39 +142,20 @@ def _flat(value: Any) -> list[Any]:
     return [part for field in value for part in _flat(field)]
 
 
-def loops(
-    modules: Sequence[str],
-    entries: Sequence[str],
-    kernels: Mapping[str, Kernel] | None = None,
-    sizes: Mapping[str, int] | None = None,
-) -> dict[str, Loop]:
+@once
+def loops(modules: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, Loop]:
     """Compiled entries, functions with declared types, of modules of loops.
 
-    Modules are named below this package; a function of a later one takes the place of one of the
-    same name.  Kernels are written where the loops call them by name; sizes are constants that the
-    compiler shall know, by name.
+    Modules are named below this package; a function of a later one replaces an earlier one of the
+    same name.
     """
-    return _loops(
-        tuple(modules), tuple(entries), tuple((kernels or {}).items()), tuple((sizes or {}).items())
-    )
-
-
-@once
-def _loops(
-    modules: tuple[str, ...],
-    entries: tuple[str, ...],
-    kernels: tuple[tuple[str, Kernel], ...],
-    sizes: tuple[tuple[str, int], ...],
-) -> dict[str, Loop]:
     imported = [import_module(f"vehiclemor.{name}") for name in modules]
-    parts = [loops_digest(modules), *modules, *entries, repr(kernels), repr(sizes)]
-    key = digest_of([*parts, compiler_identity()])
+    key = digest_of([loops_digest(modules), *modules, *entries, compiler_identity()])
 
     def make() -> bytes:
-        from vehiclemor.codegen.compiler import compiled_loops, inlined_kernel
+        from vehiclemor.codegen.compiler import compiled_loops
 
-        given = {name: inlined_kernel(kernel) for name, kernel in kernels}
-        return compiled_loops(imported, entries, given | dict(sizes))
+        return compiled_loops(imported, entries)
 
     code = MachineCode(fetched(f"loops/{modules[-1].rpartition('.')[2]}-{key}.o", make))
     functions = {name: _entry(imported, name) for name in entries}

@@ -71,8 +71,8 @@ def _kernel(name: str, arguments: Mapping[str, Sequence[sp.Symbol]], function: F
 def _product_kernels(program: Program) -> dict[str, Kernel]:
     """Two kernels by which a Jacobian is multiplied with vectors.
 
-    `tangent_parts(q, u, constants, result)` gives the entries of the Jacobian that are no
-    structural constants, then the residual; `tangent(parts, column, result)` the product.
+    `jacobian_entries(q, u, constants, result)` gives the residual, then the entries of the Jacobian
+    that are no structural constants; `jacobian_product(entries, column, result)` the product.
     """
     function, product = program.functions["residual_jacobian"], Listing()
     rows, columns = function.shape
@@ -84,7 +84,7 @@ def _product_kernels(program: Program) -> dict[str, Kernel]:
             if entry == 0:
                 continue
             if entry not in (1, -1):
-                factor = product.entry("_parts", len(entries))
+                factor = product.entry("_entries", rows + len(entries))
                 terms.append(factor * product.entry("_column", j))
                 entries.append(entry)
             else:
@@ -92,12 +92,13 @@ def _product_kernels(program: Program) -> dict[str, Kernel]:
                 terms.append(column if entry == 1 else -column)
         product.store(i, sum(terms[1:], terms[0]) if terms else 0.0)
     residual = [function.results[(i + 1) * columns - 1] for i in range(rows)]
-    results = (*entries, *residual)
-    parts = Function(function.assignments, results, (len(results),))
-    return {
-        "tangent_parts": _kernel("tangent_parts", _arguments(program), parts),
-        "tangent": product.kernel("tangent", ("_parts", "_column", "_result")),
-    }
+    results = (*residual, *entries)
+    listed = Function(function.assignments, results, (len(results),))
+    kernels = (
+        _kernel("jacobian_entries", _arguments(program), listed),
+        product.kernel("jacobian_product", ("_entries", "_column", "_result")),
+    )
+    return {kernel.name: kernel for kernel in kernels}
 
 
 class _Lowering(Listing):

@@ -18,8 +18,8 @@ from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.reduction.fallback import FallbackModel
 from vehiclemor.reduction.methods.full_order import FullOrder
-from vehiclemor.reduction.methods.guarded import FallbackModel
 from vehiclemor.reduction.methods.path_map import PathMapModel, map_kernel
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -102,7 +102,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
         case FullOrder():
             return exported_system(what.model, name)
         case FallbackModel():
-            return exported_system(what.fast, name)
+            return exported_system(what.reduced, name)
         case PathMapModel():
             return map_system(what, name)
         case ReducedVehicle():

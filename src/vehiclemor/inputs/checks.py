@@ -1,19 +1,16 @@
 """Checks of maneuvers at the border of a model that is ready to run."""
 
-from functools import lru_cache
-
 import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import extent_of, first_beyond, kept, recorded_inputs
+from vehiclemor.inputs.excitation import Excitation, cached
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
 
 
-def checked_maneuver(maneuver: str | Maneuver, definition: ModelDefinition) -> Maneuver:
+def checked_maneuver(maneuver: str | Excitation, definition: ModelDefinition) -> Excitation:
     """A maneuver, also by its name; a signal with all inputs that a model has.
 
     `InputError` if it is none, gives other inputs than the model has, or one that leaves the bounds
@@ -21,14 +18,14 @@ def checked_maneuver(maneuver: str | Maneuver, definition: ModelDefinition) -> M
     """
     if isinstance(maneuver, str):
         maneuver = component("maneuver", maneuver)
-    if not isinstance(maneuver, Maneuver):
+    if not isinstance(maneuver, Excitation):
         raise InputError(f"{quoted(maneuver)} is not a maneuver, as vm.maneuver(name) gives one")
     return _checked(maneuver, definition)
 
 
 # A maneuver is checked once for all its runs, and so is a signal that has been completed.
-@kept
-def _checked(maneuver: Maneuver, definition: ModelDefinition) -> Maneuver:
+@cached
+def _checked(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
     names = tuple(quantity.name for quantity in definition.inputs)
     complete = maneuver.for_inputs(names)
     if complete.inputs != names:
@@ -40,8 +37,8 @@ def _checked(maneuver: Maneuver, definition: ModelDefinition) -> Maneuver:
     return complete
 
 
-@kept
-def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
+@cached
+def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
     anything = -np.inf, np.inf
     ranges = [definition.validity.get(q.name, anything) for q in definition.inputs]
     if all(bounds == anything for bounds in ranges):
@@ -49,15 +46,15 @@ def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
     low, high = np.array(ranges).T
     if definition.kind == "structural":
         # A road has too many waves to be taken between output times.
-        times, values = recorded_inputs(maneuver)
+        times, values = maneuver.recorded_inputs
         beyond = (values < low) | (values > high)
         outside, since = np.flatnonzero(beyond.any(axis=0)), times[beyond.argmax(axis=0)]
     else:
-        extent = extent_of(maneuver)
+        extent = maneuver.extent
         outside = np.flatnonzero((extent.low < low) | (extent.high > high))
         however_quick = np.full((2, len(low)), np.inf)
         since = (
-            first_beyond(maneuver, np.vstack([low, high, however_quick])) if len(outside) else low
+            maneuver.first_beyond(np.vstack([low, high, however_quick])) if len(outside) else low
         )
     if len(outside):
         j = outside[since[outside].argmin()]
@@ -69,8 +66,8 @@ def _check_bounds(maneuver: Maneuver, definition: ModelDefinition) -> None:
         )
 
 
-@lru_cache(maxsize=64)
-def check_resolved(maneuver: Maneuver) -> None:
+@cached
+def check_resolved(maneuver: Excitation) -> None:
     """Raise `InputError` if the output times are too far apart to show the inputs.
 
     Between two output times without a corner an input stays within a quarter of its range of the
@@ -100,10 +97,10 @@ def check_resolved(maneuver: Maneuver) -> None:
         )
 
 
-@kept
-def cut_short(maneuver: Maneuver) -> str:
+@cached
+def cut_short(maneuver: Excitation) -> str:
     """That a maneuver goes on after the end of its run, if it does."""
-    last = 0.0 if isinstance(maneuver, Signal) else max(maneuver.break_points, default=0.0)
+    last = max(maneuver.break_points, default=0.0)
     if last <= maneuver.duration:
         return ""
     return f"the maneuver would end at {last:.4g} s, after the run"

@@ -1,28 +1,46 @@
 """Maneuvers: input time histories that studies scale in frequency and amplitude."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import count, line_of_text, number, quoted, real_array, within
+from vehiclemor.arguments import (
+    count,
+    line_of_text,
+    loop_array,
+    number,
+    quoted,
+    real_array,
+    within,
+)
 from vehiclemor.exceptions import InputError, PlugInError, blamed
+from vehiclemor.inputs.excitation import (
+    FACTORS,
+    LONGEST_DURATION,
+    MOST_SAMPLES,
+    Excitation,
+    cached,
+    checked_factor,
+    checked_times,
+)
+from vehiclemor.inputs.polynomial_loops import Pieces
+from vehiclemor.inputs.polynomials import fitted_pieces
 from vehiclemor.registry import component
-from vehiclemor.short_repr import ShortRepr
 
-# Bounds far beyond anything that is meant.  A maneuver that is a thousand times slower does not
-# begin within its run, one that is a thousand times faster is over between two output times.
-FACTORS = {"frequency": (1e-3, 1e3), "amplitude": (-1e6, 1e6)}
-LONGEST_DURATION = 1e5
-MOST_SAMPLES = 10_000_000
 MOST_CORNERS = 10_000
+# Maneuvers with cached results: more than the sampled runs of a protocol, over which all rows go.
+CACHED = 512
 
 
 @dataclass(frozen=True)
-class Maneuver(ShortRepr):
-    """Inputs u(t) of a model over a fixed duration.
+class Maneuver(Excitation):
+    """Inputs u(t) as functions of time and of two factors.
 
     Attributes
     ----------
@@ -42,12 +60,10 @@ class Maneuver(ShortRepr):
         Perturbation; 1 is the nominal maneuver.
     linear_in_amplitude
         Whether all inputs are proportional to the amplitude factor: then runs that differ in it
-        alone share what is made of the signal.
+        alone share their polynomials.
     member
         Of a family, such as roads of other seeds: number -> maneuver, whose name is `NAME:NUMBER`.
     """
-
-    repr_fields = ("name", "inputs", "duration", "samples", "frequency_factor", "amplitude_factor")
 
     name: str
     summary: str
@@ -59,7 +75,7 @@ class Maneuver(ShortRepr):
     frequency_factor: float = 1.0
     amplitude_factor: float = 1.0
     linear_in_amplitude: bool = False
-    member: "Callable[[int], Maneuver] | None" = None
+    member: Callable[[int], Maneuver] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what is no maneuver, so that its author reads one clear line."""
@@ -87,17 +103,17 @@ class Maneuver(ShortRepr):
         # Every cache of a run asks for it; what differs is mostly here.
         return hash((self.name, self.signal, self.frequency_factor, self.amplitude_factor))
 
-    @property
-    def times(self) -> np.ndarray:
-        """Equidistant output times (samples,) in s."""
-        return np.linspace(0.0, self.duration, self.samples)
+    @cached_property
+    def results(self) -> dict[Any, Any]:
+        """Cached results, which equal maneuvers share."""
+        return _results(self)
 
     @property
     def break_points(self) -> tuple[float, ...]:
         """Times in s inside the run at which the inputs are not smooth."""
         with blamed(f"{self}: corners", self.corners):
-            found = self.corners(self.frequency_factor)
-            times = real_array([*islice(found, MOST_CORNERS + 1)] or np.zeros(0))
+            corners = islice(self.corners(self.frequency_factor), MOST_CORNERS + 1)
+            times = real_array([*corners] or np.zeros(0))
         if times.ndim != 1 or not np.isfinite(times).all():
             raise PlugInError(f"{self}: corners are {quoted(times)}, not a list of times in s")
         if len(times) > MOST_CORNERS:
@@ -117,32 +133,46 @@ class Maneuver(ShortRepr):
             )
         return values
 
-    def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> "Maneuver":
+    def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
         """The maneuver with its factors set; `InputError` if one is out of its bounds."""
         return replace(self, frequency_factor=frequency, amplitude_factor=amplitude)
 
-    def for_inputs(self, names: tuple[str, ...]) -> "Maneuver":  # noqa: ARG002
-        """The maneuver as a model with these inputs takes it."""
-        return self
+    @property
+    @cached
+    def pieces(self) -> Pieces:
+        """Inputs as piecewise polynomials, fitted as far as `polynomials.ACCURACY`."""
+        unit = self._of_unit_amplitude()
+        if unit is None:
+            return fitted_pieces(self)
+        coefficients = self.amplitude_factor * unit.pieces.coefficients
+        return unit.pieces._replace(coefficients=coefficients)
+
+    def _record(self) -> tuple[np.ndarray, np.ndarray]:
+        unit = self._of_unit_amplitude()
+        if unit is None:
+            times = self.times
+            return times, loop_array(self.at(times))
+        times, inputs = unit.recorded_inputs
+        return times, self.amplitude_factor * inputs
+
+    def _of_unit_amplitude(self) -> Maneuver | None:
+        """The maneuver to which this one is proportional, if it declares that it is."""
+        if not self.linear_in_amplitude or self.amplitude_factor == 1.0:
+            return None
+        unit = self.perturbed(self.frequency_factor)
+        return unit if _is_linear(unit) else None
 
 
-def checked_times(times: Any) -> np.ndarray:
-    """Finite times (n,) in s, or `InputError`."""
-    try:
-        array = real_array(times)
-    except (TypeError, ValueError):
-        array = np.array(np.nan)
-    if array.ndim != 1 or not np.isfinite(array).all():
-        raise InputError(f"times are {quoted(times)}, not a list of finite times in s")
-    return array
+@lru_cache(maxsize=CACHED)
+def _results(maneuver: Maneuver) -> dict[Any, Any]:  # noqa: ARG001
+    return {}
 
 
-def checked_factor(name: str, value: object) -> float:
-    """A factor on the frequency or amplitude; `InputError` if it is none, or out of bounds."""
-    factor = number(f"{name} factor", value)
-    if name == "frequency" and factor <= 0.0:
-        raise InputError(f"{name} factor: {factor:g} is not positive")
-    return within(f"{name} factor", factor, FACTORS[name])
+@cached
+def _is_linear(unit: Maneuver) -> bool:
+    """Whether it is proportional as it declares: a copy with another signal may not be."""
+    doubled = unit.perturbed(unit.frequency_factor, 2.0).at(unit.times)
+    return bool(np.array_equal(doubled, 2.0 * unit.at(unit.times)))
 
 
 def smooth(frequency: float) -> tuple[float, ...]:

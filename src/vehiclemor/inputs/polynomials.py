@@ -3,132 +3,28 @@
 Between two break points of a maneuver an input is smooth: polynomials of degree 5 through the
 Chebyshev points of equal pieces (L. N. Trefethen, Approximation Theory and Approximation Practice,
 2013, chapter 2), halved until the error half-way between these points is below `ACCURACY` times the
-input's largest value.  A signal brings its own.
+input's largest value.
 """
 
-from collections.abc import Callable, Hashable
-from functools import cache, lru_cache, wraps
+from functools import cache
 from itertools import pairwise
-from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from vehiclemor.arguments import loop_array
-from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.polynomial_loops import Pieces
-from vehiclemor.inputs.signal import Signal, polynomial_loops
 
-Made = TypeVar("Made")
 ACCURACY = 1e-11
 MOST_PIECES = 1 << 15
 DEGREE = 5
-# Maneuvers whose inputs are kept: more than the drawn runs of a protocol, over which all rows go.
-KEPT = 512
 
 
-def kept(make: Callable[..., Made]) -> Callable[..., Made]:
-    """The function, its results kept: of a signal as long as it lives, of others the last ones."""
-    of_maneuver = lru_cache(maxsize=KEPT)(make)
+def fitted_pieces(maneuver: Excitation) -> Pieces:
+    """Piecewise polynomials that approximate the functions of a maneuver.
 
-    @wraps(make)
-    def found(maneuver: Maneuver, *further: Hashable) -> Made:
-        if not isinstance(maneuver, Signal):
-            return of_maneuver(maneuver, *further)
-        key = make, *further
-        if key not in maneuver.kept:
-            maneuver.kept[key] = make(maneuver, *further)
-        return maneuver.kept[key]
-
-    return found
-
-
-@kept
-def recorded_inputs(maneuver: Maneuver) -> tuple[np.ndarray, np.ndarray]:
-    """Output times (samples,) in s of a maneuver and its inputs (samples, inputs), to be read."""
-    if isinstance(maneuver, Signal):
-        signal, times = signal_of(maneuver), _times(maneuver.duration, maneuver.samples)
-        inputs = np.empty((len(times), signal.bundle.coefficients.shape[1]))
-        polynomial_loops()["sampled"](signal, times, inputs)
-    elif (unit := _of_unit_amplitude(maneuver)) is not None:
-        times, inputs = recorded_inputs(unit)
-        inputs = maneuver.amplitude_factor * inputs
-    else:
-        times = maneuver.times
-        inputs = loop_array(maneuver.at(times))
-    times.flags.writeable = inputs.flags.writeable = False
-    return times, inputs
-
-
-class Extent(NamedTuple):
-    """How far inputs go in whole signals, between output times too, see `polynomial_loops.extent`.
-
-    Largest (3, inputs) are magnitudes of the inputs, of what of them is above 2 Hz, and the root of
-    the integral of the square of what is above 8 Hz.
+    `InputError` if an input isn't finite, or isn't smooth between the break points.
     """
-
-    low: np.ndarray
-    high: np.ndarray
-    largest: np.ndarray
-
-
-@kept
-def extent_of(maneuver: Maneuver) -> Extent:
-    """Extent of the inputs of a maneuver."""
-    low, high, *quick, _ = _extent(maneuver, np.inf)
-    return Extent(low, high, np.array([np.maximum(-low, high), *quick]))
-
-
-def first_beyond(maneuver: Maneuver, limits: np.ndarray) -> np.ndarray:
-    """Times (inputs,) in s at which limits (4, inputs) of `polynomial_loops.extent` are passed."""
-    return _extent(maneuver, limits)[4]
-
-
-def _extent(maneuver: Maneuver, limits: np.ndarray | float) -> np.ndarray:
-    """Result (5, inputs) of `polynomial_loops.extent`."""
-    signal = signal_of(maneuver)
-    found = np.empty((5, signal.bundle.coefficients.shape[1]))
-    given = np.empty((4, found.shape[1]))
-    given[:] = limits
-    polynomial_loops()["extent"](signal, given, found)
-    return found
-
-
-def _of_unit_amplitude(maneuver: Maneuver) -> Maneuver | None:
-    """The maneuver to which another is proportional, if it declares that it is."""
-    if not maneuver.linear_in_amplitude or maneuver.amplitude_factor == 1.0:
-        return None
-    unit = maneuver.perturbed(maneuver.frequency_factor)
-    return unit if _is_linear(unit) else None
-
-
-@lru_cache(maxsize=KEPT)
-def _is_linear(unit: Maneuver) -> bool:
-    """Whether it is what it declares: a copy with another signal may not be."""
-    doubled = unit.perturbed(unit.frequency_factor, 2.0).at(unit.times)
-    return bool(np.array_equal(doubled, 2.0 * unit.at(unit.times)))
-
-
-@lru_cache(maxsize=64)
-def _times(duration: float, samples: int) -> np.ndarray:
-    times = np.linspace(0.0, duration, samples)
-    times.flags.writeable = False
-    return times
-
-
-@kept
-def signal_of(maneuver: Maneuver) -> Ready:
-    """Piecewise polynomial inputs of a maneuver: those of a signal, of a function approximations.
-
-    `InputError` if one isn't finite, or isn't smooth between the break points that it names.
-    """
-    if isinstance(maneuver, Signal):
-        return ready(maneuver.polynomials)
-    if (unit := _of_unit_amplitude(maneuver)) is not None:
-        signal: Pieces = signal_of(unit).bundle
-        coefficients = maneuver.amplitude_factor * signal.coefficients
-        return ready(signal._replace(coefficients=coefficients))
     inner = sorted(t for t in set(maneuver.break_points) if 0.0 < t < maneuver.duration)
     edges = np.array([0.0, *inner, maneuver.duration])
     probe = np.linspace(0.0, maneuver.duration, 1001)
@@ -145,11 +41,11 @@ def signal_of(maneuver: Maneuver) -> Ready:
     largest = np.abs(samples).max(axis=0) + 1e-300
     parts = [_segment(maneuver, (a, b), largest, (times, samples)) for a, b in pairwise(edges)]
     first = np.cumsum([0, *(len(part) for part in parts)])
-    return ready(Pieces(edges, first.astype(np.int64), np.empty(0), np.concatenate(parts)))
+    return Pieces(edges, first.astype(np.int64), np.empty(0), np.concatenate(parts))
 
 
 def _segment(
-    maneuver: Maneuver,
+    maneuver: Excitation,
     ends: tuple[float, float],
     largest: np.ndarray,
     known: tuple[np.ndarray, np.ndarray],

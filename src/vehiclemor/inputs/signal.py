@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vehiclemor.arguments import file_path, line_of_text, number, within
-from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.columns import (
     column_names,
@@ -22,18 +20,20 @@ from vehiclemor.inputs.columns import (
     sample_arrays,
     unit_factor,
 )
-from vehiclemor.inputs.maneuver import (
+from vehiclemor.inputs.excitation import (
     LONGEST_DURATION,
     MOST_SAMPLES,
-    Maneuver,
+    Excitation,
+    cached,
     checked_factor,
     checked_times,
+    polynomial_loops,
+    values_at,
 )
-from vehiclemor.inputs.polynomial_loops import DISORDERED, NOT_FINITE, ROWS, Pieces
+from vehiclemor.inputs.interpolation import HOLDS, interpolants, time_derivative
+from vehiclemor.inputs.polynomial_loops import Pieces
 from vehiclemor.registry import choice
 
-# What lies between samples, and the degree of its polynomials.
-HOLDS = {"linear": 1, "zero": 0, "cubic": 3}
 # Time (s) between output times, as of the registered maneuvers of vehicles.
 OUTPUT_STEP = 0.02
 # Time (s) between the samples that are taken of a function.
@@ -41,25 +41,31 @@ FUNCTION_STEP = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Signal(Maneuver):
-    """Inputs through samples, made by `from_samples` and its kin.
+class Signal(Excitation):
+    """Inputs through samples, made by `from_samples`, `from_function` or `from_csv`.
 
     It ends with the last sample, whatever the hold: later inputs are refused, not extrapolated.
-    `perturbed` scales its time, so its duration, and its values.  Inputs are the names of those
-    that are given, empty if they are all of a model's, in its order; `hold` is what lies between
-    samples, `pieces` the polynomials for factors of 1, `kept` what is made of it when it is run.
+    `perturbed` scales its time, so its duration, and its values.
+
+    Attributes
+    ----------
+    name, summary, inputs, duration, samples
+        See `Excitation`; without names of inputs it has all those of a model, in its order.
+    hold
+        Interpolation between samples.
+    nominal_pieces
+        Polynomials for factors of 1.
     """
 
-    hold: str = "linear"
-    pieces: Pieces = None  # type: ignore[assignment]
-    kept: dict[Any, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """The constructors have checked."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What a copy takes along: addresses are its own."""
-        return super().__getstate__() | {"kept": {}}
+    name: str
+    summary: str
+    inputs: tuple[str, ...]
+    duration: float
+    samples: int
+    hold: str
+    nominal_pieces: Pieces
+    frequency_factor: float = 1.0
+    amplitude_factor: float = 1.0
 
     def __str__(self) -> str:
         name = "signal" if self.name == "signal" else f"signal {self.name!r}"
@@ -75,7 +81,7 @@ class Signal(Maneuver):
     @property
     def _identity(self) -> tuple[Any, ...]:
         factors = self.frequency_factor, self.amplitude_factor
-        return id(self.pieces), self.inputs, self.samples, factors
+        return id(self.nominal_pieces), self.inputs, self.samples, factors
 
     @classmethod
     def from_samples(
@@ -116,28 +122,30 @@ class Signal(Maneuver):
         return many_signals(times, values[None], hold, **how)[0]
 
     @property
-    def polynomials(self) -> Pieces:
-        """Polynomials with the factors."""
-        frequency, amplitude = self.frequency_factor, self.amplitude_factor
-        if frequency == amplitude == 1.0:
-            return self.pieces
-        if "polynomials" not in self.kept:
-            inputs = self.pieces.coefficients.shape[1]
-            orders = np.array(
-                [derivative_order(name, self.inputs) for name in self.inputs] or [0] * inputs
-            )
-            amplitudes = amplitude * frequency**orders
-            self.kept["polynomials"] = self.pieces._replace(
-                edges=self.pieces.edges / frequency,
-                starts=self.pieces.starts / frequency,
-                coefficients=self.pieces.coefficients * amplitudes[:, None],
-            )
-        return self.kept["polynomials"]
+    def pieces(self) -> Pieces:
+        """Inputs as piecewise polynomials."""
+        if self.frequency_factor == self.amplitude_factor == 1.0:
+            return self.nominal_pieces
+        return self._scaled_pieces()
+
+    @cached
+    def _scaled_pieces(self) -> Pieces:
+        edges, first, starts, coefficients = self.nominal_pieces
+        orders = np.zeros(coefficients.shape[1])
+        for column, name in enumerate(self.inputs):
+            orders[column] = derivative_order(name, self.inputs)
+        amplitudes = self.amplitude_factor * self.frequency_factor**orders
+        return Pieces(
+            edges / self.frequency_factor,
+            first,
+            starts / self.frequency_factor,
+            coefficients * amplitudes[:, None],
+        )
 
     @property
     def break_points(self) -> tuple[float, ...]:
         """Times in s inside the run at which a time loop begins anew."""
-        return tuple(self.polynomials.edges[1:-1].tolist())
+        return tuple(self.pieces.edges[1:-1].tolist())
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Inputs (n, number of inputs) at times (n,) in s; `InputError` beyond the samples."""
@@ -147,7 +155,13 @@ class Signal(Maneuver):
         if beyond.any():
             late = times[beyond][0]
             raise InputError(f"{self} lasts from 0 to {self.duration:g} s: no inputs at {late:g} s")
-        return at(self.polynomials, within_run)
+        return values_at(self.pieces, within_run)
+
+    def _record(self) -> tuple[np.ndarray, np.ndarray]:
+        times = self.times
+        inputs = np.empty((self.samples, self.pieces.coefficients.shape[1]))
+        polynomial_loops()["sampled"](self.packed_pieces, times, inputs)
+        return times, inputs
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
         """The signal with its factors set: so much faster and shorter, so many times as large."""
@@ -159,27 +173,23 @@ class Signal(Maneuver):
             self,
             frequency_factor=frequency,
             amplitude_factor=amplitude,
-            duration=float(self.pieces.edges[-1]) / frequency,
-            kept={},
+            duration=float(self.nominal_pieces.edges[-1]) / frequency,
         )
 
     def for_inputs(self, names: tuple[str, ...]) -> Signal:
         """The signal with all inputs of a model, in its order; `InputError` if they don't fit."""
         names = listed(names)
-        if self.inputs == names:
-            return self
-        if names not in self.kept:
-            self.kept[names] = self._completed(names)
-        return self.kept[names]
+        return self if self.inputs == names else self._completed(names)
 
+    @cached
     def _completed(self, names: tuple[str, ...]) -> Signal:
-        columns, needed = self.pieces.coefficients.shape[1], ", ".join(names)
+        columns, needed = self.nominal_pieces.coefficients.shape[1], ", ".join(names)
         if not self.inputs:
             if columns == len(names):
-                return replace(self, inputs=names, kept={})
+                return replace(self, inputs=names)
             raise InputError(
                 f"{self} has {columns} columns without names, the model needs {needed}: "
-                f"name those that are given by inputs=[...]"
+                f"name the columns by inputs=[...]"
             )
         for name in self.inputs:
             if name not in names:
@@ -188,12 +198,12 @@ class Signal(Maneuver):
                     f"say which column is which input"
                 )
         coefficients = np.stack([self._column(name) for name in names], axis=1)
-        pieces = self.pieces._replace(coefficients=coefficients)
-        return replace(self, inputs=names, pieces=pieces, kept={})
+        pieces = self.nominal_pieces._replace(coefficients=coefficients)
+        return replace(self, inputs=names, nominal_pieces=pieces)
 
     def _column(self, name: str) -> np.ndarray:
-        """Polynomials (pieces, 6) of an input, at factors of 1."""
-        pieces, order = self.pieces, 0
+        """Coefficients (pieces, degree + 1) of an input, at factors of 1."""
+        pieces, order = self.nominal_pieces, 0
         while name not in self.inputs:
             lower = integral_of(name)
             if not lower:
@@ -202,7 +212,7 @@ class Signal(Maneuver):
         if order and self.hold != "cubic":
             raise InputError(f"{self}: derivatives of {name} follow from a cubic hold alone")
         for _ in range(order):
-            pieces = derivative(pieces)
+            pieces = time_derivative(pieces)
         return pieces.coefficients[:, self.inputs.index(name)]
 
     @classmethod
@@ -283,7 +293,7 @@ def many_signals(
     output_step: float = OUTPUT_STEP,
     name: str = "signal",
 ) -> list[Signal]:
-    """Signals through samples at the same times, by one compiled call for all.
+    """Signals through samples at the same times, at once.
 
     Parameters
     ----------
@@ -306,15 +316,11 @@ def many_signals(
     names = column_names(inputs, values.shape[2])
     if not line_of_text("name", name):
         raise InputError("name is empty")
-    every = through(times, np.ascontiguousarray(values), hold)
+    runs = interpolants(times, values, hold)
     duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
-    own = f"{len(times)} samples, {hold} hold", _unused, names, duration
-    samples = _output_samples(duration, output_step)
-    return [Signal(name, *own, samples, _unused, hold=hold, pieces=pieces) for pieces in every]
-
-
-def _unused(*_: Any) -> Any:
-    raise NotImplementedError("a signal is evaluated by its polynomials, which have its corners")
+    about = name, f"{len(times)} samples, {hold} hold", names, duration
+    output_samples = _output_samples(duration, output_step)
+    return [Signal(*about, output_samples, hold, pieces) for pieces in runs]
 
 
 def _output_samples(duration: float, step: Any) -> int:
@@ -323,75 +329,3 @@ def _output_samples(duration: float, step: Any) -> int:
         raise InputError(f"step: {step:g} s is not positive")
     within("step", step, (duration / (MOST_SAMPLES - 1), LONGEST_DURATION), " s")
     return max(round(duration / step), 1) + 1
-
-
-@cache
-def polynomial_loops() -> dict[str, Loop]:
-    """Loops over polynomials of time."""
-    return loops(("inputs.polynomial_loops",), ("sampled", "extent"))
-
-
-@cache
-def _through() -> Loop:
-    return loops(("inputs.polynomial_loops",), ("through",))["through"]
-
-
-def derivative(pieces: Pieces) -> Pieces:
-    """By time; jumps have none."""
-    if len(pieces.starts):
-        lengths = np.diff(pieces.starts, append=pieces.edges[-1])
-    else:
-        counts = np.diff(pieces.first)
-        lengths = np.repeat(np.diff(pieces.edges) / counts, counts)
-    rates = np.zeros_like(pieces.coefficients)
-    rates[:, :, :-1] = pieces.coefficients[:, :, 1:] * np.arange(1.0, rates.shape[2])
-    return pieces._replace(coefficients=rates / lengths[:, None, None])
-
-
-def at(pieces: Pieces, times: np.ndarray) -> np.ndarray:
-    """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
-    order, values = np.argsort(times), np.empty((len(times), pieces.coefficients.shape[1]))
-    increasing = np.empty_like(values)
-    polynomial_loops()["sampled"](pieces, times[order], increasing)
-    values[order] = increasing
-    return values
-
-
-def through(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
-    """Polynomials of each run through samples (runs, n, inputs) by one of `HOLDS`.
-
-    One piece for each interval; segments end at kinks, at jumps, and where nothing moves for long.
-    Runs with the same segments share all but their coefficients, which are of one array.
-    `InputError` if times (n,) don't increase, or something isn't finite.
-    """
-    runs, n, inputs = samples.shape
-    coefficients = np.empty((runs * (n - 1), inputs, HOLDS[hold] + 1))
-    rows, counts = np.empty((runs, n), dtype=np.int64), np.empty(runs, dtype=np.int64)
-    even = _through()(times, samples, np.empty((ROWS, n)), coefficients, rows, counts)
-    if even < 0:
-        raise InputError(f"samples of a signal: {_wrong(even, times, samples)}")
-    starts, own = np.empty(0) if even else times[:-1].copy(), n - 1
-    shared: dict[bytes, Pieces] = {}
-    found = []
-    for run, count in enumerate(counts.tolist()):
-        first = rows[run, :count]
-        key, part = first.tobytes(), coefficients[run * own : (run + 1) * own]
-        if key not in shared:
-            shared[key] = Pieces(times[first], first.copy(), starts, part)
-        found.append(shared[key]._replace(coefficients=part))
-    return found
-
-
-def _wrong(status: int, times: np.ndarray, samples: np.ndarray) -> str:
-    """What is wrong by what the loop has returned."""
-    if status == DISORDERED and np.isfinite(times).all():
-        row = int(np.argmax(times[1:] <= times[:-1]))
-        now, before = times[row + 1], times[row]
-        return f"times must increase, t[{row + 1}] = {now:.6g} s follows {before:.6g} s"
-    run = NOT_FINITE - status
-    given = times if status == DISORDERED else samples[run]
-    finite = np.isfinite(given).reshape(len(given), -1).all(axis=1)
-    if finite.all():
-        return "the polynomials through them are not finite"
-    where = f" of run {run}" if len(samples) > 1 and status != DISORDERED else ""
-    return f"{'t' if status == DISORDERED else 'u'}[{finite.argmin()}]{where} is not finite"

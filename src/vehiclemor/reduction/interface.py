@@ -15,7 +15,7 @@ import numpy as np
 
 from vehiclemor.arguments import line_of_text, quoted
 from vehiclemor.exceptions import InputError, blamed
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.settings import Settings, Value
 from vehiclemor.reduction.trust import InputRange, band_range
 from vehiclemor.registry import choice
@@ -64,6 +64,10 @@ def offline_cost(
     return OfflineCost(time.process_time() - began, evaluations)
 
 
+# What every fitted model has.
+MEMBERS = ("simulate", "best_approximation", "offline", "order")
+
+
 class FittedModel(Protocol):
     """What `fit` returns: whole runs.
 
@@ -81,7 +85,7 @@ class FittedModel(Protocol):
         """Largest number of reduced coordinates in any window; n for a full-order model."""
         ...
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """Trajectory at the maneuver's output times.
 
         It may take `outputs`, the names (a tuple) of all that is kept of it; see `simulated`.
@@ -102,7 +106,7 @@ def lower_rank(settings: Mapping[str, Any], reduced: FittedModel) -> str:
 
 
 def simulated(
-    reduced: FittedModel, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None
+    reduced: FittedModel, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None
 ) -> Trajectory:
     """A run of a reduced model, with some outputs alone."""
     if outputs is None:
@@ -116,10 +120,6 @@ def simulated(
 def _selects(kind: type) -> bool:
     """Whether reduced models of a class make some outputs alone."""
     return "outputs" in signature(kind.simulate).parameters  # type: ignore[attr-defined]
-
-
-# Gives the method of a name with its settings, fitted to the same training runs.
-FitOther = Callable[[str, Any], FittedModel]
 
 
 def never_refused(model: Any) -> str:  # noqa: ARG001
@@ -161,8 +161,8 @@ class Method(ShortRepr):
     follows_time
         Whether what it fits belongs to the times of the training runs, as a basis for each control
         period does: then a run is known where its inputs are those of a training run.
-    fits_others
-        Whether `fit` takes a `FitOther` too, by which it fits what it is made of.
+    variant_of
+        Name of the method with the same `fit`, if this one differs from it in defaults alone.
     check
         (model, settings): raises `InputError` if valid settings don't fit the model or each other.
     presets
@@ -186,7 +186,7 @@ class Method(ShortRepr):
     own_limits: bool = False
     band: str = ""
     follows_time: bool = False
-    fits_others: bool = False
+    variant_of: str = ""
     presets: Mapping[str, Presets] = field(default_factory=dict)
     packages: tuple[str, ...] = ()
 

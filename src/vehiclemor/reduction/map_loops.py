@@ -8,12 +8,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
+from vehiclemor.codegen.loop_types import (
+    Cube,
+    Int,
+    IntVector,
+    Matrix,
+    Vector,
+    call_kernel,
+    matrix,
+    vector,
+)
 from vehiclemor.simulation.newton_loops import CONVERGED
 from vehiclemor.sizes import require, shaped
 
-# Sizes that the compiler knows.
-INPUTS, QUANTITIES = 0, 0
 # Indices of what is reported of a run: its trust indicator, and the first sample at which that is
 # above 1, or the number of samples; how much that is.
 INDICATOR, LEFT, REPORTED = range(3)
@@ -50,24 +57,23 @@ class Cells(NamedTuple):
         require(bool(np.isfinite([self.centres, self.scales]).all()), "cells")
 
 
-def polynomials(x: Vector, coefficients: Matrix, result: Vector) -> None:
-    """Quantities at coordinates x (INPUTS,) in a cell, from -1 to 1: a kernel in the loop."""
-
-
-def map_path(inputs: Matrix, cells: Cells, space: Vector) -> Int:
+def map_path(
+    inputs: Matrix, cells: Cells, polynomials: IntVector, quantities: Int, space: Vector
+) -> Int:
     """Polynomials at every sample, outside of the box those of the nearest cell.
 
-    The space holds quantities of all samples, then what is reported, see above, then scratch space
-    (INPUTS,): one array is sooner handed over than three.
+    Their kernel gives so many quantities at coordinates (inputs,) in a cell, from -1 to 1.  The
+    space holds quantities of all samples, then what is reported, see above, then scratch space
+    (inputs,): one array is sooner handed over than three.
     """
     centres, scales, numbers, coefficients = cells
-    samples = inputs.shape[0]
-    table, end = matrix(space, 0, samples, QUANTITIES), samples * QUANTITIES
-    reported, x = vector(space, end, REPORTED), vector(space, end + REPORTED, INPUTS)
+    samples, end = len(inputs), len(inputs) * quantities
+    table = matrix(space, 0, samples, quantities)
+    reported, x = vector(space, end, REPORTED), vector(space, end + REPORTED, len(centres))
     largest, left = 0.0, samples
     for sample in range(samples):
         indicator, cell = 0.0, 0
-        for i in range(INPUTS):
+        for i in range(len(centres)):
             along = (inputs[sample, i] - centres[i]) * scales[i]
             indicator = max(indicator, abs(along))
             along = (along + 1.0) * (0.5 * numbers[i])
@@ -77,6 +83,6 @@ def map_path(inputs: Matrix, cells: Cells, space: Vector) -> Int:
         largest = max(largest, indicator)
         if indicator > 1.0 and sample < left:
             left = sample
-        polynomials(x, coefficients[cell], table[sample])
+        call_kernel(polynomials, 0, x, coefficients[cell], table[sample])
     reported[INDICATOR], reported[LEFT] = largest, left
     return CONVERGED

@@ -81,7 +81,7 @@ def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
         model=model.name,
         method=rom.method,
         vehiclemor=version("vehiclemor"),
-        code=code_digest(model.name, rom.method, rom.settings),
+        code=code_digest(model.name, rom.method),
         date=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     write_dataset(xr.Dataset(variables, attrs=described), path)

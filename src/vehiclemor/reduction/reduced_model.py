@@ -13,7 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import number, real_array
 from vehiclemor.exceptions import InputError, blamed
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction import model_file
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank, simulated
 from vehiclemor.reduction.settings import Value
@@ -103,7 +103,7 @@ class ReducedOrderModel(ShortRepr):
 
     def simulate(
         self,
-        maneuver: str | Maneuver | None = None,
+        maneuver: str | Excitation | None = None,
         start: Start | None = None,
         *,
         outputs: Names = None,

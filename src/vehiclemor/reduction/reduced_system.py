@@ -9,8 +9,7 @@ import numpy as np
 
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import recorded_inputs
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -126,7 +125,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
 
     def run(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         state: np.ndarray,
         times: np.ndarray | None = None,
         direct_until: float = np.inf,
@@ -136,11 +135,11 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         return self.system.run(maneuver, state, self.spaces, how, direct_until)
 
     def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """Integrate, then decode to full states at the maneuver's output times."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
-        inputs = recorded_inputs(maneuver)[1]
+        inputs = maneuver.recorded_inputs[1]
         run = self.run(maneuver, self.known(start, inputs[0]))
         states = self.decode(run.whole, inputs)
         found = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)

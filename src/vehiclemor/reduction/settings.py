@@ -1,12 +1,11 @@
 """What the settings of all methods share: one pydantic class by method and kind of model."""
 
-import tomllib
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, field_validator
 
-from vehiclemor.exceptions import InputError
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 
 Value = int | float | str
@@ -23,6 +22,8 @@ class Settings(BaseModel):
     """Settings of a method: a subclass declares each with its type, default, bounds and meaning."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    # Former name of a setting -> its name.
+    renamed: ClassVar[Mapping[str, str]] = {}
 
     @field_validator("*", mode="before")
     @classmethod
@@ -74,20 +75,17 @@ Tolerance = Annotated[
 ]
 
 
-def inline_table(text: str, where: str) -> dict[str, Any]:
-    """Names and values in a setting, as in TOML: `terms = 12, ridge = 1e-9`, also line by line.
-
-    `InputError` if it is none; `where` says whose it is.
-    """
-    lines = filter(None, (line.strip(" ,") for line in text.splitlines()))
-    try:
-        return tomllib.loads(f"given = {{ {', '.join(lines)} }}")["given"]
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{where}: {error}") from None
-
-
 class OnlineSettings(Settings):
     """How a reduced system is integrated."""
 
-    solver: Solver = "ros34pw2"
+    solver: Solver = "etdrk4"
     tolerance: Tolerance = 1e-3
+
+
+class FallbackSettings(OnlineSettings):
+    """Settings of reduced vehicles, behind which the full order may stand."""
+
+    fallback: Literal["none"] | AnyIntegrator = Field(
+        "none", description="integrator of the full order for runs that are not to be trusted"
+    )
+    fallback_tolerance: Tolerance = 1e-4

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import DROP, Quantity
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
@@ -40,7 +40,7 @@ class TrainingRun(ShortRepr):
     """
 
     model: Model
-    maneuver: Maneuver
+    maneuver: Excitation
     start: Start
 
     def __getattr__(self, name: str) -> Any:

@@ -14,8 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import extent_of, first_beyond, recorded_inputs
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.sizes import shaped
@@ -74,24 +73,24 @@ def by_factor(reason: str, factor: float) -> str:
     return f"{reason} by a factor of {factor:.3g}" if factor < 1e6 else reason
 
 
-def largest_samples(maneuvers: Sequence[Maneuver]) -> np.ndarray:
+def largest_samples(maneuvers: Sequence[Excitation]) -> np.ndarray:
     """Largest magnitudes (1, inputs) of inputs of kinematic models, at output times."""
     values = [np.abs(maneuver.at(maneuver.times)).max(axis=0) for maneuver in maneuvers]
     return EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
 
 
-def largest_inputs(maneuvers: Sequence[Maneuver]) -> np.ndarray:
+def largest_inputs(maneuvers: Sequence[Excitation]) -> np.ndarray:
     """Largest sizes (3, inputs) of inputs, see `Extent`."""
-    largest = [extent_of(maneuver).largest for maneuver in maneuvers]
+    largest = [maneuver.extent.largest for maneuver in maneuvers]
     return EDGE * np.maximum(np.max(largest, axis=0), NOTHING)
 
 
-def inputs_beyond(maneuver: Maneuver, known: np.ndarray) -> np.ndarray:
+def inputs_beyond(maneuver: Excitation, known: np.ndarray) -> np.ndarray:
     """Times (inputs,) in s at which inputs pass what is known of them (3, inputs) first."""
-    return first_beyond(maneuver, np.array([-known[0], *known]))
+    return maneuver.first_beyond(np.array([-known[0], *known]))
 
 
-def largest_bands(maneuvers: Sequence[Maneuver]) -> np.ndarray:
+def largest_bands(maneuvers: Sequence[Excitation]) -> np.ndarray:
     """Largest magnitudes and shares (6, inputs) of inputs of structures, see `bands_of`."""
     largest = np.max([bands_of(maneuver) for maneuver in maneuvers], axis=0)
     # A share so small does not matter.
@@ -100,7 +99,7 @@ def largest_bands(maneuvers: Sequence[Maneuver]) -> np.ndarray:
 
 
 @lru_cache(maxsize=512)
-def bands_of(maneuver: Maneuver) -> np.ndarray:
+def bands_of(maneuver: Excitation) -> np.ndarray:
     """Magnitudes of the inputs, and shares of `BANDS` in their RMS values, (6, inputs)."""
     count = max(round(maneuver.duration / SAMPLING), 2)
     values = maneuver.at(np.linspace(0.0, maneuver.duration, count, endpoint=False))
@@ -141,11 +140,11 @@ class InputRange:
         # In a file that was written by hand they may be zero.
         return np.maximum(self.largest, NOTHING)
 
-    def trust(self, model: Model, maneuver: Maneuver, speed: float) -> Trust:
+    def trust(self, model: Model, maneuver: Excitation, speed: float) -> Trust:
         """How far a run with an initial speed in m/s goes in the range."""
         maneuver = maneuver.for_inputs(model.inputs)
         if model.kind == "ae":
-            times, inputs = recorded_inputs(maneuver)
+            times, inputs = maneuver.recorded_inputs
             ranges = self._samples(model.inputs, inputs, times)
         else:
             of_inputs = self._bands if model.kind == "structural" else self._extents
@@ -158,9 +157,11 @@ class InputRange:
             ranges["history of the inputs"] = self._unlike(maneuver)
         return trust_in(ranges)
 
-    def _extents(self, names: Sequence[str], maneuver: Maneuver) -> dict[str, tuple[float, float]]:
+    def _extents(
+        self, names: Sequence[str], maneuver: Excitation
+    ) -> dict[str, tuple[float, float]]:
         """How far whole inputs of a vehicle go, and since when (s) they are beyond."""
-        used = extent_of(maneuver).largest / self._sizes
+        used = maneuver.extent.largest / self._sizes
         since = np.full(len(names), np.inf)
         if (used > 1.0).any():
             since = inputs_beyond(maneuver, self.largest)
@@ -170,17 +171,17 @@ class InputRange:
             found[what] = float(max(further, *quicker)), float(time)
         return found
 
-    def _bands(self, names: Sequence[str], maneuver: Maneuver) -> dict[str, tuple[float, float]]:
+    def _bands(self, names: Sequence[str], maneuver: Excitation) -> dict[str, tuple[float, float]]:
         """How far whole inputs of a structure go, in magnitude and in each band."""
         used = bands_of(maneuver) / self._sizes
         words = ["", *(f", {low:g} to {high:g} Hz" for low, high in pairwise(BANDS))]
         labels = [f"input {name}{word}" for name in names for word in words]
         return ranges_of(np.zeros(1), used.T.reshape(1, -1), labels)
 
-    def _unlike(self, maneuver: Maneuver) -> tuple[float, float]:
+    def _unlike(self, maneuver: Excitation) -> tuple[float, float]:
         """How far inputs are from those of the nearest training run, and since when (s)."""
         assert self.histories is not None
-        times, inputs = recorded_inputs(maneuver)
+        times, inputs = maneuver.recorded_inputs
         count = int(np.searchsorted(times, self.longest, side="right"))
         times, inputs, off = times[:count], inputs[:count], []
         known = np.linspace(0.0, self.longest / EDGE, self.histories.shape[1])
@@ -203,7 +204,7 @@ class InputRange:
 
 
 def input_range(
-    model: Model, runs: Sequence[tuple[Maneuver, float]], follows_time: bool = False
+    model: Model, runs: Sequence[tuple[Excitation, float]], follows_time: bool = False
 ) -> InputRange:
     """Range of some training runs, each a maneuver and an initial speed in m/s.
 

@@ -8,8 +8,9 @@ from pydantic import ValidationError
 
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError, PlugInError, blamed
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.reduction.interface import FitOther, FittedModel, Method, OfflineCost
+from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.reduction.fallback import with_fallback
+from vehiclemor.reduction.interface import MEMBERS, FittedModel, Method, OfflineCost
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
 from vehiclemor.reduction.training import Training, difference
 from vehiclemor.registry import choice
@@ -35,6 +36,7 @@ def validated(
     presets = method.presets_of(kind)
     choice(f"preset of {method.name}", preset, presets)
     declared = method.settings.get(kind, Settings)
+    given = {declared.renamed.get(name, name): value for name, value in given.items()}
     for name in given:
         choice(f"setting of {method.name}", name, declared.model_fields)
     chosen: dict[str, Any] = dict(presets[preset])
@@ -43,7 +45,7 @@ def validated(
             if coordinates is not None and AT_MOST_COORDINATES in field.metadata:
                 chosen[name] = min(chosen.get(name, field.default), coordinates)
         try:
-            return declared.model_validate(chosen | dict(given))
+            return declared.model_validate(chosen | given)
         except ValidationError as error:
             first = error.errors()[0]
             name = first["loc"][0] if first["loc"] else "settings"
@@ -56,10 +58,8 @@ def checked_settings(method: Method, model: Model, settings: Any) -> None:
         method.check(model, settings)
 
 
-def fitted(
-    method: Method, model: Model, training: Training, settings: Any, others: FitOther | None = None
-) -> FittedModel:
-    """What a method's `fit` gives, checked.
+def fitted(method: Method, model: Model, training: Training, settings: Any) -> FittedModel:
+    """What a method's `fit` gives, checked, with the fallback of the settings.
 
     `InputError` if it learns from runs and one of these is of another model, or `fit` refuses.
     """
@@ -69,9 +69,9 @@ def fitted(
                 f"{method.name} learns from runs of the model that it reduces alone: {name} of a "
                 f"training run is another"
             )
-    more = (others,) if others and method.fits_others else ()
     with blamed(f"method {method.name!r}: fit", method.fit):
-        return checked_fit(method.name, method.fit(model, training, settings, *more))
+        reduced = checked_fit(method.name, method.fit(model, training, settings))
+    return with_fallback(reduced, model, settings)
 
 
 def for_model(method: Method, reduced: FittedModel, model: Model, settings: Any) -> FittedModel:
@@ -90,7 +90,7 @@ def for_model(method: Method, reduced: FittedModel, model: Model, settings: Any)
 
 def checked_fit(method: str, reduced: Any) -> Any:
     """A reduced model; `PlugInError` if what `fit` gave is none."""
-    for name in ("simulate", "best_approximation", "offline", "order"):
+    for name in MEMBERS:
         if not hasattr(reduced, name):
             raise PlugInError(f"method {method!r}: fit: {quoted(reduced)} has no {name}")
     if not isinstance(reduced.offline, OfflineCost):
@@ -102,7 +102,7 @@ def checked_fit(method: str, reduced: Any) -> Any:
     return reduced
 
 
-def checked_run(model: Model, maneuver: Maneuver, start: Start, reduced: Any) -> Trajectory:
+def checked_run(model: Model, maneuver: Excitation, start: Start, reduced: Any) -> Trajectory:
     """A run of a reduced model at the output times; `PlugInError` if it gives none."""
     whose = f"{type(reduced).__module__}.{type(reduced).__name__}: simulate"
     with blamed(whose, reduced):

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from vehiclemor.inputs.maneuver import FACTORS
+from vehiclemor.inputs.excitation import FACTORS
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path
@@ -17,12 +17,27 @@ from vehiclemor.registry import component, names, unknown
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build_derived
 from vehiclemor.study.plans.loading import is_study, load_studies, read_study, study_path
-from vehiclemor.study.plans.study_file import SETS, StudyFile
+from vehiclemor.study.plans.study_file import (
+    SETS,
+    CollectionFile,
+    GridFile,
+    ProtocolEntry,
+    ProtocolFile,
+    SizeFile,
+    StudyFile,
+)
 from vehiclemor.study.plans.study_runs import values
 from vehiclemor.toml_files import read_toml
 
 Description = dict[str, Any]
-SCHEMAS: dict[str, type[BaseModel]] = {"study-schema": StudyFile, "parameter-schema": ParameterFile}
+# Name -> what its tables are of -> class that reads such a file.
+SCHEMAS: dict[str, dict[str, type[BaseModel]]] = {
+    "study-schema": {
+        f"keys of {schema.kind}": schema
+        for schema in (GridFile, ProtocolFile, SizeFile, CollectionFile)
+    },
+    "parameter-schema": {"keys": ParameterFile},
+}
 TYPES = {"string": "text", "boolean": "true or false", "array": "list", "object": "table"}
 KINDS = {
     "ae": "algebraic equations Phi(q; u) = 0",
@@ -168,23 +183,37 @@ def _study(name: str) -> Description:
     path = study_path(name)
     study = read_study(path)
     head: Description = {"study": path.stem, "summary": study.title, "file": str(path)}
-    if study.studies:
+    if isinstance(study, CollectionFile):
         rows = [
             {"study": member, "runs": content.points, "summary": content.title}
             for member, content in load_studies(name).items()
         ]
         return {**head, "runs": sum(row["runs"] for row in rows), "studies": rows}
-    methods = [
-        {"label": label, "method": entry.method, "preset": entry.preset}
-        | {"settings": _listed(entry.settings)}
-        | ({"role": entry.role, "candidates": len(entry.candidates)} if study.bounds else {})
-        for label, entry in study.labelled.items()
-    ]
-    own = _sets(study) if study.bounds else _grid(study)
-    return {**head, "model": study.model, **own, "methods": methods}
+    return {**head, "model": study.model, **_runs(study), "methods": _methods(study)}
 
 
-def _grid(study: StudyFile) -> Description:
+def _methods(study: StudyFile) -> list[Description]:
+    """A row for each method of a study."""
+    rows: list[Description] = []
+    for entry in study.methods:
+        row: Description = {"label": entry.name, "method": entry.method, "preset": entry.preset}
+        row["settings"] = _listed(entry.settings)
+        if isinstance(entry, ProtocolEntry):
+            row |= {"role": entry.role, "candidates": len(entry.candidates)}
+        rows.append(row)
+    return rows
+
+
+def _runs(study: StudyFile) -> Description:
+    """What the methods of a study are run on."""
+    if isinstance(study, GridFile):
+        return _grid(study)
+    if isinstance(study, ProtocolFile):
+        return _sets(study)
+    return _meshes(study)
+
+
+def _grid(study: GridFile) -> Description:
     """What a study varies; of a long axis both ends."""
     grid = []
     for key, entry in study.grid.items():
@@ -206,11 +235,10 @@ def _grid(study: StudyFile) -> Description:
     }
 
 
-def _sets(study: StudyFile) -> Description:
+def _sets(study: ProtocolFile) -> Description:
     """What a study with bounds trains, chooses by and tests; scenarios are counted."""
     counted = {s: sum(g.scenarios for g in getattr(study, s)) for s in SETS}
-    draws = {"drawn": study.drawn, "drawn outside": study.drawn_outside}
-    counted |= {name: draw.runs for name, draw in draws.items() if draw}
+    counted |= {name.replace("_", " "): draw.runs for name, draw in study.draws.items()}
     return {
         "runs": [f"{count} {purpose}" for purpose, count in counted.items() if count],
         "seed": study.seed,
@@ -222,13 +250,30 @@ def _sets(study: StudyFile) -> Description:
     }
 
 
+def _meshes(study: SizeFile) -> Description:
+    """What a size study runs, and on which meshes."""
+    return {
+        "maneuver": study.maneuver,
+        "training": study.training,
+        "runs": study.points,
+        "meshes": [_listed(mesh) for mesh in study.size.meshes],
+        "models beside": study.size.beside,
+    }
+
+
 def schema_description(name: str) -> Description:
-    """Every key of a file, from the class that parses it: type, default and meaning."""
-    schema = SCHEMAS[name].model_json_schema()
-    tables = {key: _keys(part) for key, part in schema.get("$defs", {}).items()}
-    # Without the markup of docstrings.
-    summary = " ".join(schema["description"].replace("`", "").split())
-    return {"schema": name, "summary": summary, "keys": _keys(schema), **tables}
+    """Every key of a file, from the classes that parse it: type, default and meaning."""
+    summaries: list[str] = []
+    tables: dict[str, list[dict[str, object]]] = {}
+    parts: dict[str, list[dict[str, object]]] = {}
+    for title, file in SCHEMAS[name].items():
+        schema = file.model_json_schema()
+        # Without the markup of docstrings.
+        summaries += schema["description"].replace("`", "").split()
+        tables[title] = _keys(schema)
+        for key, part in schema.get("$defs", {}).items():
+            parts[key] = _keys(part)
+    return {"schema": name, "summary": " ".join(summaries), **tables, **parts}
 
 
 def _keys(schema: Mapping[str, Any]) -> list[dict[str, object]]:

@@ -22,7 +22,7 @@ from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import errors_by, outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.results import judged_part, judged_set
-from vehiclemor.study.plans.study_file import SpeedTarget, StudyFile
+from vehiclemor.study.plans.study_file import ProtocolFile, SpeedTarget
 
 Row = dict[str, Any]
 OUTSIDE = ("outside", "drawn_outside")
@@ -46,12 +46,12 @@ def protocol_rows(dataset: xr.Dataset) -> list[Row]:
     return [head | row for row in rows]
 
 
-def protocol_of(dataset: xr.Dataset) -> StudyFile:
+def protocol_of(dataset: xr.Dataset) -> ProtocolFile:
     """The protocol of a combined dataset."""
-    return StudyFile.model_validate_json(dataset.attrs["configuration"])
+    return ProtocolFile.model_validate_json(dataset.attrs["configuration"])
 
 
-def method_rows(dataset: xr.Dataset, protocol: StudyFile) -> list[Row]:
+def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
     """One row for each method, full-order integrators as measures.
 
     `runs` of the `test_set` are judged, `apart` ones more are not: the full order is sensitive
@@ -74,7 +74,7 @@ def method_rows(dataset: xr.Dataset, protocol: StudyFile) -> list[Row]:
     return [row | _against(row, full, ladders) for row in rows]
 
 
-def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: StudyFile) -> Row:
+def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: ProtocolFile) -> Row:
     part, every = judged.sel(label=label), dataset.sel(label=label)
     sets = dataset["scenario_set"].values
     outside = outcomes(every.isel(scenario=np.isin(sets, OUTSIDE)), protocol.bounds)
@@ -124,7 +124,7 @@ def _chosen_settings(candidates: list[Row]) -> str:
     return ", ".join(f"{name}={chosen[name]}" for name in differing)
 
 
-def _errors_in_units(part: xr.Dataset, protocol: StudyFile) -> dict[str, float]:
+def _errors_in_units(part: xr.Dataset, protocol: ProtocolFile) -> dict[str, float]:
     """Median and worst run, by the largest error of all outputs whose bounds are in a unit."""
     columns = {}
     for si_unit, (unit, factor) in PRINTED_UNITS.items():
@@ -140,7 +140,7 @@ def _errors_in_units(part: xr.Dataset, protocol: StudyFile) -> dict[str, float]:
     return columns
 
 
-def error_columns(protocol: StudyFile) -> dict[str, tuple[str, str]]:
+def error_columns(protocol: ProtocolFile) -> dict[str, tuple[str, str]]:
     """Name of a column of errors -> (output, measure): the bounded outputs, then the reported."""
     bounded = {f"{b.measure}_{o}": (o, b.measure) for o, b in protocol.bounds.items()}
     return bounded | {f"rms_{output}": (output, "rms") for output in protocol.reported}
@@ -232,7 +232,7 @@ def upper_bound(misses: int, runs: int) -> float:
     return float(test.proportion_ci(CONFIDENCE, method="exact").high)
 
 
-def bound_rows(protocol: StudyFile, winner: Row) -> Iterator[Row]:
+def bound_rows(protocol: ProtocolFile, winner: Row) -> Iterator[Row]:
     """Errors of what was chosen, each beside its bound and the bound's reason."""
     for name, (output, measure) in error_columns(protocol).items():
         bound = protocol.bounds.get(output)
@@ -242,7 +242,7 @@ def bound_rows(protocol: StudyFile, winner: Row) -> Iterator[Row]:
         yield row
 
 
-def target_rows(dataset: xr.Dataset, protocol: StudyFile, methods: list[Row]) -> list[Row]:
+def target_rows(dataset: xr.Dataset, protocol: ProtocolFile, methods: list[Row]) -> list[Row]:
     """What the chosen one must reach: misses, warnings, ratios, the straight line."""
     winner = next((row for row in methods if row["winner"]), None)
     if winner is None:

@@ -13,8 +13,7 @@ from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, lo
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
 from vehiclemor.inputs.checks import checked_maneuver
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import kept, recorded_inputs
+from vehiclemor.inputs.excitation import Excitation, cached
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import choice
 from vehiclemor.simulation import newton_loops
@@ -36,9 +35,8 @@ RESULTS = {"residual": "residual", "outputs": "outputs", "coordinates": ""}
 CLOSED = 1e-6
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
-# Loops of the full-order solution, and the kernels that stand in loops.
+# Loops of the full-order solution.
 KINEMATIC_LOOPS = ("simulation.integrators.dense_solves", "simulation.newton_loops")
-INLINED_KERNELS = ("residual_jacobian", "newton_step", "tangent_parts", "tangent")
 REASONS = {
     newton_loops.TOO_MANY_ITERATIONS: f"no convergence in {ITERATION_LIMIT} iterations",
     newton_loops.NOT_FINITE: "a coordinate is not finite",
@@ -145,7 +143,7 @@ class AlgebraicModel(Model):
         """How far (m) the height gets downwards (-1) or upwards (1) at a rack displacement (m)."""
         target, reached = np.array([direction * self.definition.travel_limit, rack]), np.empty(2)
         iteration = _iteration(NEWTON_TOLERANCE, SHORTEST_SEARCH_STEP)
-        loop = self.loop("travel_limit")
+        loop = kinematic_loop("travel_limit")
         if loop(self._mechanism, target, iteration, reached, self._buffer()):
             raise UnreachableError(
                 f"{self.name}: rack displacement {rack:g} m is out of reach at the design height; "
@@ -159,7 +157,8 @@ class AlgebraicModel(Model):
         largest = np.array([stops.get(name, np.inf) for name in self.coordinates])
         jacobian = self.jacobian(self.design, np.zeros(len(self.inputs)))
         orientation = int(np.linalg.slogdet(jacobian).sign)
-        return newton_loops.Mechanism(self.design, largest, self.constants, orientation)
+        kernels = self.addresses("newton_step", "residual_jacobian")
+        return newton_loops.Mechanism(self.design, largest, self.constants, kernels, orientation)
 
     def _buffer(self) -> np.ndarray:
         n = len(self.coordinates)
@@ -167,7 +166,7 @@ class AlgebraicModel(Model):
 
     def simulate(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,
@@ -187,7 +186,7 @@ class AlgebraicModel(Model):
         run = self._solved(sampled, "newton" if solver is None else solver, tolerance)
         return run if outputs is None else run.chosen(outputs)
 
-    def sampled(self, maneuver: Maneuver) -> Sampled:
+    def sampled(self, maneuver: Excitation) -> Sampled:
         """Output times in s of a maneuver and its inputs, ready for loops; to be read only."""
         return _sampled(checked_maneuver(maneuver, self.definition))
 
@@ -216,7 +215,7 @@ class AlgebraicModel(Model):
         path = np.full((len(inputs), n), np.nan)
         solution = newton_loops.Solution(path, new_counts())
         iteration, buffer = _iteration(tolerance, SHORTEST_STEP), self._buffer()
-        run = self.loop("newton_path").prepared(
+        run = kinematic_loop("newton_path").prepared(
             self._ready_mechanism, given, iteration, solution, buffer
         )
         status, seconds = timed(run)
@@ -249,12 +248,11 @@ class AlgebraicModel(Model):
 
     def _packed(self, samples: Ready, iteration: Ready) -> LaneRun:
         n, inputs, m = len(self.coordinates), len(self.inputs), len(self.outputs)
-        names = "newton_step", "outputs"
-        kernels = np.array([address_of(self.kernels, name, LANES) for name in names])
+        lane_kernels = self.addresses("newton_step", "outputs", lanes=LANES)
         solution = newton_loops.Solution(np.empty((0, n + m)), new_counts())
         buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 2))
-        loop = self.loop("lane_path")
-        shared = self._ready_mechanism, samples, kernels, iteration
+        loop = kinematic_loop("lane_path")
+        shared = self._ready_mechanism, samples, lane_kernels, iteration
         call = loop.prepared(*shared, solution, buffer)
         table = call.address("solution.path")
         call.words[table + 1] = len(samples.bundle.inputs)
@@ -296,13 +294,9 @@ class AlgebraicModel(Model):
             model=self,
         )
 
-    def loop(self, name: str, *further: str) -> Loop:
-        """A loop of the full-order solution, or of modules behind it, with the kernels inlined."""
-        n, parts = len(self.coordinates), self.equations.sources["tangent_parts"].sizes[-1]
-        sizes = {"N": n, "INPUTS": len(self.inputs), "ENTRIES": parts - n}
-        inlined = {key: self.equations.sources[key] for key in INLINED_KERNELS}
-        modules = (*KINEMATIC_LOOPS, *further)
-        return loops(modules, (name,), inlined, sizes)[name]
+    def addresses(self, *names: str, lanes: int = 1) -> np.ndarray:
+        """Addresses of kernels for loops, which take so many samples at once."""
+        return np.array([address_of(self.kernels, name, lanes) for name in names], dtype=np.int64)
 
     def _check_reach(self, times: np.ndarray, inputs: np.ndarray, sample: int) -> None:
         """Raise `UnreachableError` if the height of a sample is out of reach."""
@@ -316,15 +310,20 @@ class AlgebraicModel(Model):
             )
 
 
+def kinematic_loop(name: str, *further: str) -> Loop:
+    """A loop of the full-order solution, or of the last of further modules, which call it."""
+    return loops((*KINEMATIC_LOOPS, *further), (name,))[name]
+
+
 @lru_cache(maxsize=64)
 def _iteration(tolerance: float, shortest: float) -> Ready:
     limits = ITERATION_LIMIT, LARGEST_INCREMENT, shortest
     return ready(newton_loops.Iteration(tolerance, *limits))
 
 
-@kept
-def _sampled(maneuver: Maneuver) -> Sampled:
-    times, inputs = recorded_inputs(maneuver)
+@cached
+def _sampled(maneuver: Excitation) -> Sampled:
+    times, inputs = maneuver.recorded_inputs
     checked_inputs(inputs, times, maneuver.inputs)
     return times, inputs, ready(newton_loops.Samples(inputs))
 

@@ -14,14 +14,14 @@ import numpy as np
 from vehiclemor.arguments import MOST_JOBS, count, quoted, real_array
 from vehiclemor.exceptions import ConvergenceError, InputError, VehiclemorError
 from vehiclemor.failure import Failure, attempt
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.provenance import attributes
 from vehiclemor.registry import choice
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.build import build, reparametrised
 from vehiclemor.simulation.checks import checked_path
-from vehiclemor.simulation.dynamic import reference_solver
+from vehiclemor.simulation.dynamic import REFERENCE_SOLVER, REFERENCE_TOLERANCE
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
 from vehiclemor.simulation.structures.model import SOLVER, TIGHT
@@ -57,7 +57,7 @@ REPORTED = {
 
 def simulate_many(
     model: str | Model | Any,
-    signals: Sequence[Maneuver],
+    signals: Sequence[Excitation],
     starts: Start | Sequence[Start] | None = None,
     parameters: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     *,
@@ -131,11 +131,10 @@ def simulate_many(
     )
 
 
-def _about(given: Any, full: Model, signals: Sequence[Maneuver]) -> dict[str, Any]:
+def _about(given: Any, full: Model, signals: Sequence[Excitation]) -> dict[str, Any]:
     """Attributes of the result: of which model with which settings it is."""
-    solver, tolerance = reference_solver(signals[0])
     others = {"structural": (SOLVER, TIGHT), "ae": ("newton", NEWTON_TOLERANCE)}
-    solver, tolerance = others.get(full.kind, (solver, tolerance))
+    solver, tolerance = others.get(full.kind, (REFERENCE_SOLVER, REFERENCE_TOLERANCE))
     runs, default = len(signals), {"solver": solver, "tolerance": tolerance}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
     title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}
@@ -151,7 +150,7 @@ def _report(done: Trajectory | Failure, model: Model) -> tuple:
     return *own, *done.counts.values()
 
 
-def _whole_run(model: Any, signal: Maneuver, start: Start, names: tuple[str, ...]) -> Trajectory:
+def _whole_run(model: Any, signal: Excitation, start: Start, names: tuple[str, ...]) -> Trajectory:
     """A run with some outputs alone; it may have diverged."""
     try:
         return model.simulate(signal, start, outputs=names)
@@ -163,10 +162,10 @@ def _whole_run(model: Any, signal: Maneuver, start: Start, names: tuple[str, ...
 
 def _count_of(signals: Any, model: Model) -> int:
     """Number of runs; `InputError` if something else than inputs of the model is given."""
-    if isinstance(signals, Maneuver) or not isinstance(signals, Sequence) or not len(signals):
+    if isinstance(signals, Excitation) or not isinstance(signals, Sequence) or not len(signals):
         raise InputError(f"signals is {quoted(signals)}, not a list with a signal for each run")
     for run, signal in enumerate(signals):
-        if not isinstance(signal, Maneuver):
+        if not isinstance(signal, Excitation):
             raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
         if signal.for_inputs(model.inputs).inputs != model.inputs:
             raise InputError(
@@ -184,7 +183,7 @@ def _names(model: Model, outputs: Names) -> tuple[str, ...]:
 
 
 def _kept_times(
-    given: Any, signals: Sequence[Maneuver]
+    given: Any, signals: Sequence[Excitation]
 ) -> tuple[np.ndarray, list[slice | np.ndarray]]:
     """Times in s of the result, and which samples of each run these are."""
     first = signals[0]

@@ -8,7 +8,7 @@ import numpy as np
 
 from vehiclemor.arguments import loop_array, number, quoted, within
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import ModelDefinition
 
 LARGEST = sys.float_info.max
@@ -61,9 +61,8 @@ def checked_inputs(value: Any, times: np.ndarray, names: Sequence[str]) -> np.nd
 
 def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
     """Raise `InputError` if a value is no finite positive number, or is below the smallest."""
-    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
-        value, bool
-    )
+    number = isinstance(value, int | float | np.integer | np.floating)
+    number = number and not isinstance(value, bool | np.timedelta64)
     # An integer may be too large for a float.
     if not (number and 0.0 < value <= LARGEST and value >= smallest):  # type: ignore[operator]
         bound = f"at least {smallest:g}" if smallest else "positive"
@@ -71,7 +70,7 @@ def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
 
 
 def output_times(
-    given: Any, maneuver: Maneuver, repeats: bool = False, begin: float = 0.0
+    given: Any, maneuver: Excitation, repeats: bool = False, begin: float = 0.0
 ) -> np.ndarray:
     """Output times (samples,) in s that increase within a maneuver, or `InputError`.
 

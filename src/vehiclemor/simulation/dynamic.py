@@ -12,9 +12,7 @@ import numpy as np
 from vehiclemor.arguments import loop_array, number
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import recorded_inputs
-from vehiclemor.inputs.signal import Signal
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.simulation.checks import left_validity, lifted_wheels
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.evaluation import By, chosen
@@ -36,17 +34,8 @@ from vehiclemor.simulation.workspaces import Run, Solver
 
 # What derivatives are of -> function of the equations.
 RESULTS = {"rhs": "derivative", "outputs": "outputs"}
-# How the full-order runs that others are measured against are solved: of the integrators the
-# fastest of that error, see the page on findings; and where inputs have a corner at each sample.
-SMOOTH, CORNERED = ("exponential_adams", 1e-10), ("dopri5", 1e-9)
-# The tolerance of others is as tight as is usual.
-TIGHT = 1e-9
-
-
-def reference_solver(maneuver: Maneuver) -> tuple[str, float]:
-    """Integrator and tolerance of a full-order run that others are measured against."""
-    cornered = isinstance(maneuver, Signal) and maneuver.hold == "linear"
-    return CORNERED if cornered else SMOOTH
+# How full-order runs are solved that others are measured against.
+REFERENCE_SOLVER, REFERENCE_TOLERANCE = "dopri5", 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +146,7 @@ class DynamicModel(Model):
 
     def simulate(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,
@@ -175,18 +164,15 @@ class DynamicModel(Model):
         begin
             Time in s at which the run begins with the start, in mid-maneuver if it isn't 0.
         """
-        if solver is None:
-            solver, usual = reference_solver(maneuver)
-        else:
-            integrator(solver)
-            usual = TIGHT
+        solver = REFERENCE_SOLVER if solver is None else solver
+        integrator(solver)
         trajectory = self.integrate(
             maneuver,
             self.start(start),
             whole_space(2 * len(self.coordinates)),
             Solver(
                 solver,
-                usual if tolerance is None else tolerance,
+                REFERENCE_TOLERANCE if tolerance is None else tolerance,
                 times,
                 longest_step,
                 begin if type(begin) is float else number("begin", begin),
@@ -199,7 +185,7 @@ class DynamicModel(Model):
 
     def integrate(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         state: np.ndarray,
         windows: ControlPeriods,
         how: Solver,
@@ -214,7 +200,7 @@ class DynamicModel(Model):
             self.require("second_order", "speeds")
         run = self.system.run(maneuver, state, windows, how, 0.0)
         whole = how.times is None and not how.begin
-        inputs = recorded_inputs(maneuver)[1] if whole else maneuver.at(run.times)
+        inputs = maneuver.recorded_inputs[1] if whole else maneuver.at(run.times)
         found = self.recorded(maneuver, run, inputs, run.whole, outputs=outputs)
         run.give_back()
         return found
@@ -234,7 +220,7 @@ class DynamicModel(Model):
 
     def recorded(
         self,
-        maneuver: Maneuver | None,
+        maneuver: Excitation | None,
         run: Run,
         inputs: np.ndarray,
         states: np.ndarray,

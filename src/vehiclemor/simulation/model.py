@@ -14,7 +14,7 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
@@ -154,7 +154,7 @@ class Model(ShortRepr):
     @abstractmethod
     def simulate(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,
@@ -175,12 +175,10 @@ class Model(ShortRepr):
             Of kinematic models `newton`: fresh Jacobians, generated elimination, started at the
             previous sample; `newton_lanes`: started at a quadratic extrapolation, the samples in
             vector lanes, and `newton` where that fails.  Of structures `generalised_alpha`.  Of
-            others one of the integrators: `dopri5`, Dormand-Prince 5(4); `rodas4`, Rosenbrock
-            method of order 4, a fresh Jacobian in every step; `ros34pw2`, W-method of order 3 with
-            one Jacobian, that of straight running, for all runs of similar models; with the same
-            `etdrk4`, exponential Runge-Kutta method of order 4, and `exponential_adams`,
-            exponential Adams method of order up to 6.  By default that, or `dopri5` through samples
-            on straight lines.
+            others one of the integrators: `dopri5`, Dormand-Prince 5(4), the default; `rodas4`,
+            Rosenbrock method of order 4, a fresh Jacobian in every step; `etdrk4`, exponential
+            Runge-Kutta method of order 4 with one Jacobian, that of straight running, for all runs
+            of similar models.
         tolerance
             Largest component of the last step of an iteration (rad or m), 1e-12 by default; of
             structures largest error of an output by the step size, as part of the output's range;

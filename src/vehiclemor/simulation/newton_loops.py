@@ -1,4 +1,4 @@
-"""Full-order solution of Phi(q; u(t)) = 0 along time: compiled loops with the kernels inlined.
+"""Full-order solution of Phi(q; u(t)) = 0 along time: compiled loops for all mechanisms.
 
 Every entry returns why it has stopped, and writes the sample at which to `Solution.counts`.
 
@@ -23,6 +23,7 @@ from vehiclemor.codegen.loop_types import (
     IntVector,
     Matrix,
     Vector,
+    call_kernel,
     call_lanes,
     matrix,
     vector,
@@ -31,7 +32,7 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.integrators.dense_solves import small_solve
 
 CONVERGED, TOO_MANY_ITERATIONS, NOT_FINITE, SINGULAR, OFF_BRANCH = range(5)
-# Places of the counts; behind them the sample at which a loop has stopped.
+# Indices of the counts; behind them the sample at which a loop has stopped.
 ITERATIONS, RESIDUALS, JACOBIANS, LINEAR_SOLVES, SAMPLE = range(5)
 # Largest first correction (rad or m), and largest ratio of the second to it, on the branch.
 CORRECTION, CONTRACTION = 0.1, 1.0 / 16.0
@@ -39,13 +40,14 @@ CORRECTION, CONTRACTION = 0.1, 1.0 / 16.0
 CERTAIN = 1e-5
 # Substeps that an increment is cut into at most; beyond, any mechanism is torn apart.
 MOST_SUBSTEPS = 1e4
-# Places of the kernels: Newton steps, outputs.
-STEP, RESULTS = range(2)
+# Indices of a mechanism's kernels: the Newton step Phi_q^-1 Phi by straight-line elimination; the
+# Jacobian beside the residual.
+STEP, JACOBIAN = range(2)
+# Indices of the kernels that take several samples at once.
+LANE_STEP, LANE_OUTPUTS = range(2)
 # Steps from the design position to the first samples.  They grow evenly, so that each begins at an
 # extrapolation that is as good as between samples.
 WAY = 16
-# Sizes that the compiler knows: coordinates, inputs.
-N, INPUTS = 0, 0
 
 
 class Iteration(NamedTuple):
@@ -63,35 +65,37 @@ class Iteration(NamedTuple):
 
 
 class Mechanism(NamedTuple):
-    """What is solved.
+    """Equations of a mechanism with n coordinates.
 
-    It starts at coordinates (N,) of the design position, where the inputs are zero.  Stops are the
-    largest magnitudes (N,) of coordinates, constants those of the kernels.  The orientation is the
-    sign of the Jacobian's determinant at the design position: it changes at a fold.
+    They are solved from coordinates (n,) of the design position, where the inputs are zero.  Stops
+    are the largest magnitudes (n,) of coordinates.  Kernels are addresses by index, see above, and
+    take the constants.  The orientation is the sign of the Jacobian's determinant at the design
+    position: it changes at a fold.
     """
 
     start: Vector
     stops: Vector
     constants: Vector
+    kernels: IntVector
     orientation: Int
 
 
 class Samples(NamedTuple):
-    """Inputs at the samples (samples, INPUTS), to be made ready once."""
+    """Inputs at the samples (samples, inputs)."""
 
     inputs: Matrix
 
 
 class Work(NamedTuple):
-    """Scratch space: a step (N,), coordinates to return to (N,), a matrix (N, N + 1)."""
+    """Scratch space: step (n,), coordinates to return to (n,), Jacobian and residual (n, n + 1)."""
 
     step: Vector
-    kept: Vector
+    saved: Vector
     full: Matrix
 
 
 class Solution(NamedTuple):
-    """Where a solution is recorded: coordinates (samples, n), counts by place (5,), see above."""
+    """Coordinates (samples, n) that a loop writes, and its counts (5,) by index, see above."""
 
     path: Matrix
     counts: IntVector
@@ -104,18 +108,10 @@ INLINED = (
 )
 
 
-def residual_jacobian(q: Vector, u: Vector, constants: Vector, result: Matrix) -> None:
-    """Jacobian into result[:, :N], residual into result[:, N]: a kernel that stands in the loop."""
-
-
-def newton_step(q: Vector, u: Vector, constants: Vector, result: Vector) -> None:
-    """Newton step Phi_q^-1 Phi into result (N,), by straight-line elimination."""
-
-
 def increments(u, target, largest):
     """Number of substeps from inputs u to target, none longer than `largest`."""
     distance = 0.0
-    for i in range(INPUTS):
+    for i in range(len(target)):
         distance = max(distance, abs(target[i] - u[i]))
     if distance <= largest:
         return 1
@@ -123,7 +119,7 @@ def increments(u, target, largest):
 
 
 def all_below(step, size, tolerance):
-    """Whether the first entries of a step are all below a tolerance; never if one is no number."""
+    """Whether the first entries of a step are all below a tolerance; no if one is no number."""
     below = True
     for i in range(size):
         below &= abs(step[i]) < tolerance
@@ -131,23 +127,23 @@ def all_below(step, size, tolerance):
 
 
 def largest_of(step):
-    """Magnitude of the largest component (N,) of a step."""
+    """Magnitude of the largest component of a step."""
     largest = 0.0
-    for i in range(N):
+    for i in range(len(step)):
         largest = max(largest, abs(step[i]))
     return largest
 
 
 def failure(q):
     """Status of an iteration that has used up its limit."""
-    for i in range(N):
+    for i in range(len(q)):
         if not math.isfinite(q[i]):
             return NOT_FINITE
     return TOO_MANY_ITERATIONS
 
 
 def stopped(counts, iterations, jacobians, status):
-    """The status of a loop that ends, its counts written down."""
+    """Status of a loop that ends; writes its counts."""
     counts[ITERATIONS], counts[RESIDUALS], counts[LINEAR_SOLVES] = (
         iterations,
         iterations,
@@ -159,17 +155,18 @@ def stopped(counts, iterations, jacobians, status):
 
 def newton(q, u, mechanism, iteration, work):
     """Newton's method from q, which it changes: its iterations, negative where it has failed."""
+    n = len(q)
     constants, step, full = mechanism.constants, work.step, work.full
     first, second = 0.0, 0.0
     for count in range(1, iteration.limit + 1):
-        newton_step(q, u, constants, step)
-        for i in range(N):
+        call_kernel(mechanism.kernels, STEP, q, u, constants, step)
+        for i in range(n):
             q[i] -= step[i]
-        if all_below(step, N, iteration.tolerance):
+        if all_below(step, n, iteration.tolerance):
             if second <= CERTAIN:
                 return count
-            residual_jacobian(q, u, constants, full)
-            same = small_solve(full, N) == mechanism.orientation
+            call_kernel(mechanism.kernels, JACOBIAN, q, u, constants, full)
+            same = small_solve(full, n) == mechanism.orientation
             return count + 1 if same else -count - 1
         if count <= 2:
             size = largest_of(step)
@@ -179,29 +176,30 @@ def newton(q, u, mechanism, iteration, work):
     return -iteration.limit
 
 
-def moved(q, u, place, target, mechanism, iteration, work):
+def moved(q, u, index, target, mechanism, iteration, work):
     """Move one input of a solved position to a target in steps that stay on the branch: iterations.
 
-    They are negative where not even the shortest step goes further, since the branch or a stop is
-    near: q and u are then those of the last position.
+    They are negative where not even the shortest step goes further, since the end of the branch or
+    a stop is near: q and u are then those of the last position.
     """
+    n = len(q)
     length, iterations = iteration.largest_increment, 0
-    while u[place] != target:
-        before = u[place]
-        for i in range(N):
-            work.kept[i] = q[i]
-        u[place] = target
+    while u[index] != target:
+        before = u[index]
+        for i in range(n):
+            work.saved[i] = q[i]
+        u[index] = target
         if abs(target - before) > length:
-            u[place] = before + math.copysign(length, target - before)
-        taken = newton(q, u, mechanism, iteration, work)
-        iterations += abs(taken)
-        if taken > 0 and within(q, mechanism.stops):
+            u[index] = before + math.copysign(length, target - before)
+        count = newton(q, u, mechanism, iteration, work)
+        iterations += abs(count)
+        if count > 0 and within(q, mechanism.stops):
             length = min(2.0 * length, iteration.largest_increment)
             continue
-        length = 0.5 * abs(u[place] - before)
-        u[place] = before
-        for i in range(N):
-            q[i] = work.kept[i]
+        length = 0.5 * abs(u[index] - before)
+        u[index] = before
+        for i in range(n):
+            q[i] = work.saved[i]
         if not length >= iteration.shortest_step:
             return -iterations
     return iterations
@@ -210,25 +208,25 @@ def moved(q, u, place, target, mechanism, iteration, work):
 def within(q, stops):
     """Whether no coordinate is beyond its stop."""
     inside = True
-    for i in range(N):
+    for i in range(len(q)):
         inside &= abs(q[i]) <= stops[i]
     return inside
 
 
 def approach(q, u, target, mechanism, iteration, work):
-    """From the design position to the inputs of a target, one after the other, the height last.
+    """Move the inputs from the design position to a target one by one, the height last: iterations.
 
-    Gives iterations, negative where the branch ends before.
+    They are negative where the branch ends before.
     """
-    for i in range(N):
+    for i in range(len(q)):
         q[i] = mechanism.start[i]
-    for i in range(INPUTS):
+    for i in range(len(u)):
         u[i] = 0.0
     iterations = 0
-    for place in range(INPUTS - 1, -1, -1):
-        taken = moved(q, u, place, target[place], mechanism, iteration, work)
-        iterations += abs(taken)
-        if taken < 0:
+    for index in range(len(u) - 1, -1, -1):
+        count = moved(q, u, index, target[index], mechanism, iteration, work)
+        iterations += abs(count)
+        if count < 0:
             return -iterations
     return iterations
 
@@ -242,29 +240,29 @@ def newton_path(
     method does not contract, the sample is approached from the design position instead.
     """
     path, counts = solution.path, solution.counts
-    q, u, previous, target, work = scratch(mechanism.start, buffer)
+    q, u, previous, target, work = scratch(mechanism.start, inputs.shape[1], buffer)
     iterations = 0
-    for sample in range(inputs.shape[0]):
+    for sample in range(len(inputs)):
         counts[SAMPLE] = sample
-        for i in range(INPUTS):
+        for i in range(len(u)):
             target[i] = inputs[sample, i]
         substeps = increments(previous, target, iteration.largest_increment)
         for substep in range(1, substeps + 1):
-            for i in range(INPUTS):
+            for i in range(len(u)):
                 u[i] = previous[i] + (target[i] - previous[i]) * (substep / substeps)
-            taken = newton(q, u, mechanism, iteration, work)
-            iterations += abs(taken)
-            if taken < 0:
-                taken = approach(q, u, target, mechanism, iteration, work)
-                iterations += abs(taken)
-                if taken < 0:
+            count = newton(q, u, mechanism, iteration, work)
+            iterations += abs(count)
+            if count < 0:
+                count = approach(q, u, target, mechanism, iteration, work)
+                iterations += abs(count)
+                if count < 0:
                     return stopped(counts, iterations, iterations, OFF_BRANCH)
                 break
         if not within(q, mechanism.stops):
             return stopped(counts, iterations, iterations, OFF_BRANCH)
-        for i in range(INPUTS):
+        for i in range(len(u)):
             previous[i] = target[i]
-        for i in range(N):
+        for i in range(len(q)):
             path[sample, i] = q[i]
     return stopped(counts, iterations, iterations, CONVERGED)
 
@@ -274,57 +272,59 @@ def travel_limit(
 ) -> Int:
     """How far the branch goes to a target, one input after the other, the height last.
 
-    `reached` are the inputs (INPUTS,) at which it ends; the status is that of all inputs but the
-    height.
+    `reached` are the inputs at which it ends; the status is that of all inputs but the height.
     """
-    q, u, _, _, work = scratch(mechanism.start, buffer)
+    q, u, _, _, work = scratch(mechanism.start, len(target), buffer)
     status = CONVERGED
-    for place in range(INPUTS - 1, -1, -1):
-        if moved(q, u, place, target[place], mechanism, iteration, work) < 0 and place:
+    for index in range(len(target) - 1, -1, -1):
+        if moved(q, u, index, target[index], mechanism, iteration, work) < 0 and index:
             status = OFF_BRANCH
             break
-    for i in range(INPUTS):
+    for i in range(len(u)):
         reached[i] = u[i]
     return status
 
 
-def scratch(start, buffer):
-    """Coordinates and inputs of a loop: now, at the sample before, at the next; what it works in.
+def scratch(start, inputs, buffer):
+    """Coordinates; inputs now, at the previous sample and at the next; scratch space of Newton.
 
-    They are parts of the buffer, set to the design position.
+    They are parts of the buffer.  Coordinates and inputs are those of the design position.
     """
-    q, step, kept = vector(buffer, 0, N), vector(buffer, N, N), vector(buffer, 2 * N, N)
-    full = matrix(buffer, 3 * N, N, N + 1)
-    first = 3 * N + N * (N + 1)
-    u, previous = vector(buffer, first, INPUTS), vector(buffer, first + INPUTS, INPUTS)
-    for i in range(N):
+    n = len(start)
+    q, step, saved = vector(buffer, 0, n), vector(buffer, n, n), vector(buffer, 2 * n, n)
+    full = matrix(buffer, 3 * n, n, n + 1)
+    first = 3 * n + n * (n + 1)
+    u, previous = vector(buffer, first, inputs), vector(buffer, first + inputs, inputs)
+    target = vector(buffer, first + 2 * inputs, inputs)
+    for i in range(n):
         q[i] = start[i]
-    for i in range(INPUTS):
+    for i in range(inputs):
         u[i], previous[i] = 0.0, 0.0
-    target = vector(buffer, first + 2 * INPUTS, INPUTS)
-    return q, u, previous, target, Work(step, kept, full)
+    return q, u, previous, target, Work(step, saved, full)
 
 
-def corrected(q, u, mechanism, kernels, iteration, work):
+def corrected(q, u, mechanism, lane_kernels, iteration, work):
     """Newton's method in all lanes from q, which it changes: steps, negative where one failed."""
-    step, most = matrix(work, 0, LANES, N), vector(work, N * LANES, N)
-    full = matrix(work, N * (LANES + 1), N, N + 1)
+    n = q.shape[1]
+    step, most = matrix(work, 0, LANES, n), vector(work, n * LANES, n)
+    full = matrix(work, n * (LANES + 1), n, n + 1)
     first, second = 0.0, 0.0
     for count in range(1, iteration.limit + 1):
-        call_lanes(kernels, STEP, q, u, mechanism.constants, step, 0)
-        for i in range(N):
+        call_lanes(lane_kernels, LANE_STEP, q, u, mechanism.constants, step, 0)
+        for i in range(n):
             most[i] = 0.0
         for lane in range(LANES):
-            for i in range(N):
+            for i in range(n):
                 q[lane, i] -= step[lane, i]
                 change = abs(step[lane, i])
                 # What is no number stays: it is below nothing.
                 most[i] = most[i] if change <= most[i] else change
-        if all_below(most, N, iteration.tolerance):
+        if all_below(most, n, iteration.tolerance):
             for lane in range(LANES):
                 if second > CERTAIN:
-                    residual_jacobian(q[lane], u[lane], mechanism.constants, full)
-                    if small_solve(full, N) != mechanism.orientation:
+                    constants = mechanism.constants
+                    call_kernel(mechanism.kernels, JACOBIAN, q[lane], u[lane], constants, full)
+                    if small_solve(full, n) != mechanism.orientation:
                         return -count
             return count
         if count <= 2:
@@ -338,7 +338,7 @@ def corrected(q, u, mechanism, kernels, iteration, work):
 def extrapolated(q, first, second, third, known):
     """Where the next iteration begins in all lanes, from as many positions as are known."""
     for lane in range(LANES):
-        for i in range(N):
+        for i in range(q.shape[1]):
             third[lane, i] = second[lane, i]
             second[lane, i] = first[lane, i]
             first[lane, i] = q[lane, i]
@@ -351,7 +351,7 @@ def extrapolated(q, first, second, third, known):
 def lane_path(
     mechanism: Mechanism,
     inputs: Matrix,
-    kernels: IntVector,
+    lane_kernels: IntVector,
     iteration: Iteration,
     solution: Solution,
     buffer: Vector,
@@ -362,39 +362,41 @@ def lane_path(
     before it.
     """
     path, counts = solution.path, solution.counts
-    size, samples, columns = N * LANES, inputs.shape[0], path.shape[1] - N
-    q, first = matrix(buffer, 0, LANES, N), matrix(buffer, size, LANES, N)
-    second, third = matrix(buffer, 2 * size, LANES, N), matrix(buffer, 3 * size, LANES, N)
-    u, place = matrix(buffer, 4 * size, LANES, INPUTS), 4 * size + LANES * INPUTS
-    results = matrix(buffer, place, LANES, columns)
-    work = vector(buffer, place + LANES * columns, N * (LANES + 1) + N * (N + 1))
+    samples, n = len(inputs), len(mechanism.start)
+    size, columns = n * LANES, path.shape[1] - n
+    q, first = matrix(buffer, 0, LANES, n), matrix(buffer, size, LANES, n)
+    second, third = matrix(buffer, 2 * size, LANES, n), matrix(buffer, 3 * size, LANES, n)
+    u = matrix(buffer, 4 * size, LANES, inputs.shape[1])
+    offset = 4 * size + LANES * inputs.shape[1]
+    results = matrix(buffer, offset, LANES, columns)
+    work = vector(buffer, offset + LANES * columns, n * (LANES + 1) + n * (n + 1))
     length = -(-samples // LANES)
     for lane in range(LANES):
-        for i in range(N):
+        for i in range(n):
             q[lane, i] = mechanism.start[i]
     iterations, known, inside = 0, 1, True
     for step in range(1 - WAY, length):
         share = (min(step, 0) + WAY) / WAY
         for lane in range(LANES):
             sample = min(lane * length, samples - length) + max(step, 0)
-            for i in range(INPUTS):
+            for i in range(u.shape[1]):
                 u[lane, i] = share * share * inputs[sample, i]
         # From there on it is time that goes evenly.
         known = 1 if step == 1 else known
         extrapolated(q, first, second, third, known)
         known += 1
-        taken = corrected(q, u, mechanism, kernels, iteration, work)
-        iterations += abs(taken) * LANES
-        if taken < 0:
+        count = corrected(q, u, mechanism, lane_kernels, iteration, work)
+        iterations += abs(count) * LANES
+        if count < 0:
             return stopped(counts, iterations, iterations, OFF_BRANCH)
         if step < 0:
             continue
-        call_lanes(kernels, RESULTS, q, u, mechanism.constants, results, 0)
+        call_lanes(lane_kernels, LANE_OUTPUTS, q, u, mechanism.constants, results, 0)
         for lane in range(LANES):
             sample = min(lane * length, samples - length) + step
             inside &= within(q[lane], mechanism.stops)
-            for i in range(N):
+            for i in range(n):
                 path[sample, i] = q[lane, i]
             for i in range(columns):
-                path[sample, N + i] = results[lane, i]
+                path[sample, n + i] = results[lane, i]
     return stopped(counts, iterations, iterations, CONVERGED if inside else OFF_BRANCH)

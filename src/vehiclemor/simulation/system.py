@@ -12,8 +12,7 @@ from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Prepared, Ready, ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import recorded_inputs, signal_of
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, output_times
 from vehiclemor.simulation.control_periods import ControlPeriods
@@ -74,17 +73,10 @@ class System(ShortRepr):
     def with_constants(self, constants: np.ndarray) -> System:
         """The system of other constants; operators, packed arguments and workspaces serve both."""
         # What is made of the Jacobian is made by this one, before it is shared.
-        _ = self.frame, self.turning_jacobian, self._ready, self._pool
+        _ = self.frame, self.frozen_jacobian, self._ready, self._pool
         other = object.__new__(System)
         vars(other).update(vars(self), constants=constants, _address=constants.ctypes.data)
         return other
-
-    @cached_property
-    def turning(self) -> np.ndarray:
-        """Numbers of the heading and of those pairs that turn with it which the rates depend on."""
-        pairs = self.rotating[1:].reshape(-1, 2)
-        pairs = pairs[np.isin(pairs, self.active).all(axis=1)]
-        return np.concatenate([self.rotating[:1], pairs.ravel()])
 
     def jacobian(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """df/dx (dim, dim) by central differences; columns of inactive states are zero."""
@@ -109,27 +101,6 @@ class System(ShortRepr):
         return self.jacobian(self.reference, np.zeros(self.inputs))
 
     @cached_property
-    def turning_jacobian(self) -> np.ndarray:
-        """The same of `vehicle_frame`, rows of places zero; the reference's heading is zero."""
-        jacobian, x = self.frozen_jacobian.copy(), self.reference
-        if not len(self.turning):
-            return jacobian
-        heading, pairs = self.turning[0], self.turning[1:].reshape(-1, 2)
-        (rates,) = self.values_at("derivative", x[None], np.zeros((1, self.inputs)), len(x))
-        for a, b in pairs:
-            jacobian[:, heading] += x[a] * jacobian[:, b] - x[b] * jacobian[:, a]
-        for a, b in pairs:
-            jacobian[a] += x[b] * jacobian[heading]
-            jacobian[b] -= x[a] * jacobian[heading]
-            jacobian[a, heading] += rates[b]
-            jacobian[b, heading] -= rates[a]
-            jacobian[a, b] += rates[heading]
-            jacobian[b, a] -= rates[heading]
-        # Places: their rates turn with the heading, so they are left to the formulas without modes.
-        jacobian[np.setdiff1d(self.rotating, self.turning)] = 0.0
-        return jacobian
-
-    @cached_property
     def _ready(self) -> dict[tuple, Ready]:
         # What integrators store of the frozen Jacobian is made when it is first used.
         return {}
@@ -151,14 +122,11 @@ class System(ShortRepr):
         """What an integrator needs beside its code; kept for further runs."""
         key = solver, active.tobytes()
         if key not in self._ready:
-            chosen = catalogue.integrator(solver)
-            stored: catalogue.Stored = catalogue.Stored(np.zeros((1, 1, 1)))
-            if chosen.step_kernel and chosen.tables:
+            chosen, operators = catalogue.integrator(solver), np.zeros((1, 1, 1))
+            if chosen.tables:
                 blocks = self.frame.diagonal(self.frozen_jacobian)
-                stored = catalogue.Stored(self.frame.packed([chosen.tables(b) for b in blocks]))
-            elif chosen.tables:
-                stored = chosen.tables(self.turning_jacobian)
-            method = Method(chosen.tableau, catalogue.STEP_GRID, *stored, active)
+                operators = self.frame.packed([chosen.tables(block) for block in blocks])
+            method = Method(chosen.tableau, catalogue.STEP_GRID, operators, active)
             self._ready[key] = ready(method)
         return self._ready[key]
 
@@ -173,14 +141,12 @@ class System(ShortRepr):
             names, places = FORMULATIONS[formulation], ("derivative", "second_order", "speeds")
             found = [address_of(self.kernels, name) if name in names else 0 for name in places]
             kernels = np.array([*found, step], dtype=np.int64)
-            self._ready[key] = ready(
-                Equations(kernels, self.constants, self.error_scale, self.turning)
-            )
+            self._ready[key] = ready(Equations(kernels, self.constants, self.error_scale))
         return self._ready[key]
 
     def run(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         state: np.ndarray,
         windows: ControlPeriods,
         solver: Solver,
@@ -205,7 +171,7 @@ class System(ShortRepr):
             length = maneuver.duration, maneuver.samples
             kind = length, id(windows), name, tolerance, longest, direct_until
             space, left = self._pool.taken(kind, make), partial(self._pool.give_back, kind)
-            if space.signal is not signal_of(maneuver):
+            if space.signal is not maneuver.packed_pieces:
                 space.take(self._drive(maneuver, windows, space.output.samples))
         self._set_constants(space.call)
         output = space.output
@@ -222,7 +188,7 @@ class System(ShortRepr):
 
     def workspace(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         windows: ControlPeriods,
         solver: Solver,
         direct_until: float = np.inf,
@@ -242,13 +208,13 @@ class System(ShortRepr):
         return self.packed(windows, solver, drive, output)
 
     def _drive(
-        self, maneuver: Maneuver, windows: ControlPeriods, times: np.ndarray, begin: float = 0.0
+        self, maneuver: Excitation, windows: ControlPeriods, times: np.ndarray, begin: float = 0.0
     ) -> DrivenBy:
         """What of a maneuver goes into a run."""
-        signal = signal_of(maneuver)
+        signal = maneuver.packed_pieces
         end = float(times[-1]) if len(times) else maneuver.duration
         spans = windows.spans(signal.bundle.edges, end, begin)
-        return DrivenBy(signal, spans, recorded_inputs(maneuver)[1])
+        return DrivenBy(signal, spans, maneuver.recorded_inputs[1])
 
     def packed(
         self, windows: ControlPeriods, solver: Solver, drive: DrivenBy, output: Output
@@ -259,7 +225,7 @@ class System(ShortRepr):
         if catalogue.frozen(name) and not full:
             raise InputError(f"{name} freezes the full model's Jacobian: not for a reduced model")
         dim, n = int(windows.ranks.max()), len(self.error_scale)
-        formulation = chosen.formulation if full else windows.formulation
+        formulation = windows.formulation
         longest = float(solver.longest_step or np.inf)
         start = np.empty(n)
         buffer = np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs))

@@ -25,7 +25,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.simulation.structures.model import StructuralModel
 from vehiclemor.study import scenario as of_run
-from vehiclemor.study.evaluate import evaluate, kept_reference, model_of
+from vehiclemor.study.evaluate import cached_reference, evaluate, model_of
 from vehiclemor.study.plans.choice import reasons
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names, sampled_sets
 from vehiclemor.study.plans.protocol_run import second_runs
@@ -74,7 +74,7 @@ def dataset(model: str | Path, out: str | Path | None = None) -> Path:
 def digest_of(protocol: Protocol) -> str:
     """Identity of a test set: equations, values of all parameters, bounds and runs.
 
-    It is made of texts that all machines have alike.  Matrices of a structure, which they round
+    It is a hash of texts that all machines have alike.  Matrices of a structure, which they round
     differently, count by six digits of weighted sums.
     """
     model = protocol.model
@@ -101,18 +101,18 @@ def _write(protocol: Protocol, folder: Path) -> None:
     definition, drawn = protocol.definition, sampled_sets(protocol).get("drawn", ())
     sets = {name: protocol.sets[name] for name in SETS} | ({"test": drawn} if drawn else {})
     second = second_runs(protocol, sets["test"])
-    # Its references are kept: those of the test are simulated once.
+    # Its references stay in memory: those of the test are simulated once.
     model = model_of(second)
     labels = [run.label for run in sets["test"]]
     digest = digest_of(protocol)
     for name in ("training", "validation", "test"):
-        found = _runs(model, sets[name], f"{name} of {protocol.study}")
+        runs = _runs(model, sets[name], f"{name} of {protocol.study}")
         for output, bound in definition.bounds.items():
-            found[output].attrs |= {"bound": bound.bound, "bound_measure": bound.measure}
+            runs[output].attrs |= {"bound": bound.bound, "bound_measure": bound.measure}
         if name == "test":
             apart = reasons(protocol, evaluate(second)) if drawn else [""] * len(labels)
-            found = found.assign(variables({"apart": np.array(apart, object)}, "run"))
-        found.attrs |= attributes(
+            runs = runs.assign(variables({"apart": np.array(apart, object)}, "run"))
+        runs.attrs |= attributes(
             f"{name} runs of {protocol.study}",
             model.kernel_hash,
             model=model.name,
@@ -122,7 +122,7 @@ def _write(protocol: Protocol, folder: Path) -> None:
             configuration=definition.model_dump_json(exclude_defaults=True),
             comment=NOTE,
         )
-        write_dataset(found, folder / f"{name}.nc")
+        write_dataset(runs, folder / f"{name}.nc")
     if isinstance(model, StructuralModel):
         _write_matrices(model, folder / "matrices")
 
@@ -137,45 +137,50 @@ def _runs(model: Model, scenarios: Sequence[Scenario], work: str) -> xr.Dataset:
     ]
     groups = {"inputs": definition.inputs, "states": states, "rates": rates}
     groups |= {"outputs": definition.outputs}
-    columns = [Quantity("time", "s", "time"), *chain(*groups.values())]
+    quantities = [Quantity("time", "s", "time"), *chain(*groups.values())]
     blocks: list[np.ndarray] = []
     for scenario in scenarios:
-        blocks.append(_samples(model, scenario, len(columns)))
+        blocks.append(_samples(model, scenario, len(quantities)))
         tell(work, len(blocks), len(scenarios))
-    found: dict[str, tuple] = {
-        q.name: ("sample", history, {"long_name": q.long_name, "units": q.unit}, {"zlib": True})
-        for q, history in zip(columns, np.concatenate(blocks).T.copy(), strict=True)
-    }
+    columns: dict[str, tuple] = {}
+    for quantity, history in zip(quantities, np.concatenate(blocks).T.copy(), strict=True):
+        meaning = {"long_name": quantity.long_name, "units": quantity.unit}
+        columns[quantity.name] = "sample", history, meaning, {"zlib": True}
+    labels = [run.label for run in scenarios]
     known: dict[str, object] = {
         "row_size": [len(block) for block in blocks],
-        "label": np.array([run.label for run in scenarios], object),
+        "label": np.array(labels, object),
     }
     if states:
-        starts = ((of_run.model_of_run(model, s), of_run.start_of(model, s)) for s in scenarios)
-        known["initial_state"] = [own.start(start) for own, start in starts]
-        found["state"] = "state", np.array([state.name for state in states], object)
-        found["state_unit"] = "state", np.array([state.unit for state in states], object)
+        known["initial_state"] = [
+            of_run.model_of_run(model, run).start(of_run.start_of(model, run)) for run in scenarios
+        ]
+        columns["state"] = "state", np.array([state.name for state in states], object)
+        columns["state_unit"] = "state", np.array([state.unit for state in states], object)
     if any(speeds := [of_run.speed_of(model, run) for run in scenarios]):
         known["initial_speed"] = speeds
-    found |= variables(known, "run")
-    found["row_size"][2]["sample_dimension"] = "sample"
-    for name in sorted({name for run in scenarios for name, _ in run.parameters}):
+    columns |= variables(known, "run")
+    columns["row_size"][2]["sample_dimension"] = "sample"
+    varied = {name for run in scenarios for name, _ in run.parameters}
+    for name in sorted(varied):
         usual: Any = dict(model.parameters.values()).get(name, np.nan)
         values = [dict(run.parameters).get(name, usual) for run in scenarios]
-        found[f"parameter_{name}"] = "run", values, described(model, f"{PARAMETER}{name}")
-    names = {group: " ".join(q.name for q in quantities) for group, quantities in groups.items()}
-    return xr.Dataset(found, attrs=names)
+        columns[f"parameter_{name}"] = "run", values, described(model, f"{PARAMETER}{name}")
+    names: dict[str, str] = {}
+    for group, members in groups.items():
+        names[group] = " ".join(quantity.name for quantity in members)
+    return xr.Dataset(columns, attrs=names)
 
 
 def _samples(model: Model, scenario: Scenario, width: int) -> np.ndarray:
     """Histories (samples, width); not a number where the full order has no solution."""
-    run = attempt(partial(kept_reference, model, scenario))
+    run = attempt(partial(cached_reference, model, scenario))
     if isinstance(run, Failure):
         times = scenario.maneuver.times
         return np.column_stack((times, np.full((len(times), width - 1), np.nan)))
-    own, rates = of_run.model_of_run(model, scenario), run.states[:, :0]
-    if own.speeds:
-        rates = own.values_at("derivative", run.states, run.inputs, finite=True)
+    changed, rates = of_run.model_of_run(model, scenario), run.states[:, :0]
+    if changed.speeds:
+        rates = changed.values_at("derivative", run.states, run.inputs, finite=True)
     return np.column_stack((run.times, run.inputs, run.states, rates, run.outputs))
 
 
@@ -184,15 +189,17 @@ def _write_matrices(model: StructuralModel, folder: Path) -> None:
     from scipy.io import mmwrite
 
     structure = model.system.structure
-    found = {name: getattr(structure, name) for name in ("mass", "stiffness", "dampers", "ports")}
-    of = ("position", "speed", "acceleration", "force")
-    found |= {f"outputs_{n}": part for n, part in zip(of, structure.outputs, strict=True)}
+    names = ("mass", "stiffness", "dampers", "ports")
+    matrices = {name: getattr(structure, name) for name in names}
+    outputs_of = ("position", "speed", "acceleration", "force")
+    for name, matrix in zip(outputs_of, structure.outputs, strict=True):
+        matrices[f"outputs_{name}"] = matrix
     values = dict(model.parameters.values())
     for name in model.definition.online:
         other = model.definition.structure(values | {name: values[name] + 1.0})
-        found[f"mass_by_{name}"] = other.mass - structure.mass
+        matrices[f"mass_by_{name}"] = other.mass - structure.mass
     equation = "M q'' + (W W' + d K) q' + K q = load + B f(B' q, B' q', u)"
     folder.mkdir()
-    for name, matrix in found.items():
+    for name, matrix in matrices.items():
         comment = f"{equation}, d = {structure.damping_time!r} s"
         mmwrite(folder / f"{name}.mtx", matrix, comment=comment)

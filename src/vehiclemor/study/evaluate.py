@@ -14,7 +14,8 @@ from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, bla
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
-from vehiclemor.reduction.interface import FitOther, FittedModel, Method, lower_rank
+from vehiclemor.reduction.fallback import with_fallback
+from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.trust import InputRange, input_range
 from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
@@ -40,8 +41,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# How a fitted model is integrated: experiments that differ in these alone are fitted once.
-ONLINE = ("solver", "tolerance")
+# How a fitted model is integrated, and its fallback: experiments that differ in these alone are
+# fitted once.
+SOLVER = ("solver", "tolerance")
+ONLINE = (*SOLVER, "fallback", "fallback_tolerance")
 # More than the fits of a study of protocols, some of which take a minute.
 MOST_FITS = 128
 
@@ -49,7 +52,7 @@ MOST_FITS = 128
 class Fit(NamedTuple):
     """All that determines a fit: the parameters differ from the model's, settings are JSON text.
 
-    `function` is the method's own, which may be written anew under the same name.
+    `function` is that of the method, which may be written anew under the same name.
     """
 
     model: Model
@@ -78,20 +81,21 @@ def evaluate(
     What was lately solved with a `model` that is given is used again; by default it is built from
     the registry.  Without `errors` the full order is not solved.
     """
-    solve = kept_reference if model is None else recent_reference
+    solve = cached_reference if model is None else recent_reference
     with first_use(f"{experiment.model} with {experiment.method}"), one_thread():
-        own = model or model_of(experiment)
-        found = attempt(partial(_evaluated, experiment, own, solve if errors else None))
-        if isinstance(found, Failure):
+        full = model or model_of(experiment)
+        result = attempt(partial(_evaluated, experiment, full, solve if errors else None))
+        if isinstance(result, Failure):
             # A bug has ended it.
-            found = result_dataset(own, experiment, [found] * len(experiment.test), found)
-    return found
+            result = result_dataset(full, experiment, [result] * len(experiment.test), result)
+    return result
 
 
 def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> xr.Dataset:
-    own, test = model_of_run(model, experiment.test[0]), experiment.test
+    test = experiment.test
+    tested = model_of_run(model, test[0])
     if refused := refusal(model, experiment):
-        return result_dataset(own, experiment, [refused] * len(test), refused)
+        return result_dataset(tested, experiment, [refused] * len(test), refused)
     fit = _shared(_wanted(model, experiment))
     outcomes = [_outcome(experiment, model, fit, scenario, solve) for scenario in test]
     method: Method = component("method", experiment.method)
@@ -102,11 +106,11 @@ def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> 
         and not isinstance(outcomes[0], Failure)
         and in_training(model, experiment.training, test[0])
     )
-    return result_dataset(own, experiment, outcomes, fit.reduced, seen)
+    return result_dataset(tested, experiment, outcomes, fit.reduced, seen)
 
 
 def model_of(experiment: Experiment) -> Model:
-    """The model of an experiment; kept, since all experiments of a study share it."""
+    """The model of an experiment; cached, since all experiments of a study share it."""
     return _built(experiment.model, _text(experiment.parameters))
 
 
@@ -143,14 +147,14 @@ def reference_run(model: Model, scenario: Scenario) -> Trajectory:
 RECENT = 16
 recent_reference = lru_cache(maxsize=RECENT)(reference_run)
 # More than the scenarios of any protocol, each of which is simulated with every candidate.
-kept_reference = lru_cache(maxsize=1024)(reference_run)
+cached_reference = lru_cache(maxsize=1024)(reference_run)
 
 
 def _wanted(model: Model, experiment: Experiment) -> Fit:
     settings, method = _text(experiment.settings), experiment.method
     online, function = model.definition.online, component("method", method).fit
-    own = tuple(pair for pair in experiment.test[0].parameters if pair[0] not in online)
-    return Fit(model, own, method, settings, experiment.training, experiment.code, function)
+    changed = tuple(pair for pair in experiment.test[0].parameters if pair[0] not in online)
+    return Fit(model, changed, method, settings, experiment.training, experiment.code, function)
 
 
 def fresh_fit(model: Model, experiment: Experiment) -> FittedModel | Failure:
@@ -158,55 +162,52 @@ def fresh_fit(model: Model, experiment: Experiment) -> FittedModel | Failure:
     return _fit(_wanted(model, experiment))
 
 
-def kept_fit(model: Model, experiment: Experiment) -> FittedModel | Failure:
+def cached_fit(model: Model, experiment: Experiment) -> FittedModel | Failure:
     """As `fresh_fit`, but what was fitted before is used again."""
     return _shared(_wanted(model, experiment)).reduced
 
 
-_KEPT: dict[Fit, Fitted] = {}
+_FITS: dict[Fit, Fitted] = {}
 
 
 def _shared(fit: Fit) -> Fitted:
     """A fit that may be shared; what was not used for the longest time is forgotten."""
-    found = _KEPT.pop(fit, None) or Fitted(_made(fit))
+    found = _FITS.pop(fit, None) or Fitted(_made(fit))
     # A bug may be mended before the next try.
     if not (isinstance(found.reduced, Failure) and found.reduced.status == "error"):
-        _KEPT[fit] = found
-        if len(_KEPT) > MOST_FITS:
-            del _KEPT[next(iter(_KEPT))]
+        _FITS[fit] = found
+        if len(_FITS) > MOST_FITS:
+            del _FITS[next(iter(_FITS))]
     return found
 
 
 def _made(fit: Fit) -> FittedModel | Failure:
-    """A fit; one that differs from another in its integration alone shares what that has fitted."""
+    """A fit; those that differ in what does not reach `fit` alone share one result."""
     settings = json.loads(fit.settings)
-    defaults = default_settings(fit.model, fit.method)
-    online = {name: value for name, value in settings.items() if name in ONLINE}
-    common = _text(settings | {name: defaults[name] for name in online})
-    if common != fit.settings:
-        found: Any = _shared(fit._replace(settings=common)).reduced
-        if isinstance(found, Failure):
-            return found
-        if all(hasattr(found, name) for name in online):
-            return replace(found, **online)
-
-    def other(name: str, given: Any) -> FittedModel:
-        content, function = _text(given.model_dump()), component("method", name).fit
-        shared = _shared(fit._replace(method=name, settings=content, function=function)).reduced
-        if isinstance(shared, Failure):
-            # Fitted again it fails as it does alone.
-            return fitted(component("method", name), *_given(fit), given)
-        return shared
-
-    return _fit(fit, other)
+    method: Method = component("method", fit.method)
+    if method.variant_of:
+        method = component("method", method.variant_of)
+    defaults = default_settings(fit.model, method.name)
+    common = settings | {name: defaults[name] for name in ONLINE if name in settings}
+    first = fit._replace(method=method.name, settings=_text(common), function=method.fit)
+    if first == fit:
+        return _fit(fit)
+    reduced: Any = _shared(first).reduced
+    if isinstance(reduced, Failure):
+        return reduced
+    online = {name: settings[name] for name in SOLVER if name in settings}
+    if not all(hasattr(reduced, name) for name in online):
+        return _fit(fit)
+    complete = for_method(fit.model, fit.method, settings)
+    return with_fallback(replace(reduced, **online), fit.model, complete)
 
 
-def _fit(fit: Fit, others: FitOther | None = None) -> FittedModel | Failure:
+def _fit(fit: Fit) -> FittedModel | Failure:
     method: Method = component("method", fit.method)
 
     def made() -> FittedModel:
         complete = for_method(fit.model, fit.method, json.loads(fit.settings))
-        return fitted(method, *_given(fit), complete, others)
+        return fitted(method, *_given(fit), complete)
 
     with one_thread():
         return attempt(made)
@@ -244,14 +245,14 @@ def _tested(
     reference: Trajectory | None,
 ) -> Outcome:
     """A test scenario, simulated with the reduced model."""
-    own, start = model_of_run(model, scenario), start_of(model, scenario)
-    reduced: Any = for_run(fit.reduced, own)
+    tested, start = model_of_run(model, scenario), start_of(model, scenario)
+    reduced: Any = for_run(fit.reduced, tested)
     many = experiment.keep == "errors"
     # The first run loads machine code and warms caches, another is timed where it is compared.
     if not (many or fit.warm or reference is None):
-        checked_run(own, scenario.maneuver, start, reduced)
+        checked_run(tested, scenario.maneuver, start, reduced)
         fit.warm = True
-    run = checked_run(own, scenario.maneuver, start, reduced)
+    run = checked_run(tested, scenario.maneuver, start, reduced)
     if run.finished and not np.isfinite(run.outputs).all():
         run = replace(run, status="diverged", message="an output is not finite")
     if remark := lower_rank(experiment.settings, reduced):
@@ -276,18 +277,18 @@ def _tested(
     if nearest is None:
         return Outcome(judged, reference)
     if nearest is states:
-        return Outcome(judged, reference, np.zeros(len(own.outputs)))
+        return Outcome(judged, reference, np.zeros(len(tested.outputs)))
     if np.shape(nearest) != states.shape:
         raise PlugInError(f"best_approximation gives shape {np.shape(nearest)}, not its argument's")
-    projected = own.outputs_at(nearest, reference.inputs)
+    projected = tested.outputs_at(nearest, reference.inputs)
     return Outcome(judged, reference, rms(projected - reference.outputs))
 
 
-def for_run(reduced: Any, own: Model) -> Any:
+def for_run(reduced: Any, tested: Model) -> Any:
     """A reduced model with the online parameters of a run."""
-    if not own.definition.online or getattr(reduced, "model", own) is own:
+    if not tested.definition.online or getattr(reduced, "model", tested) is tested:
         return reduced
-    return getattr(reduced, "for_model", lambda _: reduced)(own)
+    return getattr(reduced, "for_model", lambda _: reduced)(tested)
 
 
 @lru_cache(maxsize=64)

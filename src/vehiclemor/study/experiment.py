@@ -15,7 +15,7 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.scenario import Scenario, Values, parameters_of, scenario_text
+from vehiclemor.study.scenario import Overrides, Scenario, Values, parameters_of, scenario_text
 
 Settings = dict[str, Value]
 Keep = Literal["trajectories", "metrics", "errors"]
@@ -44,8 +44,9 @@ class Experiment(ShortRepr):
     @property
     def configuration(self) -> str:
         """Canonical JSON text of the experiment."""
-        texts = {name: _text(getattr(self, name)) for name in sorted(self.__dataclass_fields__)}
-        return "{" + ", ".join(f'"{name}": {text}' for name, text in texts.items()) + "}"
+        names = sorted(self.__dataclass_fields__)
+        pairs = [f'"{name}": {_text(getattr(self, name))}' for name in names]
+        return "{" + ", ".join(pairs) + "}"
 
     @cached_property
     def key(self) -> str:
@@ -71,17 +72,19 @@ def make_experiment(
 ) -> Experiment:
     """An experiment with present kernels, parameters and source; settings are complete ones."""
     if keep != "errors" and len(test) != 1:
-        raise ValueError(f"{keep} are kept of one test scenario, not of {len(test)}")
+        raise ValueError(f"{keep} are stored of one test scenario, not of {len(test)}")
     online = model.definition.online
-    fixed = {tuple(pair for pair in s.parameters if pair[0] not in online) for s in test}
-    if len(fixed) > 1:
+    models: set[Overrides] = set()
+    for scenario in test:
+        models.add(tuple(pair for pair in scenario.parameters if pair[0] not in online))
+    if len(models) > 1:
         raise InputError(
             "the scenarios of a test set have several parameters; a test is of one model"
         )
     return Experiment(
         model.name,
         model.kernel_hash,
-        code_digest(model.name, method, settings),
+        code_digest(model.name, method),
         parameters_of(model),
         method,
         settings,

@@ -16,7 +16,7 @@ from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.netcdf_file import opened, read_dataset
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.results import judged_part
-from vehiclemor.study.plans.study_file import Bound, StudyFile
+from vehiclemor.study.plans.study_file import Bound, ProtocolFile
 from vehiclemor.study.store import combined_path
 
 Bounds = Mapping[str, Bound]
@@ -52,27 +52,28 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
     known = folder / "test.nc"
     if not known.exists():
         raise FileError(f"{folder}: has no test.nc; vehiclemor dataset MODEL writes such a folder")
-    truth, found = _read(known, "test set"), _read(path, "file of predictions")
+    truth, predictions = _read(known, "test set"), _read(path, "file of predictions")
     if "configuration" not in truth.attrs or "apart" not in truth:
         raise FileError(f"{known}: not the test set of a dataset of this package")
-    bounds = StudyFile.model_validate_json(truth.attrs["configuration"]).bounds
-    _check(path, found, truth, bounds)
-    judged = truth["apart"].values == ""
-    if not judged.any():
+    bounds = ProtocolFile.model_validate_json(truth.attrs["configuration"]).bounds
+    _check(path, predictions, truth, bounds)
+    counts = truth["apart"].values == ""
+    if not counts.any():
         raise InputError(f"{known}: no run can be judged")
-    label = printable(str(found.attrs.get("method", path.stem)))
-    part = _measured(found, truth, bounds).isel(scenario=judged)
+    label = printable(str(predictions.attrs.get("method", path.stem)))
+    part = _measured(predictions, truth, bounds).isel(scenario=counts)
     rows = [_row(label, part, bounds)]
     stored = combined_path(file_path("results", results), truth.attrs["study"])
     if stored.exists():
         other = judged_part(read_dataset(stored, "source", "vehiclemor", stored=True))
-        if np.array_equal(other["scenario"].values, truth["label"].values[judged]):
+        if np.array_equal(other["scenario"].values, truth["label"].values[counts]):
             shown = other["winner"].values | (other["method"].values == "replay")
             names = other["label"].values[shown].tolist()
             rows += [_row(name, other.sel(label=name), bounds) for name in names]
     for output, bound in bounds.items():
-        own = {"kind": "output", "measure": bound.measure, "bound": bound.bound}
-        rows.append(_row(label, part, {output: bound}) | own | {"unit": truth[output].units})
+        row = _row(label, part, {output: bound})
+        row |= {"kind": "output", "measure": bound.measure, "bound": bound.bound}
+        rows.append(row | {"unit": truth[output].units})
     return pd.DataFrame(rows)
 
 
@@ -83,28 +84,31 @@ def _read(path: Path, kind: str) -> xr.Dataset:
         return xr.open_dataset(NetCDF4DataStore(file), decode_times=False).load()
 
 
-def _check(path: Path, found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> None:
+def _check(path: Path, predictions: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> None:
     """Raise `InputError` if a file is not of predictions of this test set."""
     for name in ("model", "test_set_digest"):
-        if (given := str(found.attrs.get(name, "missing"))) != (wanted := truth.attrs[name]):
-            raise InputError(f"{path}: {name} is {quoted(given)}; the test set has {wanted!r}")
-    if missing := [output for output in bounds if output not in found]:
+        value, wanted = str(predictions.attrs.get(name, "missing")), truth.attrs[name]
+        if value != wanted:
+            raise InputError(f"{path}: {name} is {quoted(value)}; the test set has {wanted!r}")
+    if missing := [output for output in bounds if output not in predictions]:
         raise InputError(f"{path}: has no {missing[0]}; needed are {', '.join(bounds)}")
     sizes = dict.fromkeys(bounds, truth.sizes["sample"])
-    sizes |= {name: truth.sizes["run"] for name in ("trusted", "seconds") if name in found}
+    sizes |= {name: truth.sizes["run"] for name in ("trusted", "seconds") if name in predictions}
     for name, size in sizes.items():
-        if found[name].shape != (size,) or found[name].dtype.kind not in "biuf":
-            given = f"shape {found[name].shape} and type {found[name].dtype}"
-            raise InputError(f"{path}: {name} has {given}; needed are {size} numbers")
+        values = predictions[name]
+        if values.shape != (size,) or values.dtype.kind not in "biuf":
+            has = f"shape {values.shape} and type {values.dtype}"
+            raise InputError(f"{path}: {name} has {has}; needed are {size} numbers")
 
 
-def _measured(found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> xr.Dataset:
+def _measured(predictions: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> xr.Dataset:
     """Errors and ends of all runs, as a protocol has them of a method."""
     names, ends = truth.attrs["outputs"].split(), np.cumsum(truth["row_size"].values)[:-1]
     full = np.transpose([truth[name].values for name in names])
-    places = [names.index(name) for name in bounds]
+    bounded = [names.index(name) for name in bounds]
+    predicted = np.transpose([predictions[name].values for name in bounds])
     error = np.full(full.shape, np.nan)
-    error[:, places] = np.transpose([found[name].values for name in bounds]) - full[:, places]
+    error[:, bounded] = predicted - full[:, bounded]
 
     def by_run(measure: Callable[[np.ndarray], np.ndarray], histories: np.ndarray) -> tuple:
         # What is finite may be too large to be squared.
@@ -112,9 +116,10 @@ def _measured(found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> xr.Datase
             parts = np.array([measure(part) for part in np.split(histories, ends)])
         return ("scenario", "output"), parts
 
-    finite = np.isfinite(by_run(max_abs, error)[1][:, places]).all(axis=1)
+    finite = np.isfinite(by_run(max_abs, error)[1][:, bounded]).all(axis=1)
     missing = np.full(len(finite), np.nan)
-    trusted = found["trusted"].values > 0 if "trusted" in found else True
+    trusted = predictions["trusted"].values > 0 if "trusted" in predictions else True
+    seconds = predictions["seconds"].values if "seconds" in predictions else missing
     status = np.where(finite, np.where(trusted, "ok", "untrusted"), "diverged")
     return xr.Dataset(
         {
@@ -123,7 +128,7 @@ def _measured(found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> xr.Datase
             "signal_range": by_run(signal_range, full),
             "status": ("scenario", status),
             "trusted_until": ("scenario", missing),
-            "seconds": ("scenario", found["seconds"].values if "seconds" in found else missing),
+            "seconds": ("scenario", seconds),
         },
         {"output": names, "output_unit": ("output", [truth[name].units for name in names])},
     )
@@ -131,17 +136,17 @@ def _measured(found: xr.Dataset, truth: xr.Dataset, bounds: Bounds) -> xr.Datase
 
 def _row(label: str, part: xr.Dataset, bounds: Bounds) -> dict[str, Any]:
     """How the runs of a method keep some bounds."""
-    found = outcomes(part, bounds)
+    ends = outcomes(part, bounds)
     worst = {name: outcomes(part, {name: bounds[name]}).scores.max() for name in bounds}
     return {
         "kind": "method",
         "label": label,
-        "runs": len(found.scores),
-        "misses": int(found.missed.sum()),
-        "silent": int(found.undetected.sum()),
-        "flagged": int(found.warned.sum()),
-        "score": float(found.scores.max()),
-        "median_score": float(np.median(found.scores)),
+        "runs": len(ends.scores),
+        "misses": int(ends.missed.sum()),
+        "silent": int(ends.undetected.sum()),
+        "flagged": int(ends.warned.sum()),
+        "score": float(ends.scores.max()),
+        "median_score": float(np.median(ends.scores)),
         "output": max(worst, key=lambda name: worst[name]),
         "seconds": float(part["seconds"].mean()),
     }

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vehiclemor.failure import Failure
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.provenance import attributes
 from vehiclemor.reduction.interface import FittedModel
@@ -46,16 +46,16 @@ def _declared() -> VariablesFile:
     return read_toml(data_folder() / "results" / "variables.toml", VariablesFile)
 
 
-def variables(found: Mapping[str, object], *dimensions: str) -> dict[str, tuple]:
+def variables(values_by_name: Mapping[str, object], *dimensions: str) -> dict[str, tuple]:
     """Values with unit and meaning, on dimensions and on the quantity that their unit goes with."""
     result: dict[str, tuple] = {}
-    for name, values in found.items():
+    for name, values in values_by_name.items():
         unit, meaning, *clock = _declared().variables[name]
         quantity = unit.removeprefix("see ").removesuffix("_unit")
-        own = () if quantity == unit else (quantity,)
+        of_quantity = () if quantity == unit else (quantity,)
         attributes = ({"units": unit} if unit else {}) | {"long_name": meaning}
         attributes |= {"clock": clock[0]} if clock else {}
-        result[name] = ((*dimensions, *own), values, attributes)
+        result[name] = ((*dimensions, *of_quantity), values, attributes)
     return result
 
 
@@ -94,21 +94,22 @@ def result_dataset(
     many = experiment.keep == "errors"
     runs = [_compared(model, e, s, many) for e, s in zip(outcomes, experiment.test, strict=True)]
     tables = [_measured(model, run) for run in runs]
-    found = tables[0]
+    measured = tables[0]
     if many:
-        found = {name: np.array([table[name] for table in tables]) for name in found}
+        for name in measured:
+            measured[name] = np.array([table[name] for table in tables])
     else:
-        found |= _of_one_run(model, runs[0]) | {"in_training": in_training}
+        measured |= _of_one_run(model, runs[0]) | {"in_training": in_training}
         if model.speeds:
-            found["growth_rate"] = float(getattr(reduced, "spectral_abscissa", np.nan))
+            measured["growth_rate"] = float(getattr(reduced, "spectral_abscissa", np.nan))
     scenarios = ("scenario",) * many
-    counts = {name: found.pop(name) for name in model.counts}
-    described = variables(found, *scenarios) | variables(fit_cost(reduced))
+    counts = {name: measured.pop(name) for name in model.counts}
+    described = variables(measured, *scenarios) | variables(fit_cost(reduced))
     for name, text in model.counts.items():
         described[name] = scenarios, counts[name], {"units": "1", "long_name": text}
     if experiment.keep == "trajectories":
         if (full := runs[0].reference) is not None:
-            # A reference may be kept for further results.
+            # Further results may need the reference.
             described |= variables({"reference_outputs": full.outputs.copy()}, "time")
         dataset = trajectory_dataset(model, runs[0].trajectory, described)
     else:
@@ -116,8 +117,9 @@ def result_dataset(
     if many:
         dataset = dataset.assign_coords(scenario=[scenario.label for scenario in experiment.test])
     title = f"{experiment.method} on {experiment.model}"
-    own = {"cell": experiment.key, "configuration": experiment.configuration}
-    dataset.attrs |= attributes(title, experiment.kernel, **own)
+    dataset.attrs |= attributes(
+        title, experiment.kernel, cell=experiment.key, configuration=experiment.configuration
+    )
     return dataset
 
 
@@ -137,7 +139,7 @@ def _compared(
     return Outcome(missing, missing)
 
 
-def _missing(model: Model, maneuver: Maneuver, failure: Failure) -> Trajectory:
+def _missing(model: Model, maneuver: Excitation, failure: Failure) -> Trajectory:
     times = maneuver.times
     coordinates, speeds, outputs = (
         np.full((len(times), len(names)), np.nan)
@@ -153,39 +155,43 @@ def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
     outputs, times = run.outputs, run.times
     early = np.searchsorted(times, FIRST_SECONDS, side="right")
     landed = np.searchsorted(times, min(LANDED, times[-1]))
-    found: dict[str, object] = {
+    measured: dict[str, object] = {
         "largest_output": max_abs(outputs[:early]),
         "smallest_output": outputs[landed:].min(axis=0),
-        **{name: getattr(run, name) for name in ("seconds", "status", "message", "remark")},
-        **{name: run.counts.get(name, 0) for name in model.counts},
+        "seconds": run.seconds,
+        "status": run.status,
+        "message": run.message,
+        "remark": run.remark,
         "trust_indicator": trust.indicator if trust else np.nan,
         "trusted_until": trust.until if trust else np.inf,
         "warned": run.status == "untrusted" or bool(run.finished and trust and trust.reason),
     }
+    for name in model.counts:
+        measured[name] = run.counts.get(name, 0)
     if full is not None:
         error = outputs - full.outputs
-        found |= {
+        measured |= {
             "rms_error": rms(error),
             "max_error": max_abs(error),
             "signal_range": signal_range(full.outputs),
         }
         if model.coordinates:
-            found["rms_coordinate_error"] = rms(run.coordinates - full.coordinates)
+            measured["rms_coordinate_error"] = rms(run.coordinates - full.coordinates)
         if model.speeds:
-            found["rms_speed_error"] = rms(run.speeds - full.speeds)
-    return found
+            measured["rms_speed_error"] = rms(run.speeds - full.speeds)
+    return measured
 
 
 def _of_one_run(model: Model, outcome: Outcome) -> dict[str, object]:
     """What takes time to find, and is not known of the many runs of a protocol."""
-    run, found = outcome.trajectory, dict[str, object]()
+    run, measured = outcome.trajectory, dict[str, object]()
     if outcome.reference is not None:
         none = np.full(len(model.outputs), np.nan)
-        found["floor_rms_error"] = none if outcome.projection is None else outcome.projection
+        measured["floor_rms_error"] = none if outcome.projection is None else outcome.projection
     if model.kind == "ae":
         residuals = model.values_at("residual", run.coordinates, run.inputs)
-        found["largest_residual"] = float(np.abs(residuals).max())
-    return found
+        measured["largest_residual"] = float(np.abs(residuals).max())
+    return measured
 
 
 def fit_cost(reduced: FittedModel | Failure) -> dict[str, object]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Collection
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
@@ -18,19 +18,34 @@ from vehiclemor.progress import tell, telling
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
-from vehiclemor.study.plans.protocol import Protocol, load_protocol
-from vehiclemor.study.plans.protocol_run import run_protocol
+from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.plans.protocol_run import run_protocol, validation_keys
 from vehiclemor.study.plans.results import combined, grid_digest
 from vehiclemor.study.plans.size import run_size
-from vehiclemor.study.plans.study_file import MOST_SEED, StudyFile
+from vehiclemor.study.plans.study_file import MOST_SEED, ProtocolFile, SizeFile, StudyFile
 from vehiclemor.study.store import combined_path, read_run, result_path, run_path, stored
-from vehiclemor.study.workers import Workers, cluster
+from vehiclemor.study.workers import Engine, Workers, cluster
 
 # Grids of so many points are announced before they are expanded.
 LARGE = 10_000
 LATER = "then the chosen ones are tested"
 # What differs from run to run of one reason.
 NUMBER = re.compile(r"-?\d[\d.e+-]*")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study runs, all names resolved.
+
+    `run` takes the results folder, a number of jobs, and what runs them elsewhere; `keys` gives the
+    keys of the runs that come first, after which a protocol does what `later` says.
+    """
+
+    name: str
+    definition: StudyFile
+    run: Callable[[Path, int, Engine | None], xr.Dataset]
+    keys: Callable[[], Collection[str]]
+    later: str = ""
 
 
 def run_studies(
@@ -45,53 +60,62 @@ def run_studies(
     if jobs > 1 and scheduler:
         raise InputError("jobs: a scheduler has its own workers")
     plans = _plans(study, seed)
-    results: dict[str, xr.Dataset] = {}
     with cluster(scheduler) if scheduler else nullcontext() as elsewhere:
-        for plan in plans:
-            if isinstance(plan, Protocol):
-                results[plan.study] = run_protocol(plan, folder, jobs, elsewhere)
-                continue
-            if isinstance(plan, tuple):
-                results[plan[0]] = run_size(*plan, folder)
-                continue
-            keys = list(plan.experiments)
-            workers = Workers(plan.name, folder, jobs, elsewhere)
-            results[plan.name] = stored(
-                combined_path(folder, plan.name),
-                "cells",
-                grid_digest(plan),
-                partial(_combined, plan, workers),
-                partial(map, partial(run_path, folder), keys),
-                content_hash(plan.definition),
-            )
-            tell(plan.name, len(keys), len(keys))
-    return results
+        return {plan.name: plan.run(folder, jobs, elsewhere) for plan in plans}
 
 
-def _plans(study: str, seed: int | None) -> list[Grid | Protocol | tuple[str, StudyFile]]:
-    """Grids, protocols and size studies of a study or collection, all names resolved."""
+def _plans(study: str, seed: int | None) -> list[Plan]:
+    """Plan of a study, or of every study of a collection."""
     if seed is not None:
         count("seed", seed, least=0, most=MOST_SEED)
     files = studies_and_files(study)
-    if seed is not None and not any(definition.drawn for _, definition in files.values()):
+    if seed is not None and not any(_samples(definition) for _, definition in files.values()):
         raise InputError(f"seed: {study} samples no test runs")
-    plans: list[Grid | Protocol | tuple[str, StudyFile]] = []
-    for name, (path, definition) in files.items():
-        if definition.size:
-            plans.append((name, definition))
-        elif definition.bounds:
-            plans.append(load_protocol(str(path), seed if definition.drawn else None, name))
-        else:
-            large = definition.points >= LARGE
-            text = f"{name}: checking {definition.points} grid points"
-            with telling(text) if large else nullcontext():
-                plans.append(expand(name, definition))
-    return plans
+    return [_plan(name, path, definition, seed) for name, (path, definition) in files.items()]
 
 
-def _combined(grid: Grid, workers: Workers) -> xr.Dataset:
-    workers([[experiment] for experiment in grid.experiments.values()])
-    return combined(grid, workers.folder)
+def _samples(definition: StudyFile) -> bool:
+    return isinstance(definition, ProtocolFile) and definition.drawn is not None
+
+
+def _plan(name: str, path: Path, definition: StudyFile, seed: int | None) -> Plan:
+    if isinstance(definition, SizeFile):
+        run = partial(run_size, name, definition)
+        # Its runs are timed together.
+        return Plan(name, definition, lambda folder, *_: run(folder), keys=tuple)
+    if isinstance(definition, ProtocolFile):
+        own_seed = seed if definition.drawn else None
+        protocol = load_protocol(str(path), own_seed, name)
+        keys = partial(validation_keys, protocol)
+        return Plan(protocol.study, definition, partial(run_protocol, protocol), keys, LATER)
+    large = definition.points >= LARGE
+    text = f"{name}: checking {definition.points} grid points"
+    with telling(text) if large else nullcontext():
+        grid = expand(name, definition)
+    return Plan(name, definition, partial(run_grid, grid), grid.experiments.keys)
+
+
+def run_grid(
+    grid: Grid, folder: Path, jobs: int = 1, elsewhere: Engine | None = None
+) -> xr.Dataset:
+    """Run a grid; what an earlier run has finished is not computed again."""
+    keys = grid.experiments.keys()
+    workers = Workers(grid.name, folder, jobs, elsewhere)
+
+    def run_and_combine() -> xr.Dataset:
+        workers([[experiment] for experiment in grid.experiments.values()])
+        return combined(grid, folder)
+
+    dataset = stored(
+        combined_path(folder, grid.name),
+        "cells",
+        grid_digest(grid),
+        run_and_combine,
+        lambda: (run_path(folder, key) for key in keys),
+        content_hash(grid.definition),
+    )
+    tell(grid.name, len(keys), len(keys))
+    return dataset
 
 
 @dataclass
@@ -128,25 +152,15 @@ def status_of(study: str, folder: Path, seed: int | None = None) -> dict[str, St
     """
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder}: not a folder")
-    found: dict[str, StudyStatus] = {}
-    for plan in _plans(study, seed):
-        if isinstance(plan, tuple):
-            name, definition = plan
-            result = result_path(folder, name, content_hash(definition))
-            found[name] = StudyStatus(1, done=int(result is not None), result=result)
-            continue
-        if isinstance(plan, Protocol):
-            validation, name, later = plan.sets["validation"], plan.study, LATER
-            groups = [entry.experiments(plan.model, validation) for entry in plan.entries]
-            keys = {experiment.key for group in groups for experiment in group}
-        else:
-            name, later, keys = plan.name, "", plan.experiments.keys()
-        result = result_path(folder, name, content_hash(plan.definition))
-        found[name] = _status(keys, folder, StudyStatus(len(keys), result=result, later=later))
-    return found
+    return {plan.name: _status(plan, folder) for plan in _plans(study, seed)}
 
 
-def _status(keys: Iterable[str], folder: Path, status: StudyStatus) -> StudyStatus:
+def _status(plan: Plan, folder: Path) -> StudyStatus:
+    result = result_path(folder, plan.name, content_hash(plan.definition))
+    keys = plan.keys()
+    if not keys:
+        return StudyStatus(1, done=int(result is not None), result=result)
+    status = StudyStatus(len(keys), result=result, later=plan.later)
     examples: dict[tuple[str, str], tuple[str, str]] = {}
     for key in keys:
         try:

@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.checks import check_resolved, checked_maneuver
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.reduction.training import SPEED, TrainingRun, own_speed
 from vehiclemor.registry import component
@@ -48,7 +48,7 @@ class Scenario:
     model's parameters, if it has any; `parameters` are what differs from the model's.
     """
 
-    maneuver: Maneuver
+    maneuver: Excitation
     start: str | tuple[float, ...]
     speed: float | None = None
     parameters: Overrides = ()
@@ -69,8 +69,8 @@ class Scenario:
     @property
     def content(self) -> dict[str, Any]:
         """Everything that determines the run of a given model, for a hash."""
-        own = {} if self.parameters == () else {"parameters": self.parameters}
-        return own | {
+        changed = {} if self.parameters == () else {"parameters": self.parameters}
+        return changed | {
             "maneuver": self.maneuver.name,
             "frequency": self.maneuver.frequency_factor,
             "amplitude": self.maneuver.amplitude_factor,
@@ -95,7 +95,7 @@ class Scenario:
         parameters: Overrides = (),
     ) -> "Scenario":
         """The run of a registered maneuver with two factors: of frequency, of amplitude."""
-        chosen: Maneuver = component("maneuver", maneuver)
+        chosen: Excitation = component("maneuver", maneuver)
         return cls(chosen.perturbed(*factors), start, speed, parameters)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -107,10 +107,10 @@ class Scenario:
 
 # As many as the references that a process keeps.
 @lru_cache(maxsize=1024)
-def _sent(maneuver: Maneuver) -> Maneuver | tuple[str, float, float]:
+def _sent(maneuver: Excitation) -> Excitation | tuple[str, float, float]:
     """What goes to another process: the name of a registered maneuver, and its factors.
 
-    Its functions would be new ones each time: what was fitted or solved with it were not found.
+    Its functions would be new ones each time: fits and references with it would not be reused.
     """
     sent = maneuver.name, maneuver.frequency_factor, maneuver.amplitude_factor
     with suppress(InputError):
@@ -120,8 +120,8 @@ def _sent(maneuver: Maneuver) -> Maneuver | tuple[str, float, float]:
 
 
 @lru_cache(maxsize=1024)
-def _received(sent: Maneuver | tuple[str, float, float]) -> Maneuver:
-    if isinstance(sent, Maneuver):
+def _received(sent: Excitation | tuple[str, float, float]) -> Excitation:
+    if isinstance(sent, Excitation):
         return sent
     name, *factors = sent
     return component("maneuver", name).perturbed(*factors)
@@ -135,11 +135,11 @@ def scenario_text(scenario: Scenario) -> str:
 
 
 @lru_cache(maxsize=1024)
-def input_hash(maneuver: Maneuver) -> str:
+def input_hash(maneuver: Excitation) -> str:
     """Hash of the output times and the inputs at these times; of a signal all there is of it."""
     times = maneuver.times
     if isinstance(maneuver, Signal):
-        parts = [part.tobytes() for part in (times, *maneuver.polynomials)]
+        parts = [part.tobytes() for part in (times, *maneuver.pieces)]
         names = json.dumps(maneuver.inputs).encode()
         return hashlib.sha256(b"".join([names, *parts])).hexdigest()[:16]
     # Adding zero makes -0 and 0 one input.
@@ -148,7 +148,7 @@ def input_hash(maneuver: Maneuver) -> str:
 
 
 class Values(dict[str, Any]):
-    """Values by name that many experiments share: their canonical JSON text is made once."""
+    """Values by name that many experiments share: their canonical JSON text is written once."""
 
     @cached_property
     def text(self) -> str:
@@ -170,12 +170,12 @@ def model_of_run(model: Model, scenario: Scenario) -> Model:
 # More than the runs of a protocol, over which all rows go.
 @lru_cache(maxsize=1024)
 def with_parameters(model: Model, parameters: Overrides) -> Model:
-    """The model with some of its parameters changed; kept, since many runs are of one sample."""
+    """The model with some of its parameters changed; cached, since many runs are of one sample."""
     return reparametrised(model, dict(parameters)) if parameters else model
 
 
 def start_of(model: Model, scenario: Scenario) -> Start:
-    """What a run starts from: a name, or at another speed than the model's own the state (n,)."""
+    """What a run starts from: a name, or at another speed than that of the model the state (n,)."""
     if scenario.speed is None or scenario.speed == own_speed(model_of_run(model, scenario)):
         return scenario.start
     return _state_at(model, (*scenario.parameters, (SPEED, scenario.speed)), scenario.start)

@@ -1,7 +1,8 @@
 """The results folder: a file for each run, and one for each study, with its combined dataset.
 
-Files are written whole and moved into place.  What is not as it was written is quarantined, named,
-and made again.  A combined dataset belongs to a content, not to a name.
+Files appear under their names when they are complete.  What is not as it was written is
+quarantined, named, and computed again.  A combined dataset is identified by a hash of its study
+file.
 
 The file of a run has its arrays as safetensors, all else as JSON in the header, and there a hash of
 the file, so that a part, or a flipped bit, is never read as a result.
@@ -65,8 +66,10 @@ class StoredRun(NamedTuple):
     @property
     def layout(self) -> dict[str, tuple[list[str], tuple[int, ...], str]]:
         """Name -> dimensions, shape and kind of a variable."""
-        entries = self.variables.items()
-        return {name: (found[0], found[1].shape, found[1].dtype.kind) for name, found in entries}
+        return {
+            name: (dimensions, array.shape, array.dtype.kind)
+            for name, (dimensions, array, _) in self.variables.items()
+        }
 
     @property
     def broken(self) -> bool:
@@ -95,8 +98,8 @@ def encoded(dataset: xr.Dataset, key: str) -> bytes:
     coordinates = [str(name) for name in dataset.coords]
     content = {"variables": described, "coordinates": coordinates, "attributes": dataset.attrs}
     header = {"schema": SCHEMA, "key": key, "sha256": ZEROS}
-    whole = save(arrays, header | {"dataset": json.dumps(content, default=_plain)})
-    return _with_hash(whole, ZEROS, hashlib.sha256(whole).hexdigest())
+    file = save(arrays, header | {"dataset": json.dumps(content, default=_plain)})
+    return _with_hash(file, ZEROS, hashlib.sha256(file).hexdigest())
 
 
 def decoded(content: bytes, key: str) -> StoredRun:
@@ -109,15 +112,15 @@ def decoded(content: bytes, key: str) -> StoredRun:
         header = json.loads(content[PREFIX : PREFIX + size])["__metadata__"]
         if (schema := header["schema"]) != SCHEMA:
             raise CorruptError(f"{shortened(schema)!r}, where this version writes {SCHEMA!r}")
-        if (found := header["key"]) != key:
-            raise CorruptError(f"not the result that belongs here, but of {shortened(found)}")
+        if (other := header["key"]) != key:
+            raise CorruptError(f"not the result that belongs here, but of {shortened(other)}")
         digest = header["sha256"]
         if hashlib.sha256(_with_hash(content, digest, ZEROS)).hexdigest() != digest:
             raise CorruptError("what it holds is not what was written")
-        found, arrays = json.loads(header["dataset"]), load(content)
-        run = StoredRun({}, list(found["coordinates"]), dict(found["attributes"]))
+        described, arrays = json.loads(header["dataset"]), load(content)
+        run = StoredRun({}, list(described["coordinates"]), dict(described["attributes"]))
         texts = [*run.coordinates, *run.attributes.values()]
-        for name, entry in found["variables"].items():
+        for name, entry in described["variables"].items():
             if "text" in entry:
                 arrays[name] = np.array(entry["text"], dtype=object).reshape(entry["shape"])
             dimensions, attributes = list(entry["dimensions"]), dict(entry["attributes"])
@@ -254,9 +257,9 @@ def stored(
 ) -> xr.Dataset:
     """What is stored for this key, else what `make` gives, which is then stored.
 
-    That takes the place of the results of another study of that name, which can be combined again.
-    The global `attribute` holds the key, `content` is the hash of a study file.  It is made again
-    if one of the files that it is made from is missing, or a bug has ended a run.
+    That replaces the results of another study of that name, which can be combined again.
+    The global `attribute` holds the key, `content` is the hash of a study file.  `make` is called
+    again if one of its sources is missing, or a bug has ended a run.
     """
     held = global_attributes(path, stored=True)
     if held.get(attribute) == key and all(source.exists() for source in sources()):
@@ -272,7 +275,7 @@ def stored(
     if content:
         dataset = dataset.assign_attrs(content=content)
         if held.get("content", content) != content:
-            _LOG.info("%s: in the place of the results of another %s.toml", path, path.stem)
+            _LOG.info("%s: replaces the results of another %s.toml", path, path.stem)
     write_dataset(dataset, path)
     dataset.encoding["source"] = str(path)
     return dataset

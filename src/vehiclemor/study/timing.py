@@ -1,6 +1,6 @@
 """The timing pass: runs interleaved in one process, medians of rounds, stored by content.
 
-What counts is a whole call of `simulate` with an input that was just made, all states and outputs
+What counts is a call of `simulate` from outside, with a new input, all states and outputs
 delivered, timed from outside: whatever a model works out about an input is part of its call. Inputs
 arrive as signals, piecewise polynomials: making these of a formula takes milliseconds of Python,
 once, for reduced models and full order alike. The same call repeated, and what a model tells of its
@@ -16,7 +16,7 @@ import hashlib
 import json
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,8 +26,8 @@ import xarray as xr
 
 from vehiclemor.codegen.cache import compiler_identity
 from vehiclemor.failure import Failure, attempt
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import signal_of
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.progress import tell
 from vehiclemor.provenance import attributes, machine
@@ -35,7 +35,7 @@ from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread, timed
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.study.evaluate import evaluate, for_run, fresh_fit, kept_fit, model_of
+from vehiclemor.study.evaluate import cached_fit, evaluate, for_run, fresh_fit, model_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.result import variables
 from vehiclemor.study.scenario import model_of_run, start_of
@@ -50,10 +50,10 @@ INPUTS, INPUTS_OF_LONG, LONG_RUN = 3, 2, 2e-3
 # (s) of a fit beside which loading machine code is nothing.
 FITS, FIT_SECONDS, LONG_FIT = 9, 2.0, 1.0
 # Variable -> case against which it is the speed-up, and what of a run; quantiles of its seconds.
-WHOLE, REPEATED, LOOP = 0, 1, 2
+CALL, REPEATED, LOOP = 0, 1, 2
 SPEED_UPS = {
-    "speed_up": ("baseline", WHOLE),
-    "speed_up_strongest": ("strongest", WHOLE),
+    "speed_up": ("baseline", CALL),
+    "speed_up_strongest": ("strongest", CALL),
     "loop_speed_up": ("baseline", LOOP),
     "loop_speed_up_strongest": ("strongest", LOOP),
 }
@@ -67,15 +67,14 @@ def timed_starts(experiments: Mapping[str, Mapping[str, Experiment]], path: Path
         parts = [timed_cases(cases).assign_coords(start=s) for s, cases in experiments.items()]
         return xr.concat(parts, dim="start", join="exact", combine_attrs="override")
 
-    keys = {
-        start: {case: experiment.key for case, experiment in cases.items()}
-        for start, cases in experiments.items()
-    }
+    keys: dict[str, dict[str, str]] = {}
+    for start, cases in experiments.items():
+        keys[start] = {case: experiment.key for case, experiment in cases.items()}
     return stored_timing(path, [keys, CASE_ROUNDS], every_start)
 
 
 def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -> xr.Dataset:
-    """What is stored for this content and machine, or else is made and stored at `path`."""
+    """What is stored for this content and machine, or else what `make` gives, stored at `path`."""
     text = json.dumps([content, machine(), compiler_identity(), INPUTS, INPUTS_OF_LONG, CLOCK])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
     return stored(path, "timing", key, make)
@@ -90,9 +89,9 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
     """
     first = next(iter(experiments.values()))
     samples, start = first.test[0].maneuver.samples, first.test[0].start
-    kept = ["effective_rank", "offline_evaluations", "rms_error", "status"]
-    kept += model_of(first).counts
-    results = [evaluate(experiment)[kept] for experiment in experiments.values()]
+    names = ["effective_rank", "offline_evaluations", "rms_error", "status"]
+    names += model_of(first).counts
+    results = [evaluate(experiment)[names] for experiment in experiments.values()]
     dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop_conflicts")
     dataset = dataset.drop_vars("output_unit").assign_coords(case=list(experiments))
     rounds, what = (CASE_ROUNDS, CASE_ROUNDS), f"from {start}"
@@ -104,11 +103,11 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
         "tolerance": [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()],
     }
     # Round by round, so that a burst of other load on the machine hits both alike.
-    own = np.where(seconds[:, :, 0] > 0.0, seconds[:, :, 0], np.nan)
+    measured = np.where(seconds[:, :, 0] > 0.0, seconds[:, :, 0], np.nan)
     for name, (against, part) in SPEED_UPS.items():
         if against in experiments:
-            baseline = own[:, [list(experiments).index(against)], part]
-            columns[name] = np.median(baseline / own[:, :, part], axis=0)
+            baseline = measured[:, [list(experiments).index(against)], part]
+            columns[name] = np.median(baseline / measured[:, :, part], axis=0)
     return dataset.assign(variables(columns, "case")).assign_attrs(times.attrs)
 
 
@@ -131,20 +130,20 @@ def _dataset(
     experiments: Mapping[str, Experiment], seconds: np.ndarray, offline: list[float], what: str
 ) -> xr.Dataset:
     """Median and quartiles of rounds (rounds, cases, scenarios, parts of `Seconds`)."""
-    whole = seconds[..., WHOLE]
+    of_calls = seconds[..., CALL]
     with warnings.catch_warnings():
         # What was never timed has none.
         warnings.filterwarnings("ignore", "All-NaN slice")
-        quantiles = {n: np.nanquantile(whole, share, axis=0) for n, share in QUANTILES.items()}
+        quantiles = {n: np.nanquantile(of_calls, share, axis=0) for n, share in QUANTILES.items()}
         quantiles["repeated_seconds"] = np.nanmedian(seconds[..., REPEATED], axis=0)
         quantiles["loop_seconds"] = np.nanmedian(seconds[..., LOOP], axis=0)
-    found = variables(quantiles, "case", "scenario")
-    found |= variables({"offline_seconds": offline}, "case")
-    found["seconds"] = found.pop("seconds_median")
+    columns = variables(quantiles, "case", "scenario")
+    columns |= variables({"offline_seconds": offline}, "case")
+    columns["seconds"] = columns.pop("seconds_median")
     first = next(iter(experiments.values()))
     labels = {"case": list(experiments), "scenario": [scenario.label for scenario in first.test]}
     title = f"timing of {first.model}, interleaved, {len(seconds)} rounds, {what}"
-    return xr.Dataset(found, labels, attributes(title, first.kernel, model=first.model))
+    return xr.Dataset(columns, labels, attributes(title, first.kernel, model=first.model))
 
 
 @one_thread()
@@ -164,63 +163,61 @@ def _rounds(
     tests = [(as_signal(model, s.maneuver), start_of(model, s)) for s in scenarios]
     shape = (len(experiments), len(tests))
     wanted = np.ones(shape, dtype=bool) if finished is None else finished.copy()
-    # Each has a name of its own, so that progress never goes back.
+    # The names differ, so that progress never goes back.
     work = f"rounds of times on {model.name}, {what}"
     tell(work, 0, rounds[0] + 1)
     fits = [_warm_fit(model, e, bool(w.any())) for e, w in zip(experiments, wanted, strict=True)]
-    for_test = {
-        (index, place): for_run(reduced, model_of_run(model, scenario))
-        for index, (reduced, _) in enumerate(fits)
-        for place, scenario in enumerate(scenarios)
-    }
+    models = [model_of_run(model, scenario) for scenario in scenarios]
+    for_test: list[list[Any]] = []
+    for reduced, _ in fits:
+        for_test.append([for_run(reduced, changed) for changed in models])
     seconds = np.full((rounds[0] + 1, *shape, len(Seconds._fields)), np.nan)
     for turn in range(rounds[0] + 1):
-        for place, (maneuver, start) in enumerate(tests):
+        for number, (maneuver, start) in enumerate(tests):
             for index, (reduced, _) in enumerate(fits):
                 # The first round loads machine code, and tells how long a run takes.
-                long = turn == 0 or seconds[0, index, place, WHOLE] >= LONG_RUN
-                if reduced is None or not wanted[index, place] or (long and turn > rounds[1]):
+                long = turn == 0 or seconds[0, index, number, CALL] >= LONG_RUN
+                if reduced is None or not wanted[index, number] or (long and turn > rounds[1]):
                     continue
-                simulate = for_test[index, place].simulate
+                simulate = for_test[index][number].simulate
                 inputs = INPUTS_OF_LONG if long else INPUTS
                 measured = attempt(partial(called, simulate, (maneuver, start), inputs))
                 if isinstance(measured, Failure):
-                    wanted[index, place], seconds[:, index, place] = False, np.nan
+                    wanted[index, number], seconds[:, index, number] = False, np.nan
                 else:
-                    seconds[turn, index, place] = measured
+                    seconds[turn, index, number] = measured
         tell(work, turn + 1, rounds[0] + 1)
     return seconds[1:], [offline for _, offline in fits]
 
 
 class Seconds(NamedTuple):
-    """Of a whole call with a new input, of the same call again, and of the loop by its account."""
+    """Of a call with a new input, of the same call again, and of the loop that it reports."""
 
-    whole: float
+    call: float
     repeated: float
     loop: float
 
 
-def as_signal(model: Model, maneuver: Maneuver) -> Maneuver:
+def as_signal(model: Model, maneuver: Excitation) -> Excitation:
     """A maneuver as the signal of its polynomials; a structure's, which takes samples, as it is."""
     if isinstance(maneuver, Signal) or model.kind == "structural":
         return maneuver
-    pieces: Any = signal_of(maneuver).bundle
-    values = {f.name: getattr(maneuver, f.name) for f in fields(Maneuver)}
-    values |= {"frequency_factor": 1.0, "amplitude_factor": 1.0}
-    return Signal(**values, hold="polynomials", pieces=pieces)
+    about = maneuver.name, maneuver.summary, maneuver.inputs, maneuver.duration, maneuver.samples
+    return Signal(*about, hold="polynomials", nominal_pieces=maneuver.pieces)
 
 
-def as_new(maneuver: Maneuver) -> Maneuver:
-    """A maneuver as a user has just made it: nothing is known of its inputs from earlier calls."""
+def as_new(maneuver: Excitation) -> Excitation:
+    """A maneuver as a user has just built it: nothing is known of its inputs from earlier calls."""
     if isinstance(maneuver, Signal):
-        return replace(maneuver, pieces=maneuver.pieces._replace(), kept={})
-    # What is worked out about inputs is looked up by their function.
+        return replace(maneuver, nominal_pieces=maneuver.nominal_pieces._replace())
+    assert isinstance(maneuver, Maneuver)
+    # Cached results are looked up by the function.
     return replace(maneuver, signal=partial(maneuver.signal))
 
 
 def called(
     simulate: Callable[..., Trajectory],
-    run: tuple[Maneuver, *tuple[Any, ...]],
+    run: tuple[Excitation, *tuple[Any, ...]],
     inputs: int,
     *,
     again: bool = True,
@@ -231,8 +228,8 @@ def called(
     """
     maneuver, *further = run
 
-    def delivered(new: Maneuver) -> Trajectory:
-        # Histories are made when they are first read.
+    def delivered(new: Excitation) -> Trajectory:
+        # Histories are computed when they are first read.
         trajectory = simulate(new, *further)
         assert trajectory.outputs is not None
         return trajectory
@@ -240,21 +237,21 @@ def called(
     measured: list[Seconds] = []
     for _ in range(inputs):
         new = as_new(maneuver)
-        trajectory, whole = timed(partial(delivered, new))
+        trajectory, seconds = timed(partial(delivered, new))
         if not trajectory.finished:
             return Failure(trajectory.status, trajectory.message)
         repeated = np.nan
         if again:
             trajectory, repeated = timed(partial(delivered, new))
-        measured.append(Seconds(whole, repeated, trajectory.seconds))
+        measured.append(Seconds(seconds, repeated, trajectory.seconds))
     return Seconds(*np.median(measured[1:], axis=0).tolist())
 
 
 def _warm_fit(
     model: Model, experiment: Experiment, needed: bool
 ) -> tuple[FittedModel | None, float]:
-    """A fitted model, and the median seconds of fits that found their machine code loaded."""
-    fitted = kept_fit(model, experiment)
+    """A fitted model, and the median seconds of fits with their machine code loaded."""
+    fitted = cached_fit(model, experiment)
     if isinstance(fitted, Failure):
         return None, np.nan
     if not needed or fitted.offline.seconds > LONG_FIT:

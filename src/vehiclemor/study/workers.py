@@ -58,7 +58,7 @@ class Done(NamedTuple):
     sent: Mapping[str, bytes] = MappingProxyType({})
 
 
-# What evaluates groups, if so each as a batch of its own.
+# What evaluates groups, if so each as a separate batch.
 Engine = Callable[[Groups, bool], Generator[Done, None, None]]
 
 
@@ -74,7 +74,7 @@ class Workers:
     finished: set[str] = field(default_factory=set)
 
     def __call__(self, groups: Groups) -> None:
-        """Evaluate what is missing; a group stays in one process, where its fit is made once.
+        """Evaluate what is missing; a group stays in one process, where its fit is computed once.
 
         `MachineError` if the machine has failed again and again; what was finished is stored.
         """
@@ -105,16 +105,22 @@ class Workers:
 
     def _missing(self, groups: Groups) -> list[list[Experiment]]:
         """What is not finished, each once."""
-        missing = {e.key: e for group in groups for e in group if e.key not in self.finished}
-        # Two candidates may be the same experiment: `pop` leaves it to the first.
-        parts = [[f for e in group if (f := missing.pop(e.key, None))] for group in groups]
-        return [part for part in parts if part]
+        seen = set(self.finished)
+        missing: list[list[Experiment]] = []
+        for group in groups:
+            part: list[Experiment] = []
+            for experiment in group:
+                # Two candidates may be the same experiment: it stays with the first.
+                if experiment.key not in seen:
+                    seen.add(experiment.key)
+                    part.append(experiment)
+            if part:
+                missing.append(part)
+        return missing
 
-    def _evaluated(self, work: list[list[Experiment]], again: bool) -> Iterator[str]:
+    def _evaluated(self, work: Groups, again: bool) -> Iterator[str]:
         """Evaluate groups; gives how the machine has failed in each, if it has."""
-        # One group of each method first, so that workers compile different loops at a time.
-        first = {id(group) for group in {g[0].method: g for g in reversed(work)}.values()}
-        work.sort(key=lambda group: id(group) not in first)
+        work = one_of_each_method_first(work)
         # Starting processes costs seconds: a handful of groups is quicker without.  But what has
         # killed a worker would kill this process too.
         few = len(work) < 2 * self.jobs and not again
@@ -133,8 +139,23 @@ class Workers:
                 yield done.fault
 
 
+def one_of_each_method_first(groups: Groups) -> list[Sequence[Experiment]]:
+    """Groups in an order in which workers compile different loops at a time."""
+    first: list[Sequence[Experiment]] = []
+    later: list[Sequence[Experiment]] = []
+    methods: set[str] = set()
+    for group in groups:
+        method = group[0].method
+        if method in methods:
+            later.append(group)
+        else:
+            methods.add(method)
+            first.append(group)
+    return first + later
+
+
 def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
-    """Evaluate some experiments, and move each complete file into place."""
+    """Evaluate some experiments, and store each complete file."""
     finished, fault = [], ""
     for experiment in experiments:
         # Another driver may have stored it, or a worker that was killed before it could say so.
@@ -183,9 +204,9 @@ def in_batches(
                 yield Done([], KILLED)
 
 
-def batch_size(groups: Groups, places: int) -> int:
+def batch_size(groups: Groups, workers: int) -> int:
     """Groups of a batch, where so many batches are worked at a time."""
-    return min(max(len(groups) // (EACH * max(places, 1)), 1), LARGEST)
+    return min(max(len(groups) // (EACH * max(workers, 1)), 1), LARGEST)
 
 
 def in_processes(groups: Groups, folder: Path, jobs: int) -> Generator[Done, None, None]:
@@ -243,14 +264,14 @@ def cluster(scheduler: str) -> Iterator[Engine]:
             client: Any = Client(scheduler, timeout=REACH, set_as_default=False)
         except (OSError, TypeError, ValueError) as error:
             reason = str(error)
-            # What is half made closes itself when it is collected: now, as within the next call
+            # An incomplete client closes itself when it is collected: now, as within the next call
             # of dask it would wait for a lock that this call holds.
             error.__traceback__ = None
             gc.collect()
             raise InputError(f"scheduler {scheduler}: can't be reached ({reason})") from None
         with client:
             number = sum(client.nthreads().values())
-            work = f"{number} places for runs" if number else "no worker yet, runs wait"
+            work = f"{number} threads for runs" if number else "no worker yet, runs wait"
             _LOG.info("scheduler %s: %s; dashboard %s", scheduler, work, client.dashboard_link)
             yield partial(on_cluster, client=client)
 
@@ -258,20 +279,22 @@ def cluster(scheduler: str) -> Iterator[Engine]:
 def on_cluster(groups: Groups, alone: bool = False, *, client: Any) -> Generator[Done, None, None]:
     """What `on_worker` gives for each batch.
 
-    If `alone`, each group is a batch of its own, so that one that kills workers harms no other.
+    If `alone`, each group is a separate batch, so that one that kills workers harms no other.
     """
     from concurrent.futures import CancelledError
 
     from distributed import KilledWorker
 
-    def told() -> None:
+    def warn_of_no_worker() -> None:
         if not client.nthreads():
             _LOG.warning("the scheduler has no worker: runs wait for one")
 
     pool = client.get_executor(pure=False)
     size = 1 if alone else batch_size(groups, sum(client.nthreads().values()))
     try:
-        yield from in_batches(pool, on_worker, groups, size, killed=KilledWorker, idle=told)
+        yield from in_batches(
+            pool, on_worker, groups, size, killed=KilledWorker, idle=warn_of_no_worker
+        )
     except CancelledError:
         raise MachineError(
             "the scheduler is lost; what is finished is stored: run again to resume"
@@ -289,7 +312,7 @@ def on_worker(experiments: Sequence[Experiment]) -> Done:
     """As `evaluate_and_store`, on a worker: files are sent."""
     with _turn(), TemporaryDirectory() as name:
         for e in {e.code + e.kernel: e for e in experiments}.values():
-            code = code_digest(e.model, e.method, e.settings)
+            code = code_digest(e.model, e.method)
             if code != e.code or model_of(e).kernel_hash != e.kernel:
                 from distributed import get_worker
 

@@ -10,8 +10,8 @@ from numba.core.errors import NumbaError
 from tests.unit.kernels import kernel
 from vehiclemor.codegen import loop_types
 from vehiclemor.codegen import loops as module
-from vehiclemor.codegen.compiler import compiled_loops, inlined_kernel
-from vehiclemor.codegen.kernels import MachineCode
+from vehiclemor.codegen.compiler import compiled_loops
+from vehiclemor.codegen.kernels import Kernels, MachineCode
 from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, declared_arguments
 from vehiclemor.codegen.loops import Loop, address_of_array, ready
 
@@ -57,9 +57,9 @@ def module_of(text: str, name: str = "made_up_loops") -> ModuleType:
     return made
 
 
-def compiled(*texts: str, name: str = "entry", **given) -> Loop:
+def compiled(*texts: str, name: str = "entry") -> Loop:
     modules = [module_of(text, f"made_up_{k}") for k, text in enumerate(texts)]
-    code = MachineCode(compiled_loops(modules, [name], given))
+    code = MachineCode(compiled_loops(modules, [name]))
     function = next(vars(m)[name] for m in modules if name in vars(m))
     return Loop(name, declared_arguments(function), code)
 
@@ -141,47 +141,50 @@ def double(x, u, constants, result):
     result[0] = 2.0 * x[0] + u[0]
 
 
-def triple(x, u, constants, result):
-    result[0] = 3.0 * x[0] + u[0]
+def half(x, result):
+    result[0] = 0.5 * x[0]
 
 
-KERNEL = kernel(double)
+CALL = """
+def entry(kernels: IntVector, x: Vector, result: Vector) -> Int:
+    call_kernel(kernels, {})
+    return 0
+"""
 
 
-def test_kernels_are_written_where_they_are_called():
-    call = "def entry(x: Vector, result: Vector) -> Int:\n    double({})\n    return 0\n"
-    given = {"double": inlined_kernel(KERNEL)}
+@pytest.mark.parametrize(
+    ("call", "expected"), [("0, x, x, x, result", 4.5), ("1, x, result", 0.75)]
+)
+def test_kernels_are_called_by_address_with_as_many_arrays_as_they_take(call, expected):
+    kernels = Kernels([kernel(double), kernel(half)])
+    addresses = np.array([kernels.address("double"), kernels.address("half")])
     result = np.empty(1)
-    compiled(call.format("x, x, x, result"), **given)(np.array([1.5]), result)
-    assert result == [4.5]
-    for wrong in ("x[::2], x, x, result", "x, 1.0, x, result", "x, x, result"):
-        with pytest.raises(NumbaError, match=r"C-contiguous|double takes"):
-            compiled(call.format(wrong), **given)
+    compiled(CALL.format(call))(addresses, np.array([1.5]), result)
+    assert result == [expected]
 
 
-def test_another_source_kernel_size_or_compiler_is_another_file(monkeypatch):
+@pytest.mark.parametrize("call", ["0, x[::2], x, x, result", "0, x, 1.0, x, result"])
+def test_kernels_take_whole_arrays_alone(call):
+    with pytest.raises(NumbaError, match="C-contiguous"):
+        compiled(CALL.format(call))
+
+
+def test_another_source_entry_or_compiler_is_another_file(monkeypatch):
     names = []
 
     def fetched(name, _):
         names.append(name)
         raise InterruptedError
 
-    def ask(modules=("simulation.path_loops",), kernels=(), sizes=()):
+    def ask(modules=("simulation.path_loops",), entries=("kernel_path",)):
         with pytest.raises(InterruptedError):
-            module._loops.__wrapped__(modules, ("kernel_path",), kernels, sizes)
+            module.loops.__wrapped__(modules, entries)
 
     monkeypatch.setattr(module, "fetched", fetched)
-    other = (("double", kernel(triple)),)
-    for given in (
-        {},
-        {},
-        {"kernels": (("double", KERNEL),)},
-        {"kernels": other},
-        {"sizes": (("N", 1),)},
-        {"sizes": (("N", 2),)},
-        {"modules": ("simulation.integrators.structures", "simulation.path_loops")},
-    ):
-        ask(**given)
+    ask()
+    ask()
+    ask(entries=("lane_path",))
+    ask(modules=("simulation.integrators.structures", "simulation.path_loops"))
     for name in ("source_digest", "compiler_identity"):
         monkeypatch.setattr(module, name, lambda *_: "another")
         ask()

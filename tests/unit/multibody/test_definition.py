@@ -2,12 +2,11 @@
 
 import re
 from dataclasses import replace
-from importlib.metadata import EntryPoint
 
 import pytest
 
+from tests.plugin.installation import registered
 from tests.unit import standard_problems
-from vehiclemor import registry
 from vehiclemor.exceptions import InputError
 from vehiclemor.multibody import definition
 from vehiclemor.registry import component
@@ -44,11 +43,10 @@ def test_a_declaration_that_contradicts_itself_is_one_line(change, message):
 
 
 @pytest.mark.parametrize("value", ["standard_problems", "standard_problems:NAME"])
-def test_what_is_no_definition_is_refused_with_its_entry_point(monkeypatch, value):
+def test_what_is_no_definition_is_refused_with_its_entry_point(value):
     value = f"tests.unit.{value}"
-    entry = EntryPoint("mine", value, registry.GROUPS["model"])
-    monkeypatch.setattr(registry, "_entries", lambda _: {"mine": entry})
-    with pytest.raises(InputError, match=re.escape(f"model 'mine' ({value})")):
+    words = re.escape(f"model 'mine' ({value})")
+    with registered("model", "mine", value), pytest.raises(InputError, match=words):
         component("model", "mine")
 
 

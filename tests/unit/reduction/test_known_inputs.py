@@ -8,7 +8,6 @@ from scipy.signal import lfilter
 
 import vehiclemor as vm
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.polynomials import extent_of
 from vehiclemor.study.plans.protocol import load_protocol, sampled_runs
 
 CAR = "independent_suspension_vehicle"
@@ -103,7 +102,7 @@ def test_the_whole_signal_is_looked_at():
         signal = vm.Signal.from_samples(times, values, hold)
         fine = np.linspace(0.0, 3.0, 300_001)[:-1]
         u = signal.at(fine)
-        found = extent_of(signal)
+        found = signal.extent
         np.testing.assert_allclose(found.low, u.min(axis=0), rtol=0.01, atol=1e-12)
         np.testing.assert_allclose(found.high, u.max(axis=0), rtol=0.01, atol=1e-12)
         quick, shaken = high_passed(u, fine[1], 0.08), high_passed(u, fine[1], 0.02)

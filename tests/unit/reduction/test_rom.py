@@ -40,7 +40,7 @@ def test_it_tells_what_it_is(full, linear, wishbone):
     assert linear.states == ("z0", "z1", "z2", "psi", "X", "Y")
     assert len(linear.state()) == len(linear.states)
     assert wishbone.states == wishbone.model.coordinates
-    assert linear.settings["solver"] == "ros34pw2"
+    assert linear.settings["solver"] == "etdrk4"
     assert len(repr(linear)) < 500
 
 

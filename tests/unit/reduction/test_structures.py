@@ -189,9 +189,8 @@ def test_a_rougher_road_than_trained_is_not_trusted():
 
 
 def test_a_coarse_mesh_is_the_model_with_that_mesh():
-    mesh = "elements_per_bay = 1, shell_size = 0"
     fine = vm.model(TRUCK, {"elements_per_bay": 2.0})
-    rom = vm.reduce(fine, "coarse_mesh", training=[bumps()], mesh=mesh)
+    rom = vm.reduce(fine, "coarse_mesh", training=[bumps()])
     coarse = vm.model(TRUCK, {"elements_per_bay": 1.0})
     assert rom.reduced.order == coarse.size < fine.size
     np.testing.assert_array_equal(rom.simulate(bumps()).outputs, coarse.run(bumps()).outputs)
@@ -209,9 +208,10 @@ WRONG = [
     ("pod", {"control_period": 0.01}, "control_period is below 0.1 s"),
     ("full_order", {"tolerance": 1e9}, "tolerance"),
     ("slow_manifold", {}, "flexible_truck is of kind structural"),
-    ("coarse_mesh", {"mesh": "elements_per_bay = 1.5"}, "elements_per_bay is 1.5"),
-    ("coarse_mesh", {"mesh": "elements_per_bay"}, "coarse_mesh: mesh: "),
-    ("coarse_mesh", {"mesh": "wheels = 3"}, "wheels"),
+    ("coarse_mesh", {"parameters": {"elements_per_bay": 1.5}}, "elements_per_bay is 1.5"),
+    ("coarse_mesh", {"parameters": "elements_per_bay"}, "coarse_mesh: parameters "),
+    ("coarse_mesh", {"parameters": {"wheels": 3}}, "wheels"),
+    ("full_order", {"parameters": {"payload": 3.0}}, "payload is set for each run"),
 ]
 
 

@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.excitation import values_at
 from vehiclemor.inputs.maneuver import Maneuver, smooth
 from vehiclemor.inputs.polynomial_loops import Pieces
-from vehiclemor.inputs.polynomials import ACCURACY, recorded_inputs
-from vehiclemor.inputs.polynomials import signal_of as ready_signal_of
-from vehiclemor.inputs.signal import at
+from vehiclemor.inputs.polynomials import ACCURACY, fitted_pieces
 from vehiclemor.registry import component
 from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.system import Solver
@@ -22,13 +21,9 @@ from vehiclemor.simulation.system import Solver
 LANE_CHANGE = component("maneuver", "lane_change")
 
 
-def signal_of(maneuver: Maneuver) -> Pieces:
-    return ready_signal_of(maneuver).bundle
-
-
 def value(signal: Pieces, t: float) -> float:
     """The first input at one time; at a break point that after it."""
-    return at(signal, np.array([t]))[0, 0]
+    return values_at(signal, np.array([t]))[0, 0]
 
 
 def steered(signal, corners=(), duration=10.0) -> Maneuver:
@@ -45,11 +40,11 @@ def steered(signal, corners=(), duration=10.0) -> Maneuver:
 @given(frequency=st.floats(0.2, 5.0), amplitude=st.floats(-4.0, 4.0))
 def test_polynomials_equal_the_lane_change_at_any_time(frequency, amplitude):
     perturbed = LANE_CHANGE.perturbed(frequency, amplitude)
-    signal, end = signal_of(perturbed), 1.0 + 2.5 / frequency
+    signal, end = perturbed.pieces, 1.0 + 2.5 / frequency
     times = np.sort(np.random.default_rng(1).uniform(0.0, min(end + 0.1, 25.0), 40))
     # 0.03 rad: relative to that, ten digits.
     within = 3e-12 * max(abs(amplitude), 1e-6)
-    np.testing.assert_allclose(at(signal, times), perturbed.at(times), rtol=0, atol=within)
+    np.testing.assert_allclose(values_at(signal, times), perturbed.at(times), rtol=0, atol=within)
     np.testing.assert_allclose(signal.edges, [0.0, 1.0, end, 25.0], rtol=1e-15)
     # Before and after the pulse the input is one constant.
     assert np.diff(signal.first)[[0, 2]].tolist() == [1, 1]
@@ -76,12 +71,12 @@ def test_compiled_loops_read_the_polynomials(solver):
 @pytest.mark.parametrize("at_jump", [0.0, 0.5, 1.0])
 def test_a_jump_has_both_its_values_and_that_at_its_very_time_means_nothing(at_jump):
     step = steered(lambda t: np.where(t == 4.0, at_jump, np.where(t < 4.0, 0.0, 0.02 * t)), (4.0,))
-    signal = signal_of(step)
+    signal = step.pieces
     assert value(signal, 4.0 - 1e-9) == pytest.approx(0.0, abs=1e-12)
     assert value(signal, 4.0) == pytest.approx(0.08, abs=1e-11)
     # Break points may lie close together.
     close = steered(lambda t: np.where(t < 3, 0.0, np.where(t < 3 + 1e-9, 1.0, 2.0)), (3, 3 + 1e-9))
-    found = at(signal_of(close), np.array([2.0, 3 + 5e-10, 4.0]))[:, 0]
+    found = values_at(close.pieces, np.array([2.0, 3 + 5e-10, 4.0]))[:, 0]
     assert found.tolist() == [0.0, 1.0, 2.0]
 
 
@@ -92,8 +87,8 @@ def test_a_jump_has_both_its_values_and_that_at_its_very_time_means_nothing(at_j
 )
 def test_a_corner_that_has_no_name_is_refused(corner):
     with pytest.raises(InputError, match=r"'mine' is not smooth"):
-        signal_of(steered(corner))
-    assert len(signal_of(steered(corner, corners=(4.1,))).edges) == 3
+        fitted_pieces(steered(corner))
+    assert len(steered(corner, corners=(4.1,)).pieces.edges) == 3
 
 
 PULSE = 4.4321
@@ -118,17 +113,17 @@ PULSE = 4.4321
 def test_short_pulses_and_many_periods_are_followed(signal, corners, duration):
     ends = np.concatenate([np.geomspace(1e-12, 1.0, 50), np.linspace(0.0, duration, 501)])
     times = np.sort(np.concatenate([ends, duration - ends, [PULSE]]))
-    found = at(signal_of(steered(signal, corners, duration)), times)[:, 0]
+    found = values_at(steered(signal, corners, duration).pieces, times)[:, 0]
     np.testing.assert_allclose(found, signal(times), rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_a_value_that_is_no_number_is_refused_with_its_time(bad):
     with pytest.raises(InputError, match=r"delta .* t = 7 s"):
-        signal_of(steered(lambda t: np.where(t >= 7.0, bad, 0.0)))
+        fitted_pieces(steered(lambda t: np.where(t >= 7.0, bad, 0.0)))
     # Not at one of the thousand equidistant times, but where the polynomials are made.
     with pytest.raises(InputError, match="not finite"):
-        signal_of(steered(lambda t: np.where((t > 0.6249) & (t < 0.6251), bad, np.cos(t))))
+        fitted_pieces(steered(lambda t: np.where((t > 0.6249) & (t < 0.6251), bad, np.cos(t))))
 
 
 def test_a_maneuver_that_is_linear_in_its_amplitude_is_searched_once():
@@ -141,15 +136,15 @@ def test_a_maneuver_that_is_linear_in_its_amplitude_is_searched_once():
     linear = Maneuver("mine", "", inputs, ("u",), 3.0, 11, smooth, linear_in_amplitude=True)
     general = dataclasses.replace(linear, linear_in_amplitude=False)
     for frequency in (1.0, 2.0):
-        signal_of(linear.perturbed(frequency, 3.0))
+        assert linear.perturbed(frequency, 3.0).pieces
         calls.clear()
-        scaled = signal_of(linear.perturbed(frequency, -0.7))
+        scaled = linear.perturbed(frequency, -0.7).pieces
         assert not calls
-        searched = signal_of(general.perturbed(frequency, -0.7))
+        searched = general.perturbed(frequency, -0.7).pieces
         assert set(calls) == {-0.7}
         np.testing.assert_array_equal(scaled.edges, searched.edges)
         times = np.linspace(0.0, 3.0, 997)
-        found, wanted = (at(signal, times) for signal in (scaled, searched))
+        found, wanted = (values_at(signal, times) for signal in (scaled, searched))
         # Both round off in the powers of the pieces, far below the accuracy of these.
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=0.1 * ACCURACY)
 
@@ -157,6 +152,6 @@ def test_a_maneuver_that_is_linear_in_its_amplitude_is_searched_once():
 def test_a_copy_with_another_signal_is_not_taken_for_linear():
     linear = component("maneuver", "lane_change").perturbed(1.0, 1.5)
     fixed = dataclasses.replace(linear, signal=lambda t, *_: np.sin(t)[:, None], corners=smooth)
-    np.testing.assert_array_equal(recorded_inputs(fixed)[1][:, 0], np.sin(fixed.times))
-    found = at(signal_of(fixed), fixed.times)[:, 0]
+    np.testing.assert_array_equal(fixed.recorded_inputs[1][:, 0], np.sin(fixed.times))
+    found = values_at(fixed.pieces, fixed.times)[:, 0]
     np.testing.assert_allclose(found, np.sin(fixed.times), rtol=0.0, atol=1e-11)

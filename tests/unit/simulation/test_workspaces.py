@@ -16,7 +16,7 @@ from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.simulation.workspaces import MOST_KINDS, Pool, Solver
 
 CASES = {
-    "independent_suspension_vehicle": ("ros34pw2", ("equilibrium", "dropped")),
+    "independent_suspension_vehicle": ("etdrk4", ("equilibrium", "dropped")),
     "double_wishbone": ("newton_lanes", ("equilibrium",)),
 }
 
@@ -55,7 +55,7 @@ def test_threads_do_not_share_what_they_write(name):
 def test_a_run_keeps_its_path_until_it_gives_it_back():
     model = build("independent_suspension_vehicle")
     maneuver, space = component("maneuver", "lane_change"), whole_space(28)
-    own = Solver("ros34pw2", 1e-3)
+    own = Solver("etdrk4", 1e-3)
 
     def run(start: str):
         return model.system.run(maneuver, model.start(start), space, own, 0.0)

@@ -13,8 +13,7 @@ from pydantic import Field
 
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.inputs.checks import checked_maneuver
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import recorded_inputs
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, installed
 from vehiclemor.reduction.learned.learned_loops import Equations
 from vehiclemor.reduction.learned.samples import (
@@ -266,7 +265,7 @@ class LearnedModel(ShortRepr):
         """The same equations for a model whose online parameters are others."""
         return replace(self, states=States.of_model(model))
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """A run at the maneuver's output times, between steps by linear interpolation."""
         table, run = self._run(maneuver, start)
         if self.model.kind == "ae" or run.status != "ok":
@@ -280,11 +279,11 @@ class LearnedModel(ShortRepr):
         trust = trust_of(run.times, used, names)
         return run.judged(trust) if trust.indicator > 1.0 else run
 
-    def _run(self, maneuver: Maneuver, start: Start) -> tuple[np.ndarray, Trajectory]:
+    def _run(self, maneuver: Excitation, start: Start) -> tuple[np.ndarray, Trajectory]:
         """Coordinates and quadratures at the output times, and the run."""
         model = self.model
         maneuver = checked_maneuver(maneuver, model.definition)
-        times, inputs = recorded_inputs(maneuver)
+        times, inputs = maneuver.recorded_inputs
         nothing = np.zeros(len(model.counts), dtype=np.int64)
         if model.kind == "ae":
             model.check_start(start)
@@ -334,7 +333,7 @@ class LearnedModel(ShortRepr):
         learned_loop("evaluated")(self.equations, v, self._buffer(0), results)
         return results
 
-    def _path(self, maneuver: Maneuver, begun: np.ndarray) -> tuple[np.ndarray, int]:
+    def _path(self, maneuver: Excitation, begun: np.ndarray) -> tuple[np.ndarray, int]:
         """Coordinates and quadratures at all steps of a run, and how many rows are reached."""
         steps = max(int(np.ceil(maneuver.duration / self.time_step - 1e-9)), 1)
         halves = 0.5 * self.time_step * np.arange(2 * steps + 1)

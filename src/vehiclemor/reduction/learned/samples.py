@@ -150,7 +150,7 @@ def _of_run(
     What follows is found in the same run; the last sample has none.
     """
     model: Any = run.model
-    maneuver = replace(run.maneuver, samples=(run.maneuver.samples - 1) * steps + 1)
+    maneuver = run.maneuver.subdivided(steps)
     last = maneuver.samples - 1
     first = int(min(skipped / maneuver.duration, 0.5) * last)
     taken = np.arange(first, last, every)

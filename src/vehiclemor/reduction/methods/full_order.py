@@ -1,15 +1,19 @@
-"""The full-order model itself: the baseline of every comparison."""
+"""The full-order model itself: the baseline of every comparison.
+
+A structure on a coarse mesh, `coarse_mesh`, is their null model: larger elements make a cheaper
+model, too.
+"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.exceptions import ConvergenceError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.exceptions import ConvergenceError, InputError
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import Method, OfflineCost, Presets
 from vehiclemor.reduction.projection.structural import StructuralRuns, StructuralSettings
 from vehiclemor.reduction.reduced_system import ReducedMechanism, ReducedSystem
@@ -23,6 +27,7 @@ from vehiclemor.reduction.settings import (
 )
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
+from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import By
@@ -46,10 +51,9 @@ class DynamicSettings(OnlineSettings):
     """How equations of motion are integrated."""
 
     solver: AnyIntegrator = Field(
-        "exponential_adams",
+        "dopri5",
         description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
-        "Jacobians; ros34pw2: W-method of order 3, one Jacobian for all runs; with the same "
-        "etdrk4: exponential method of order 4; exponential_adams: of order 6, for high accuracy",
+        "Jacobians; etdrk4: exponential method of order 4, one Jacobian for all runs",
     )
     tolerance: Tolerance = 1e-8
 
@@ -59,6 +63,17 @@ class FullStructureSettings(StructuralSettings):
 
     solver: Literal["generalised_alpha"] = Field(
         SOLVER, description="of order 2, one step size a run, damped at infinity"
+    )
+    parameters: dict[str, float] = Field(
+        {}, description="values that differ from the model's, of its mesh for example"
+    )
+
+
+class CoarseMeshSettings(FullStructureSettings):
+    """The same with the parameters of a coarse mesh."""
+
+    parameters: dict[str, float] = Field(
+        {"elements_per_bay": 1, "shell_size": 0}, description="parameters of the mesh"
     )
 
 
@@ -88,7 +103,7 @@ class FullOrder:
         return len(self.model.coordinates)
 
     def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """Full-order trajectory at the output times; it may have diverged."""
         how = {"solver": self.solver, "tolerance": self.tolerance, "outputs": outputs}
@@ -143,24 +158,43 @@ class FullOrderStructure(StructuralRuns, FullOrder):
 
     model: StructuralModel
     step_size: float = 0.0
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def order(self) -> int:
         """Number of coordinates."""
-        return self.model.size
+        return self.solved[0].size
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray:
-        """The states themselves."""
-        return states
+    @cached_property
+    def solved(self) -> tuple[StructuralModel, None]:
+        """The model with the parameters that differ, in its own coordinates."""
+        if not self.parameters:
+            return self.model, None
+        return reparametrised(self.model, self.parameters), None
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """The states themselves; another mesh has others."""
+        return None if self.parameters else states
+
+
+def check(model: Model, settings: Any) -> None:
+    """Raise `InputError` if the model can't have the parameters that differ."""
+    different = getattr(settings, "parameters", {})
+    for name in different:
+        if name in model.definition.online:
+            raise InputError(f"parameters: {name} is set for each run, not for a method")
+    if different:
+        reparametrised(model, different)
 
 
 def fit(model: Any, training: Training, settings: Any) -> FullOrder:
     """Nothing is fitted, and no training run is looked at."""
-    own = model, settings.solver, settings.tolerance
+    solver = settings.solver, settings.tolerance
     if model.kind == "structural":
-        return FullOrderStructure(*own, step_size=settings.step_size)
+        further = {"step_size": settings.step_size, "parameters": settings.parameters}
+        return FullOrderStructure(model, *solver, **further)
     kind = FullOrderMechanism if model.kind == "ae" else FullOrderSystem
-    return kind(*own)
+    return kind(model, *solver)
 
 
 METHOD = Method(
@@ -177,6 +211,15 @@ METHOD = Method(
         "structural": _presets(SOLVER, 1e-2, paper={"tolerance": USUAL}),
     },
     fit=fit,
+    check=check,
     learns_from="nothing",
     own_limits=True,
+)
+
+COARSE_MESH = replace(
+    METHOD,
+    name="coarse_mesh",
+    summary="no reduction: larger elements, the null model of structures",
+    settings={"structural": CoarseMeshSettings},
+    presets={},
 )

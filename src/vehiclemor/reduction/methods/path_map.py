@@ -10,7 +10,7 @@ runs only tell between which inputs: the equations are solved in all of that box
 import math
 import time
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import combinations_with_replacement
 from typing import Literal
 
@@ -19,19 +19,20 @@ from numpy.polynomial import chebyshev
 from pydantic import Field
 
 from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
-from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
+from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
 from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value
 from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.exceptions import InputError, UnreachableError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.map_loops import REPORTED, Cells
 from vehiclemor.reduction.reduced_system import ReducedMechanism
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
-from vehiclemor.simulation.algebraic import AlgebraicModel
+from vehiclemor.simulation.algebraic import AlgebraicModel, kinematic_loop
 from vehiclemor.simulation.checks import loop_array
-from vehiclemor.simulation.evaluation import By
+from vehiclemor.simulation.evaluation import By, address_of
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import Samples
 from vehiclemor.simulation.run_timer import timed
@@ -74,15 +75,6 @@ def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -
     for place, column in enumerate(columns):
         listing.store(place, values[column])
     return listing.kernel("polynomials", ("_x", "_coefficients", "_result"))
-
-
-@cache
-def map_loop(inputs: int, moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -> Loop:
-    """Compiled loop of polynomials of that total degree in those of the inputs that move."""
-    sizes = {"INPUTS": inputs, "QUANTITIES": len(columns)}
-    modules = "simulation.newton_loops", "reduction.map_loops"
-    kernels = {"polynomials": map_kernel(moving, degree, columns)}
-    return loops(modules, ("map_path",), kernels, sizes)["map_path"]
 
 
 class PathMapSettings(Settings):
@@ -136,8 +128,8 @@ class PathMapModel(ReducedMechanism):
         return len(self.moving)
 
     @cached_property
-    def _loop(self) -> Loop:
-        return map_loop(len(self.ranges), self.moving, self.degree, self.columns)
+    def _kernel(self) -> Kernel:
+        return map_kernel(self.moving, self.degree, self.columns)
 
     @cached_property
     def _pool(self) -> Pool[Prepared]:
@@ -145,11 +137,13 @@ class PathMapModel(ReducedMechanism):
 
     def _packed(self, given: Ready, size: int) -> Prepared:
         """The loop for some inputs, to be given space of that size."""
-        call = self._loop.prepared(given, self.cells, np.empty(0))
+        polynomials = np.array([address_of(Kernels([self._kernel]), self._kernel.name)])
+        loop = kinematic_loop("map_path", "reduction.map_loops")
+        call = loop.prepared(given, self.cells, polynomials, len(self.columns), np.empty(0))
         call.words[call.address("space") + 1] = size
         return call
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """Polynomials at the maneuver's output times."""
         self.model.check_start(start)
         return self._evaluated(*self.model.sampled(maneuver))
@@ -161,7 +155,7 @@ class PathMapModel(ReducedMechanism):
 
     @cached_property
     def _sensitivity(self) -> Sensitivity:
-        kernel = map_kernel(self.moving, self.degree, self.columns)
+        kernel = self._kernel
         return sensitivity(kernel, kernel.arguments[0], len(self.columns), len(self.ranges))
 
     def slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.settings import Settings
@@ -54,7 +54,7 @@ class ReplayModel(ShortRepr):
         """The same runs, asked for with the online parameters of another model."""
         return replace(self, model=model)
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """The nearest training run: each of them is given back exactly.
 
         The distance adds squares: of the RMS difference of each input, and of the difference of

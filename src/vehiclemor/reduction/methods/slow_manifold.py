@@ -15,14 +15,15 @@ position that is off.
 """
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, offline_cost
-from vehiclemor.reduction.settings import OnlineSettings, Solver, Tolerance
+from vehiclemor.reduction.settings import AnyIntegrator, FallbackSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.fitting import (
@@ -63,7 +64,7 @@ SYMMETRIC = 2
 DECODED = 24
 
 
-class SlowManifoldSettings(OnlineSettings):
+class SlowManifoldSettings(FallbackSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
@@ -95,6 +96,20 @@ class SlowManifoldSettings(OnlineSettings):
     )
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 1e-3
+
+
+class GuardedSettings(SlowManifoldSettings):
+    """The same settings with a fallback."""
+
+    renamed: ClassVar[Mapping[str, str]] = {
+        "safe_solver": "fallback",
+        "safe_tolerance": "fallback_tolerance",
+    }
+
+    fallback: AnyIntegrator = Field(
+        "etdrk4", description="integrator of the full order for runs that are not to be trusted"
+    )
+    tolerance: Tolerance = 2e-3
 
 
 def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings) -> ReducedVehicle:
@@ -220,4 +235,12 @@ METHOD = Method(
     settings=dict.fromkeys(("ode", "dae"), SlowManifoldSettings),
     refusal=no_steered_vehicle,
     fit=fit,
+)
+
+GUARDED = replace(
+    METHOD,
+    name="guarded",
+    summary="slow_manifold where it can be trusted, the full order where not",
+    settings=dict.fromkeys(("ode", "dae"), GuardedSettings),
+    variant_of="slow_manifold",
 )

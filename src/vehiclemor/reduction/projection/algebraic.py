@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
 from vehiclemor.reduction.projection.bases import (
@@ -26,7 +26,7 @@ from vehiclemor.reduction.reduced_system import ReducedMechanism
 from vehiclemor.reduction.settings import Settings, StepTolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.registry import choice
-from vehiclemor.simulation.algebraic import AlgebraicModel, new_counts
+from vehiclemor.simulation.algebraic import AlgebraicModel, kinematic_loop, new_counts
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import SAMPLE, Iteration, Solution
 from vehiclemor.simulation.run_timer import timed
@@ -110,15 +110,16 @@ class AlgebraicProjection(ReducedMechanism):
         )
         iteration = Iteration(self.tolerance, ITERATION_LIMIT, np.inf)
         least_squares = int(self.tests is None)
-        given = (state, subspaces, least_squares, inputs, model.constants, iteration)
-        loop = model.loop("projected_path", "reduction.projection.algebraic_loops")
-        buffer = np.empty(4 * n + len(model.inputs) + n * n + 2 * n * (n + 1))
+        kernels = model.addresses("jacobian_entries", "jacobian_product")
+        given = (state, subspaces, least_squares, inputs, model.constants, kernels, iteration)
+        loop = kinematic_loop("projected_path", "reduction.projection.algebraic_loops")
+        buffer = np.empty(3 * n + 3 * n * (n + 1) + len(model.inputs))
         path, counts = np.full((len(times), n), np.nan), new_counts()
         status, seconds = timed(loop.prepared(*given, Solution(path, counts), buffer))
         failure = (status, int(counts[SAMPLE])) if status else None
         return model.trajectory(times, inputs, path, counts.tolist(), seconds, failure)
 
-    def simulate(self, maneuver: Maneuver, start: Start) -> Trajectory:
+    def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """Solve the reduced equations at the maneuver's output times."""
         times, inputs, _ = self.model.sampled(maneuver)
         return self.solved_at(times, inputs, self.model.start(start))

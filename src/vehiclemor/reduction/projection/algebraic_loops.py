@@ -1,84 +1,84 @@
-"""Reduced solution of algebraic equations along time: a compiled loop with the kernels inlined.
+"""Reduced solution of algebraic equations along time: a compiled loop.
 
 With q = mean + basis qh the reduced equations are W^T Phi(mean + basis qh; u) = 0: W is a constant
 test basis (Petrov-Galerkin), or W = Phi_q basis, fresh in each iteration (least squares by
-Gauss-Newton).  Bases stand by rows, padded with zeros to N x N, so that the compiler knows all
-sizes.
+Gauss-Newton).  Bases of n coordinates stand by rows, padded with zeros to n x n.
 """
 
 from typing import NamedTuple
 
-from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector, matrix, vector
+from vehiclemor.codegen.loop_types import (
+    Cube,
+    Int,
+    IntVector,
+    Matrix,
+    Vector,
+    call_kernel,
+    matrix,
+    vector,
+)
 from vehiclemor.simulation.integrators.dense_solves import small_solve
 from vehiclemor.simulation.newton_loops import (
     CONVERGED,
-    INPUTS,
     SAMPLE,
     SINGULAR,
     Iteration,
-    N,
     Solution,
     all_below,
     failure,
     stopped,
 )
 
-# Number of entries of the Jacobian that are no structural zeros.
-ENTRIES = 0
-INLINED = ("weigh", "decode", "tangent_product", "enter_window")
+# Indices of the kernels: residual and entries of the Jacobian; the product with these.
+ENTRIES, PRODUCT = range(2)
+INLINED = ("weigh", "decode", "basis_product", "enter_window")
 
 
 class Windows(NamedTuple):
     """Subspaces by window."""
 
     first_samples: IntVector  # Window k holds the samples from entry k up to entry k + 1.
-    means: Matrix  # Means (windows, N).
-    # Basis and test basis by rows (windows, N, N).
+    means: Matrix  # Means (windows, n).
+    # Basis and test basis by rows (windows, n, n).
     bases: Cube
     tests: Cube
     ranks: IntVector  # Rows that are used (windows,).
 
 
-def tangent_parts(q: Vector, u: Vector, constants: Vector, result: Vector) -> None:
-    """Entries of the Jacobian, then the residual, into result (ENTRIES + N,)."""
-
-
-def tangent(parts: Vector, column: Vector, result: Vector) -> None:
-    """Jacobian, by its entries, times a column (N,) into result (N,)."""
-
-
 def weigh(test, r, product, reduced):
     """Rows of the test basis times those of the product: the reduced equations."""
+    n = test.shape[1]
     for k in range(r):
         for column in range(r + 1):
-            j, total = column if column < r else N, 0.0
-            for i in range(N):
+            j, total = column if column < r else n, 0.0
+            for i in range(n):
                 total += test[k, i] * product[j, i]
             reduced[k, j] = total
 
 
 def decode(mean, basis, qh, r, q):
     """Full coordinates mean + qh basis into q."""
-    for i in range(N):
+    for i in range(len(q)):
         total = mean[i]
         for j in range(r):
             total += basis[j, i] * qh[j]
         q[i] = total
 
 
-def tangent_product(parts, basis, r, product):
-    """Jacobian times the rows of the basis into rows of the product, the residual into row N."""
+def basis_product(kernels, entries, basis, r, product):
+    """Jacobian times the rows of the basis into rows of the product, the residual into the last."""
+    n = basis.shape[1]
     for k in range(r):
-        tangent(parts, basis[k], product[k])
-    for i in range(N):
-        product[N, i] = parts[ENTRIES + i]
+        call_kernel(kernels, PRODUCT, entries, basis[k], product[k])
+    for i in range(n):
+        product[n, i] = entries[i]
 
 
 def enter_window(mean, basis, r, q, qh):
     """Reduced coordinates of q in a new subspace, and q projected onto it."""
     for j in range(r):
         qh[j] = 0.0
-        for i in range(N):
+        for i in range(len(q)):
             qh[j] += basis[j, i] * (q[i] - mean[i])
     decode(mean, basis, qh, r, q)
 
@@ -89,6 +89,7 @@ def projected_path(
     least_squares: Int,
     inputs: Matrix,
     constants: Vector,
+    kernels: IntVector,
     iteration: Iteration,
     solution: Solution,
     buffer: Vector,
@@ -99,25 +100,26 @@ def projected_path(
     the new subspace.
     """
     path, counts = solution.path, solution.counts
-    q, qh, step = vector(buffer, 0, N), vector(buffer, N, N), vector(buffer, 2 * N, N)
-    u, parts = vector(buffer, 3 * N, INPUTS), vector(buffer, 3 * N + INPUTS, ENTRIES + N)
-    first = 4 * N + INPUTS + ENTRIES
-    product = matrix(buffer, first, N + 1, N)
-    reduced = matrix(buffer, first + N * (N + 1), N, N + 1)
+    n, size = len(q_start), len(q_start) * (len(q_start) + 1)
+    q, qh, step = vector(buffer, 0, n), vector(buffer, n, n), vector(buffer, 2 * n, n)
+    product, reduced = matrix(buffer, 3 * n, n + 1, n), matrix(buffer, 3 * n + size, n, n + 1)
+    # As many as a Jacobian without zeros has.
+    entries = vector(buffer, 3 * n + 2 * size, size)
+    u = vector(buffer, 3 * n + 3 * size, inputs.shape[1])
     iterations = 0
-    for i in range(N):
+    for i in range(n):
         q[i] = q_start[i]
     for window in range(windows.ranks.shape[0]):
         r, mean, basis = windows.ranks[window], windows.means[window], windows.bases[window]
         enter_window(mean, basis, r, q, qh)
         for sample in range(windows.first_samples[window], windows.first_samples[window + 1]):
             counts[SAMPLE] = sample
-            for i in range(INPUTS):
+            for i in range(len(u)):
                 u[i] = inputs[sample, i]
             converged = False
             for _ in range(iteration.limit):
-                tangent_parts(q, u, constants, parts)
-                tangent_product(parts, basis, r, product)
+                call_kernel(kernels, ENTRIES, q, u, constants, entries)
+                basis_product(kernels, entries, basis, r, product)
                 iterations += 1
                 if least_squares:
                     weigh(product, r, product, reduced)
@@ -126,7 +128,7 @@ def projected_path(
                 if not small_solve(reduced, r):
                     return stopped(counts, iterations, iterations, SINGULAR)
                 for j in range(r):
-                    step[j] = reduced[j, N]
+                    step[j] = reduced[j, n]
                     qh[j] -= step[j]
                 decode(mean, basis, qh, r, q)
                 if all_below(step, r, iteration.tolerance):
@@ -134,6 +136,6 @@ def projected_path(
                     break
             if not converged:
                 return stopped(counts, iterations, iterations, failure(q))
-            for i in range(N):
+            for i in range(n):
                 path[sample, i] = q[i]
     return stopped(counts, iterations, iterations, CONVERGED)

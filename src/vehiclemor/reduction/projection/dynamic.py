@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.bases import (
     Basis,
@@ -123,7 +123,7 @@ class DynamicProjection(ReducedSystem):
         return self.restart == "full_model"
 
     def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """Each window from where the one before has ended, or from the state of the full model.
 

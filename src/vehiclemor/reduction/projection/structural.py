@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from vehiclemor.exceptions import ConvergenceError, InputError
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import Structure
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.projection.bases import RankTolerance
@@ -123,7 +123,7 @@ class StructuralRuns(ShortRepr):
         return replace(self, model=model)  # type: ignore[type-var]
 
     def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """A run at the maneuver's output times; it may have diverged."""
         self.model.start(start)

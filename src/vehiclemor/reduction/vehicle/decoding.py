@@ -18,8 +18,7 @@ from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.vector_lanes import LANES, padded
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import extent_of
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.trust import by_factor, inputs_beyond
 from vehiclemor.reduction.vehicle.decoding_loops import (
     BESIDES,
@@ -119,11 +118,11 @@ class TrainingReach:
         shaped("starts", (self.left, n), (self.starts, starts, n), (self.begun, starts))
         shaped("reach", (self.inputs, 3, *self.inputs.shape[1:2]))
 
-    def driven(self, maneuver: Maneuver) -> tuple[float, float]:
+    def driven(self, maneuver: Excitation) -> tuple[float, float]:
         """How far a maneuver's inputs go, 1 at the edge, and when (s) they pass it."""
         if not self.inputs.size:
             return 0.0, np.inf
-        used = float(np.maximum.reduce(extent_of(maneuver).largest / self.inputs, axis=None))
+        used = float(np.maximum.reduce(maneuver.extent.largest / self.inputs, axis=None))
         return used, np.inf if used <= 1.0 else inputs_beyond(maneuver, self.inputs).min()
 
     def settled(self, excited: np.ndarray) -> float:

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.inputs.checks import checked_maneuver
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import recorded_inputs
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
 from vehiclemor.reduction.trust import trust_of
@@ -176,16 +175,16 @@ class ReducedVehicle(ReducedSystem):
         return Decoding(features, self.parameters, *of_shape, self.transient, self.reach)
 
     def path(
-        self, maneuver: Maneuver, start: Start, times: np.ndarray | None = None
+        self, maneuver: Excitation, start: Start, times: np.ndarray | None = None
     ) -> np.ndarray | None:
         """Reduced states (samples, states + 3), if the run comes to its end."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
-        state = self.encode(self.model.start(start), recorded_inputs(maneuver)[1][0])
+        state = self.encode(self.model.start(start), maneuver.recorded_inputs[1][0])
         run = self.run(maneuver, state, times)
         return None if run.failure or not np.isfinite(run.path).all() else run.path
 
     def simulate(
-        self, maneuver: Maneuver, start: Start, outputs: tuple[str, ...] | None = None
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """Integrate the reduced equations, then decode states at the maneuver's output times."""
         maneuver, inputs, driven = self._driven(maneuver)
@@ -200,12 +199,12 @@ class ReducedVehicle(ReducedSystem):
         return found
 
     @cached_property
-    def _driven(self) -> Callable[[Maneuver], tuple[Maneuver, np.ndarray, tuple[float, float]]]:
+    def _driven(self) -> Callable[[Excitation], tuple[Excitation, np.ndarray, tuple[float, float]]]:
         """Of the last maneuvers: checked, inputs at the output times, how far these go."""
 
-        def made(maneuver: Maneuver) -> tuple[Maneuver, np.ndarray, tuple[float, float]]:
+        def made(maneuver: Excitation) -> tuple[Excitation, np.ndarray, tuple[float, float]]:
             maneuver = checked_maneuver(maneuver, self.model.definition)
-            return maneuver, recorded_inputs(maneuver)[1], self.reach.driven(maneuver)
+            return maneuver, maneuver.recorded_inputs[1], self.reach.driven(maneuver)
 
         return lru_cache(MOST_STARTS)(made)
 

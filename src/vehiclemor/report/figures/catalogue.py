@@ -18,7 +18,7 @@ from vehiclemor.report.figures import result_plot, runs, theme
 from vehiclemor.report.result_selection import KINDS, select_point
 from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.loading import is_study, refuse_doubles, studies_and_files
-from vehiclemor.study.plans.study_file import StudyFile
+from vehiclemor.study.plans.study_file import GridFile, ProtocolFile, StudyFile
 from vehiclemor.study.run import run_studies
 
 # Figures that every model has, of all registered methods: study, what is drawn of it.
@@ -64,12 +64,15 @@ def find(name: str, results: Path) -> list[Entry]:
 
 def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
     """What a study lets be drawn: of a protocol the errors over the times."""
-    kinds = ["errors"]
-    if study.keep == "trajectories":
-        outputs = {output.name for output in component("model", study.model).outputs}
-        kinds += ["histories", *["paths"] * (outputs >= set(runs.PATH))]
-    if study.size or study.bounds:
-        kinds = ["size" if study.size else "pareto"]
+    if isinstance(study, GridFile):
+        kinds = ["errors"]
+        if study.keep == "trajectories":
+            kinds.append("histories")
+            outputs = {output.name for output in component("model", study.model).outputs}
+            if outputs >= set(runs.PATH):
+                kinds.append("paths")
+    else:
+        kinds = ["pareto" if isinstance(study, ProtocolFile) else "size"]
     of = path.stem if data_folder() in path.parents else str(path)
     return [Entry(f"{name}-{kind}", kind, of, name) for kind in kinds]
 

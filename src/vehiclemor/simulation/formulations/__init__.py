@@ -7,8 +7,6 @@ loop.
 # Formulation -> kernels that it calls; a kernel of whole steps may come besides.
 FORMULATIONS = {
     "full": ("derivative",),
-    # The full system as seen from the vehicle, for integrators of one Jacobian.
-    "vehicle_frame": ("derivative",),
     "state": ("derivative",),
     "coordinates": ("derivative", "second_order", "speeds"),
 }

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +13,9 @@ from vehiclemor.codegen.operations import Kernel
 from vehiclemor.progress import first_use
 from vehiclemor.registry import choice
 from vehiclemor.simulation.formulations import FORMULATIONS
-from vehiclemor.simulation.integrators import etdrk4, exponential_modes, rodas4, ros34pw2
+from vehiclemor.simulation.integrators import etdrk4, rodas4
 from vehiclemor.simulation.integrators.loop import scratch_end
-from vehiclemor.simulation.integrators.step_kernels import Frame, exponential_step, w_step
+from vehiclemor.simulation.integrators.step_kernels import Frame, exponential_step
 from vehiclemor.simulation.integrators.structures import Control
 
 # Step sizes (s) for which operators are stored.  Where a step and the nearest of them differ more,
@@ -24,13 +23,6 @@ from vehiclemor.simulation.integrators.structures import Control
 STEP_GRID = 2.0 ** (0.125 * np.arange(-128, 25))
 # A run that needs more evaluations of its right-hand side than this for a second goes nowhere.
 MOST_CALLS = 100_000
-
-
-class Stored(NamedTuple):
-    """What is stored of a frozen Jacobian: matrices by step size, and one for all step sizes."""
-
-    operators: np.ndarray
-    shared: np.ndarray = np.zeros((1, 1))
 
 
 @dataclass(frozen=True)
@@ -45,31 +37,12 @@ class Integrator:
     # Makes the kernel of a whole step from the frame and the number of inputs, where it has one.
     step_kernel: Callable[[Frame, int], Kernel] | None = None
     # Makes what is stored of a frozen Jacobian: transposed operators (step sizes, tables, n, n) of
-    # a diagonal block for a kernel of whole steps, else `Stored`.  None for a method with fresh
-    # Jacobians or without any.
-    tables: Callable[[np.ndarray], Any] | None = None
-    formulation: str = "full"  # Of the full system.
+    # a diagonal block.  None for a method with fresh Jacobians or without any.
+    tables: Callable[[np.ndarray], np.ndarray] | None = None
     # Scratch space: vectors and matrices of the system's dimension, and single numbers.
     rows: int = 24
     squares: int = 0
     numbers: int = 16
-
-
-def inverses(jacobian: np.ndarray) -> np.ndarray:
-    """Transposed (step sizes, 1, n, n) of (I - gamma h J)^-1."""
-    matrices = np.eye(len(jacobian)) - ros34pw2.GAMMA * STEP_GRID[:, None, None] * jacobian
-    return np.ascontiguousarray(np.linalg.inv(matrices).swapaxes(1, 2)[:, None])
-
-
-def modal_functions(jacobian: np.ndarray) -> Stored:
-    """Functions of the modes; transposed S and T, and the rest of `exponential_modes.Modes`."""
-    from vehiclemor.simulation.integrators.exponential_adams import PHI
-
-    found, n = exponential_modes.modes(jacobian), len(jacobian)
-    parts = [found.rows.T, found.columns.T, found.rates[None], found.forth[None], found.back[None]]
-    shared = [np.pad(part, ((0, 0), (0, n - part.shape[1]))) for part in parts]
-    tables = exponential_modes.modal_tables(found, STEP_GRID, PHI)
-    return Stored(tables, np.ascontiguousarray(np.vstack(shared)))
 
 
 INTEGRATORS = {
@@ -86,16 +59,8 @@ INTEGRATORS = {
         tableau=rodas4.tableau(),
         squares=2,
     ),
-    "ros34pw2": Integrator(
-        "W-method of order 3, one Jacobian for all runs",
-        3,
-        Control(1.0 / 3.0, 1.0 / 3.0),
-        tableau=ros34pw2.tableau(),
-        step_kernel=w_step,
-        tables=inverses,
-    ),
     "etdrk4": Integrator(
-        "exponential method of order 4, with the same",
+        "exponential method of order 4, one Jacobian for all runs",
         4,
         Control(
             0.175,
@@ -109,25 +74,6 @@ INTEGRATORS = {
         step_kernel=exponential_step,
         tables=partial(etdrk4.exponential_tables, grid=STEP_GRID),
         rows=32,
-    ),
-    "exponential_adams": Integrator(
-        "exponential Adams method of order up to 6, with the same",
-        6,
-        Control(
-            1.0 / 6.0,
-            1.0 / 4.0,
-            shrink_least=0.3,
-            shrink=0.3,
-            grow=3.0,
-            safety=0.8,
-            keep_least=0.97,
-            keep_most=1.18,
-        ),
-        cubic=False,
-        tables=modal_functions,
-        formulation="vehicle_frame",
-        rows=65,
-        numbers=64,
     ),
 }
 

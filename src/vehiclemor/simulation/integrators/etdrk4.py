@@ -151,7 +151,7 @@ def _doubled(functions: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     )
 
 
-def exponential_tables(jacobian: np.ndarray, grid: Sequence[float]) -> np.ndarray:
+def exponential_tables(jacobian: np.ndarray, grid: Sequence[float] | np.ndarray) -> np.ndarray:
     """Tables (step sizes, 7, n, n) of the loops, each matrix transposed.
 
     J; phi_1(z/2) / 2 and phi_2(z/2); phi_1, 2 phi_2, 2 phi_2 - 4 phi_3, 4 phi_3 - phi_2 of

@@ -1,8 +1,8 @@
-"""Kernels that take whole steps of a system with a frozen Jacobian.
+"""A kernel that takes whole steps of a system with a frozen Jacobian.
 
 With two or four dozen states the loops around the stages would take as long as the right-hand side.
-These kernels do a step of `ros34pw2` or `etdrk4` in vectors of known length, and execute the
-right-hand side by its address.  Vectors that stored operators are applied to stand in a frame: the
+This kernel does a step of `etdrk4` in vectors of known length and executes the right-hand side by
+its address.  Vectors that stored operators are applied to stand in a frame: the
 heading is turned to zero, and left and right are replaced by sum and difference.  A vehicle is its
 own mirror image: in these its Jacobian at straight running has two diagonal blocks, one of motions
 that are their own mirror image, one of those that reverse.
@@ -19,7 +19,7 @@ import numpy as np
 
 from vehiclemor.codegen.operations import Kernel, Listing, Value
 from vehiclemor.codegen.vector_lanes import padded
-from vehiclemor.simulation.integrators import etdrk4, ros34pw2
+from vehiclemor.simulation.integrators import etdrk4
 
 # Vectors that a step hands back.
 RESULTS = ("new", "rates", "error")
@@ -236,37 +236,6 @@ class _Step(Listing):
 
 def _total(terms: Sequence[Value]) -> Value:
     return sum(terms[1:], terms[0])
-
-
-@lru_cache(maxsize=8)
-def w_step(frame: Frame, inputs: int) -> Kernel:
-    """A step of `ros34pw2`: first argument (y, f, h, inputs of three stages), result (new, error).
-
-    The second argument is the stored inverse.
-    """
-    tableau, step = ros34pw2.tableau(), _Step(frame, ("y", "f"), 1)
-    n, stages = step.n, ("s0", "s1", "s2", "s3")
-    for name in ("new", "error"):
-        step.at(name)
-    scale = step.let(ros34pw2.GAMMA * step.scalars[0])
-
-    def weighted(row: int, count: int) -> list[tuple[float, str]]:
-        return [(float(tableau[row, j]), stages[j]) for j in range(count)]
-
-    for k, stage in enumerate(stages):
-        rates = "f"
-        if k:
-            step.sum("middle", (1.0, "y"), *weighted(k, k), n=n)
-            step.rates("middle", (k - 1) * inputs, rates := "rates")
-        step.sum("b", (scale, rates), *weighted(4 + k, k), n=n)
-        step.enter("entered", "b")
-        solved = stage if frame.plain else "solved"
-        step.product(solved, 0, "entered", 1.0)
-        if not frame.plain:
-            step.leave(stage, solved)
-    step.sum("new", (1.0, "y"), *weighted(ros34pw2.M, 4), n=n)
-    step.sum("error", *weighted(ros34pw2.E, 4), n=n)
-    return step.made("ros34pw2_step")
 
 
 @lru_cache(maxsize=8)

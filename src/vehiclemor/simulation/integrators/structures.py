@@ -18,14 +18,12 @@ class Equations(NamedTuple):
     """Compiled equations dx/dt = f(x, u).
 
     Addresses of the kernels by place, zero where there is none, and their hoisted constants; the
-    magnitude of each state below which errors count absolutely; numbers of the heading and of pairs
-    of velocities that turn with it, if there are any.
+    magnitude of each state below which errors count absolutely.
     """
 
     kernels: IntVector
     constants: Vector
     error_scale: Vector
-    turning: IntVector
 
 
 class Spans(NamedTuple):
@@ -52,14 +50,12 @@ class Method(NamedTuple):
     """What an integrator needs beside its code.
 
     Its coefficients; step sizes (s) for which operators of a frozen Jacobian are stored, these
-    operators, and what is shared by all step sizes; numbers of the states that the right-hand side
-    depends on.
+    operators; numbers of the states that the right-hand side depends on.
     """
 
     tableau: Matrix
     grid: Vector
     operators: Cube
-    shared: Matrix
     active: IntVector
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -11,9 +11,7 @@ import numpy as np
 from vehiclemor.arguments import number, within
 from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError, blamed
 from vehiclemor.inputs.checks import checked_maneuver
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.polynomials import recorded_inputs
-from vehiclemor.inputs.signal import Signal
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import Structure
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import (
@@ -72,7 +70,7 @@ class Periods:
 
     def march(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         accuracy: tuple[float, float],
         alike: np.ndarray,
         recorded: bool,
@@ -95,7 +93,7 @@ class Periods:
         return self.steps_of(maneuver, every, maneuver.samples, recorded), remark
 
     def steps_of(
-        self, maneuver: Maneuver, every: int, samples: int, recorded: bool = False, begin: int = 0
+        self, maneuver: Excitation, every: int, samples: int, recorded: bool = False, begin: int = 0
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
         """The first samples of a run with so many steps between output times.
 
@@ -128,7 +126,7 @@ class Periods:
             first = end
         return histories, states, np.sum([part[2] for part in parts], axis=0), parts[-1][3]
 
-    def steps(self, maneuver: Maneuver, tolerance: float, alike: np.ndarray) -> tuple[int, str]:
+    def steps(self, maneuver: Excitation, tolerance: float, alike: np.ndarray) -> tuple[int, str]:
         """Steps between output times of this accuracy, and a remark if no step is short enough.
 
         A part of a run, in which its inputs change most, is repeated with half the step, as long as
@@ -138,9 +136,7 @@ class Periods:
         if spacing > LONGEST_SPACING:
             # Few output times would show nothing of what lies between them.
             inner = int(np.ceil(spacing / LONGEST_SPACING))
-            own = {"kept": {}} if isinstance(maneuver, Signal) else {}
-            finer = replace(maneuver, samples=(maneuver.samples - 1) * inner + 1, **own)
-            every, remark = self.steps(finer, tolerance, alike)
+            every, remark = self.steps(maneuver.subdivided(inner), tolerance, alike)
             return inner * every, remark
         every = max(round(spacing / FIRST_STEP), 1)
         least, most = (max(round(spacing / h), 1) for h in (LONGEST_STEP, SHORTEST_STEP))
@@ -164,13 +160,13 @@ class Periods:
         )
 
 
-def spacing_of(maneuver: Maneuver) -> float:
+def spacing_of(maneuver: Excitation) -> float:
     """Time in s between output times."""
     return maneuver.duration / max(maneuver.samples - 1, 1)
 
 
 @lru_cache(maxsize=16)
-def inputs_at_steps(maneuver: Maneuver, every: int) -> np.ndarray:
+def inputs_at_steps(maneuver: Excitation, every: int) -> np.ndarray:
     """Inputs (steps + 1, inputs) of a maneuver with so many steps between output times."""
     times = np.linspace(0.0, maneuver.duration, (maneuver.samples - 1) * every + 1)
     inputs = checked_inputs(maneuver.at(times), times, maneuver.inputs)
@@ -178,7 +174,7 @@ def inputs_at_steps(maneuver: Maneuver, every: int) -> np.ndarray:
     return inputs
 
 
-def liveliest(maneuver: Maneuver, samples: int) -> int:
+def liveliest(maneuver: Excitation, samples: int) -> int:
     """First of so many samples in which the inputs of a maneuver change most."""
     changes = np.diff(inputs_at_steps(maneuver, 1), axis=0) ** 2
     whole = changes.sum(axis=0)
@@ -280,7 +276,7 @@ class StructuralModel(Model):
 
     def simulate(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         start: Start | None = None,
         times: np.ndarray | None = None,
         solver: str | None = None,
@@ -299,7 +295,7 @@ class StructuralModel(Model):
 
     def run(
         self,
-        maneuver: Maneuver,
+        maneuver: Excitation,
         periods: Periods | None = None,
         tolerance: float = USUAL,
         outputs: Names = None,
@@ -317,7 +313,7 @@ class StructuralModel(Model):
         ((histories, states, found, reason), remark), seconds = timed(
             lambda: periods.march(maneuver, (tolerance, step), self._alike, recorded)
         )
-        times, inputs = recorded_inputs(maneuver)
+        times, inputs = maneuver.recorded_inputs
         failure = ""
         if reason:
             reached = int(np.isfinite(histories[:, 0]).sum())

@@ -1,7 +1,7 @@
 """Scores against bounds, and the choice of settings from validation results alone.
 
-Sampled runs on which the full order itself is sensitive are found by rule and reported apart: where
-two integrators of the full order disagree by more than a bound, where the vehicle spins, tips over
+Sampled runs on which the full order itself is sensitive are reported apart, by rule: where two
+integrators of the full order disagree by more than a bound, where the vehicle spins, tips over
 or has a wheel in the air, no error against one of them tells anything of a reduced model.
 """
 
@@ -35,7 +35,7 @@ class Validation:
 
     `stable` is the share of the runs that come to their end; `score` the largest error as a
     multiple of its bound, infinite if a run has failed; `evaluations` of the equations are the mean
-    by the method's own count, which decides among candidates of one method alone.
+    as the method counts them, which decides among candidates of one method alone.
     """
 
     stable: float
@@ -90,15 +90,15 @@ def scores(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> np.ndarray:
 
 def errors_by(dataset: xr.Dataset, output: str, measure: str) -> xr.DataArray:
     """Errors of an output by a measure, see `Bound`."""
-    own = dataset.sel(output=output)
+    of_output = dataset.sel(output=output)
     if measure == "relative":
         # What moves by rounding alone, as roll on a symmetric road, has no error.
-        alike = dataset["output_unit"] == own["output_unit"]
+        alike = dataset["output_unit"] == of_output["output_unit"]
         least = ROUNDING * dataset["signal_range"].where(alike).max("output")
-        size = own["signal_range"]
-        share = (own["rms_error"] / size.where(size > least)).where(size > least, 0.0)
-        return share.where(np.isfinite(own["rms_error"]))
-    return own[f"{measure}_error"]
+        size = of_output["signal_range"]
+        share = (of_output["rms_error"] / size.where(size > least)).where(size > least, 0.0)
+        return share.where(np.isfinite(of_output["rms_error"]))
+    return of_output[f"{measure}_error"]
 
 
 class Outcomes(NamedTuple):
@@ -117,10 +117,10 @@ class Outcomes(NamedTuple):
 
 def outcomes(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> Outcomes:
     """Outcomes of a row in its scenarios."""
-    found, status = scores(dataset, bounds), dataset["status"].values
-    missed = ~(found <= 1.0)
+    multiples, status = scores(dataset, bounds), dataset["status"].values
+    missed = ~(multiples <= 1.0)
     warned = (status != "ok") | np.isfinite(dataset["trusted_until"].values)
-    return Outcomes(found, missed, warned, missed & (status == "ok"))
+    return Outcomes(multiples, missed, warned, missed & (status == "ok"))
 
 
 def choose(results: Sequence[Validation]) -> int:
@@ -141,9 +141,11 @@ def choose(results: Sequence[Validation]) -> int:
 
 def reasons(protocol: Protocol, second: xr.Dataset) -> list[str]:
     """Why each scenario is reported apart, by a second full-order run; empty if it is not."""
-    found = scores(second, protocol.definition.bounds)
-    parts = (second.isel(scenario=index) for index in range(len(found)))
-    return [_reason(protocol, *pair) for pair in zip(parts, found.tolist(), strict=True)]
+    multiples = scores(second, protocol.definition.bounds).tolist()
+    return [
+        _reason(protocol, second.isel(scenario=index), score)
+        for index, score in enumerate(multiples)
+    ]
 
 
 def _reason(protocol: Protocol, run: xr.Dataset, score: float) -> str:
@@ -156,7 +158,7 @@ def _reason(protocol: Protocol, run: xr.Dataset, score: float) -> str:
         if value > limit:
             return f"{output} of the full order reaches {value:.3g}, beyond {limit:g}"
     if protocol.model.kind == "structural":
-        # Its tires are made to leave the road.
+        # Its tires may leave the road.
         return ""
     # A dropped vehicle has landed before.
     least, loads = run["smallest_output"], protocol.model.definition.loads

@@ -20,7 +20,7 @@ from vehiclemor.study.experiment import (
     default_settings,
     make_experiment,
 )
-from vehiclemor.study.plans.study_file import MethodEntry, StudyFile
+from vehiclemor.study.plans.study_file import GridFile, MethodEntry
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER, TEXTS, Sampling, values
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Overrides, Scenario, Values, check, overrides, with_parameters
@@ -40,7 +40,7 @@ class Grid:
     """
 
     name: str
-    definition: StudyFile
+    definition: GridFile
     model: Model
     dimensions: dict[str, list[Any]]
     samples: dict[str, list[float]]
@@ -48,7 +48,7 @@ class Grid:
     experiments: dict[str, Experiment]
 
 
-def expand(name: str, study: StudyFile) -> Grid:
+def expand(name: str, study: GridFile) -> Grid:
     """All experiments of a study; `FileError` if it names something unknown or unfit."""
     try:
         model = build(study.model, overrides=study.parameters)
@@ -58,13 +58,13 @@ def expand(name: str, study: StudyFile) -> Grid:
             _check_histories(model, study, dimensions)
         keys = np.empty([len(entry) for entry in dimensions.values()], KEY)
         experiments: dict[str, Experiment] = {}
-        own = {name: found for name, found in dimensions.items() if name != "label"}
+        axes = {name: points for name, points in dimensions.items() if name != "label"}
         for number, entry in enumerate(study.methods):
-            made = list(_of_method(model, study, entry, _points(own, samples)))
-            # Settings that a method does not have make no further experiments of it.
-            experiments |= {experiment.key: experiment for experiment in made}
-            found = np.array([experiment.key for experiment in made], KEY)
-            keys[..., number] = found.reshape(keys.shape[:-1])
+            of_method = list(_of_method(model, study, entry, _points(axes, samples)))
+            # Settings that a method does not have give no further experiments of it.
+            experiments |= {experiment.key: experiment for experiment in of_method}
+            keys_of_method = np.array([experiment.key for experiment in of_method], KEY)
+            keys[..., number] = keys_of_method.reshape(keys.shape[:-1])
     except PlugInError:
         raise
     except (InputError, GeometryError) as error:
@@ -73,7 +73,7 @@ def expand(name: str, study: StudyFile) -> Grid:
 
 
 def _dimensions(
-    model: Model, study: StudyFile, samples: Mapping[str, list[float]]
+    model: Model, study: GridFile, samples: Mapping[str, list[float]]
 ) -> dict[str, list[Any]]:
     """Name -> values of every dimension, checked."""
     settings = {s for entry in study.methods for s in default_settings(model, entry.method)}
@@ -91,7 +91,7 @@ def _dimensions(
     return dimensions | {"label": list(study.labelled)}
 
 
-def _check_histories(model: Model, study: StudyFile, dimensions: Mapping[str, list[Any]]) -> None:
+def _check_histories(model: Model, study: GridFile, dimensions: Mapping[str, list[Any]]) -> None:
     """Raise `InputError` if the histories of all runs can't be held, or not side by side."""
     names = dimensions.get("maneuver", [study.maneuver or model.definition.maneuver])
     first, *others = [component("maneuver", name) for name in names]
@@ -111,19 +111,22 @@ def _points(
     dimensions: Mapping[str, list[Any]], samples: Mapping[str, list[float]]
 ) -> Iterator[dict[str, Any]]:
     """Name of a dimension, or of what is sampled -> value, at every point."""
-    for place in itertools.product(*dimensions.values()):
-        point = dict(zip(dimensions, place, strict=True))
-        yield point | {name: found[point["sample"]] for name, found in samples.items()}
+    for coordinates in itertools.product(*dimensions.values()):
+        point = dict(zip(dimensions, coordinates, strict=True))
+        for name, values_of_samples in samples.items():
+            point[name] = values_of_samples[point["sample"]]
+        yield point
 
 
 def _of_method(
-    model: Model, study: StudyFile, entry: MethodEntry, points: Iterator[dict[str, Any]]
+    model: Model, study: GridFile, entry: MethodEntry, points: Iterator[dict[str, Any]]
 ) -> Iterator[Experiment]:
     """Experiments of a method at some points; `InputError` if its settings fit at none of them.
 
     Corners of a grid may not fit, such as a rank above the number of snapshots.
     """
-    names, first, fits = set(default_settings(model, entry.method)), "", False
+    names = set(default_settings(model, entry.method))
+    first_refusal, fits = "", False
     factors = tuple((one, other) for one, other in study.training_set)
     for point in points:
         given = entry.settings | {d: point[d] for d in study.grid if d in names}
@@ -143,13 +146,14 @@ def _of_method(
         learned = _training(model, learner, training, test, of_entry)
         experiment = make_experiment(model, entry.method, settings, learned, (test,), study.keep)
         if not fits:
-            found = refusal(model, experiment)
+            failure = refusal(model, experiment)
             # Of a method that refuses the model nothing is set; a bug is a result.
-            fits = found is None or found.status != "rejected" or not settings
-            first = first or (found.message if found else "")
+            fits = failure is None or failure.status != "rejected" or not settings
+            if failure and not first_refusal:
+                first_refusal = failure.message
         yield experiment
     if not fits:
-        raise InputError(first)
+        raise InputError(first_refusal)
 
 
 @lru_cache(maxsize=4096)
@@ -161,7 +165,7 @@ def _complete(model: Model, method: str, given: tuple[tuple[str, Any], ...], pre
 def _checked(
     model: Model, maneuver: str, factors: tuple[float, float], start: str, parameters: Overrides
 ) -> Scenario:
-    """A test scenario; `InputError` if the model can't be run or made so."""
+    """A test scenario; `InputError` if the model can't be built or run so."""
     try:
         with_parameters(model, parameters)
     except VehiclemorError as error:

@@ -11,7 +11,7 @@ from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import write_text
 from vehiclemor.registry import choice
 from vehiclemor.resources import data_folder, data_names
-from vehiclemor.study.plans.study_file import StudyFile
+from vehiclemor.study.plans.study_file import CollectionFile, StudyFile, schema_of
 from vehiclemor.toml_files import FileSchema, fitting, toml_content
 
 # Between entries of a long list.
@@ -35,28 +35,73 @@ def study_path(study: str) -> Path:
     return data_folder() / "studies" / f"{choice('study', study, data_names('studies'))}.toml"
 
 
-def read_study(path: Path) -> StudyFile:
-    """What a file says, and what it takes from the study that it extends.
+def read_study(path: Path) -> StudyFile | CollectionFile:
+    """The study of a file, with what it takes from others; `FileError` if one of them is wrong."""
+    return _validated(path, _merged(path))
 
-    `FileError` if one of them is missing or wrong.
-    """
+
+def _validated(path: Path, content: dict[str, Any]) -> StudyFile | CollectionFile:
+    try:
+        schema = schema_of(content)
+    except InputError as error:
+        raise FileError(f"{path}: {error}") from None
+    # The methods that it names stand among the others.
+    return fitting(path, {key: content[key] for key in content if key != "rows"}, schema)
+
+
+def _merged(path: Path, readers: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Content of a file, with all but the methods of the study that it extends, and with rows."""
     content = toml_content(path)
-    rows, name = content.pop("rows", []), str(content.get("extends", ""))
-    if not isinstance(rows, list) or (rows and not name):
-        raise FileError(f"{path}: rows is a list of labels, of a study that extends another")
-    if name:
-        try:
-            base = toml_content(study_path(name))
-            if "extends" in base or "studies" in base:
-                raise InputError(f"{name} extends a study itself, or is a collection")
-            entries = {e.get("label", e.get("method")): e for e in base.pop("methods", [])}
-            methods = [
-                entries[choice("row of the extended study", str(row), entries)] for row in rows
-            ]
-        except InputError as error:
-            raise FileError(f"{path}: extends: {error}") from None
-        content = base | content | {"methods": [*methods, *content.get("methods", [])]}
-    return fitting(path, content, StudyFile)
+    extended = str(content.get("extends", ""))
+    readers = (*readers, path.resolve())
+    base: dict[str, Any] = {}
+    rows: list[Any] = []
+    key = "extends"
+    try:
+        if extended:
+            base = _other_content(extended, readers)
+        key = "rows"
+        for study, labels in _labels_by_study(content.get("rows", []), extended).items():
+            rows += _methods_of(study, labels, readers)
+    except InputError as error:
+        raise FileError(f"{path}: {key}: {error}") from None
+    methods = content.get("methods", [])
+    if isinstance(methods, list) and (rows or extended):
+        content["methods"] = [*rows, *methods]
+    if "extends" in base:
+        # Its test set is named after the study that has it.
+        content["extends"] = base["extends"]
+    return base | content
+
+
+def _labels_by_study(rows: object, extended: str) -> dict[str, list[Any]]:
+    """Study -> labels of its methods; a list of labels is of the extended study."""
+    if isinstance(rows, list):
+        rows = {extended: rows} if rows else {}
+    if not isinstance(rows, dict) or "" in rows:
+        raise InputError("give a list of labels of the extended study, or a table study -> labels")
+    for study, labels in rows.items():
+        if not isinstance(labels, list):
+            raise InputError(f"{study} has no list of labels")
+    return rows
+
+
+def _other_content(study: str, readers: tuple[Path, ...]) -> dict[str, Any]:
+    """Validated content of another study."""
+    path = study_path(study)
+    if path.resolve() in readers:
+        raise InputError(f"{study} extends itself")
+    content = _merged(path, readers)
+    if isinstance(_validated(path, content), CollectionFile):
+        raise InputError(f"{study} is a collection")
+    return content
+
+
+def _methods_of(study: str, labels: list[Any], readers: tuple[Path, ...]) -> list[dict[str, Any]]:
+    """Those methods of another study that have these labels."""
+    methods = _other_content(study, readers)["methods"]
+    by_label = {method.get("label") or method["method"]: method for method in methods}
+    return [by_label[choice(f"row of {study}", label, by_label)] for label in labels]
 
 
 def load_studies(study: str) -> dict[str, StudyFile]:
@@ -65,16 +110,16 @@ def load_studies(study: str) -> dict[str, StudyFile]:
 
 
 def studies_and_files(study: str) -> dict[str, tuple[Path, StudyFile]]:
-    """As `load_studies`, with the files."""
+    """Study name -> its file and definition; a collection gives all of its members."""
     path = study_path(study)
     definition = read_study(path)
-    if not definition.studies:
+    if not isinstance(definition, CollectionFile):
         return {path.stem: (path, definition)}
     members: dict[str, tuple[Path, StudyFile]] = {}
     for member in definition.studies:
         file = study_path(member)
         content = read_study(file)
-        if content.studies:
+        if isinstance(content, CollectionFile):
             raise FileError(f"{path}: studies.{member} is a collection itself")
         if content in (other for _, other in members.values()):
             raise FileError(f"{path}: studies.{member}: the same study is in it already")
@@ -103,7 +148,7 @@ def content_hash(definition: FileSchema) -> str:
 def write_study(definition: StudyFile, path: Path) -> Path:
     """Write what a study says beyond the defaults as a TOML file."""
     content = definition.model_dump(exclude_defaults=True).items()
-    # Entries of the longest lists stand on lines of their own.
+    # Entries of the longest lists stand on separate lines.
     lines = [f"{name} = {_toml(value, LINE)}" for name, value in content]
     return write_text(path, "\n".join([*lines, ""]))
 

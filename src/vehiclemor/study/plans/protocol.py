@@ -18,13 +18,13 @@ from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
-from vehiclemor.study.plans.loading import read_study, study_path
-from vehiclemor.study.plans.study_file import DRAWN, SETS, MethodEntry, StudyFile
+from vehiclemor.study.plans.loading import load_studies, read_study, study_path
+from vehiclemor.study.plans.study_file import DRAWN, SETS, ProtocolEntry, ProtocolFile
 from vehiclemor.study.plans.study_runs import DECIMALS, Box, Draw, Group
 from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
 
 FULL_ORDER, CONTENDER = "full order", "contender"
-# Of the names of the package's own; the model follows.
+# Of the names of those in the package; the model follows.
 PREFIX = "predictive-"
 # Samples tried for each run before a box counts as too small.
 TRIES = 100
@@ -59,7 +59,7 @@ class Entry:
         return [self.row_label(number) for number in numbers]
 
     def row_label(self, candidate: int) -> str:
-        """Label of a candidate's row; of a full-order method every candidate has its own."""
+        """Label of a candidate's row; of a full-order method every candidate has one."""
         if self.role != FULL_ORDER:
             return self.label
         tolerance = f"{float(self.candidates[candidate].get('tolerance', 0.0)):.1e}"
@@ -72,7 +72,7 @@ class Protocol:
 
     name: str
     path: Path
-    definition: StudyFile
+    definition: ProtocolFile
     model: Model
     sets: dict[str, Scenarios]
     entries: tuple[Entry, ...]
@@ -108,7 +108,7 @@ def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protoc
     """
     path = study_path(study)
     definition = read_study(path)
-    if not definition.bounds:
+    if not isinstance(definition, ProtocolFile):
         raise FileError(f"{path}: has no bounds")
     seed = definition.seed if seed is None else seed
     try:
@@ -119,7 +119,7 @@ def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protoc
         raise FileError(f"{path}: {error}") from None
 
 
-def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protocol:
+def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Protocol:
     model = build(definition.model, overrides=definition.parameters)
     straight = definition.straight
     outputs = [*definition.bounds, *definition.reported, *definition.sensitive]
@@ -131,12 +131,14 @@ def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protoc
         parts = [_checked(model, f"{key}, group {n}", _of_group, group) for n, group in groups]
         sets[key] = tuple(itertools.chain(*parts))
     seen: dict[tuple, str] = {}
-    for key, scenario in ((key, scenario) for key, part in sets.items() for scenario in part):
-        # What a method has learned from or was chosen by can't test it.
-        if (run := scenario.run_key) in seen:
-            raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
-        seen[run] = key
-    draws = {key: draw for key in DRAWN if (draw := getattr(definition, key))}
+    for key, part in sets.items():
+        for scenario in part:
+            # What a method has learned from or was chosen by can't test it.
+            run = scenario.run_key
+            if run in seen:
+                raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
+            seen[run] = key
+    draws = definition.draws
     for key, draw in draws.items():
         for number, box in enumerate(draw.boxes, start=1):
             _checked(model, f"{key}, box {number}", _corners, box)
@@ -152,10 +154,10 @@ def _resolved(name: str, path: Path, definition: StudyFile, seed: int) -> Protoc
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *labels]
         if definition.extends and target.against not in known:
-            base = ", ".join(read_study(study_path(definition.extends)).labelled)
+            (base,) = load_studies(definition.extends).values()
             raise InputError(
                 f"a target is against {target.against!r}, a row of {definition.extends}: "
-                f"rows is needed and must name its method, of {base}"
+                f"rows is needed and must name its method, of {', '.join(base.labelled)}"
             )
         choice("row that a target is against", target.against, known)
     return Protocol(name, path, definition, model, sets, entries, seed)
@@ -183,9 +185,9 @@ def _of_group(model: Model, group: Group) -> list[Scenario]:
     points = group.points or [[frequency, size, *speed] for frequency, size, speed in products]
     samples = itertools.product(*group.parameters.values())
     tables = [overrides(dict(zip(group.parameters, sample, strict=True))) for sample in samples]
-    own = own_speed(model)
+    usual_speed = own_speed(model)
     return [
-        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else own, table)
+        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else usual_speed, table)
         for point in points
         for start in group.start or model.starts[:1]
         for table in tables
@@ -196,8 +198,8 @@ def _corners(model: Model, box: Box) -> list[Scenario]:
     """Scenarios of the corners of a box, and one of every start, end of members and parameters."""
     starts, speeds = box.start or list(model.starts[:1]), box.speed or [None]
     factors = list(itertools.product(box.frequency, box.amplitude))
-    ends = [{name: limits[end] for name, limits in box.parameters.items()} for end in (0, 1)]
-    low, high = (overrides(table) for table in ends)
+    low = overrides({name: limits[0] for name, limits in box.parameters.items()})
+    high = overrides({name: limits[1] for name, limits in box.parameters.items()})
     members = [f"{box.maneuver}:{number}" for number in box.members or ()] or [box.maneuver]
     corners = itertools.product(members[:1], factors, starts[:1], speeds, [low])
     others = itertools.product(members[:1], factors[:1], starts[1:], speeds[:1], [low])
@@ -205,14 +207,13 @@ def _corners(model: Model, box: Box) -> list[Scenario]:
     return [Scenario.of(*corner) for corner in (*corners, *others, *further)]
 
 
-def _entry(model: Model, entry: MethodEntry, training: Scenarios) -> Entry:
-    label = entry.label or entry.method
-    where = f"method {label!r}"
+def _entry(model: Model, entry: ProtocolEntry, training: Scenarios) -> Entry:
+    where = f"method {entry.name!r}"
     candidates: list[Settings] = []
-    for given in entry.candidates:
-        own: dict[str, object] = dict(given)
-        preset = str(own.pop("preset", entry.preset))
-        complete = complete_settings(model, entry.method, {**entry.settings, **own}, preset)
+    for candidate in entry.candidates:
+        settings = {**entry.settings, **candidate}
+        preset = str(settings.pop("preset", entry.preset))
+        complete = complete_settings(model, entry.method, settings, preset)
         # Of a method that refuses the model all candidates are empty.
         if complete and complete in candidates:
             raise InputError(f"{where} has the same candidate twice")
@@ -223,23 +224,23 @@ def _entry(model: Model, entry: MethodEntry, training: Scenarios) -> Entry:
     for name in learned:
         choice(f"maneuver in the training of {where}", name, known)
     runs = tuple(run for run in training if not learned or run.maneuver.name in learned)
-    return Entry(label, entry.method, entry.role, tuple(candidates), runs)
+    return Entry(entry.name, entry.method, entry.role, tuple(candidates), runs)
 
 
 def sampled_sets(protocol: Protocol) -> dict[str, Scenarios]:
     """Sampled sets by name; none of their runs is one of training or validation."""
     # What is listed for other ends may be sampled again: else a list could strike runs from a set.
     known = [*protocol.sets["training"], *protocol.sets["validation"]]
-    found: dict[str, Scenarios] = {}
+    sets: dict[str, Scenarios] = {}
     for number, name in enumerate(DRAWN):
         if draw := getattr(protocol.definition, name):
             seeds = protocol.seed, protocol.definition.version, number
             try:
-                found[name] = sampled_runs(protocol.model, draw, seeds, known)
+                sets[name] = sampled_runs(protocol.model, draw, seeds, known)
             except InputError as error:
                 raise FileError(f"{protocol.path}: {error}") from None
-            known += found[name]
-    return found
+            known += sets[name]
+    return sets
 
 
 def sampled_runs(
@@ -252,16 +253,17 @@ def sampled_runs(
     # Of the generator only `random` is used: NumPy may change how the other functions sample.
     generator = np.random.Generator(np.random.PCG64(seeds))
     shares = np.cumsum([box.share for box in draw.boxes])
-    seen, found = {scenario.run_key for scenario in known}, list[Scenario]()
+    seen = {scenario.run_key for scenario in known}
+    runs: list[Scenario] = []
     for _ in range(TRIES * draw.runs):
-        place = generator.random() * shares[-1]
-        box = draw.boxes[int(np.searchsorted(shares, place, side="right"))]
+        share = generator.random() * shares[-1]
+        box = draw.boxes[int(np.searchsorted(shares, share, side="right"))]
         scenario = _sampled_run(model, box, generator.random)
         if scenario.run_key not in seen:
             seen.add(scenario.run_key)
-            found.append(scenario)
-        if len(found) == draw.runs:
-            return tuple(found)
+            runs.append(scenario)
+        if len(runs) == draw.runs:
+            return tuple(runs)
     raise InputError(f"the boxes hold fewer than {draw.runs} different runs")
 
 

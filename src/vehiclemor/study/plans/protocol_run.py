@@ -8,6 +8,8 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -52,15 +54,14 @@ def run_protocol(
     validation = protocol.sets["validation"]
     rows = validate(protocol, protocol.entries, validation, workers)
     rows = with_winner(protocol, rows, path)
-    experiments = [
-        [row.entry.experiment(model, row.candidate, scenarios) for scenarios in sets.values()]
-        for row in rows
-    ]
+    experiments: list[list[Experiment]] = []
+    for row in rows:
+        test = partial(row.entry.experiment, model, row.candidate)
+        experiments.append([test(scenarios) for scenarios in sets.values()])
     workers(experiments)
-    found = {
-        name: [workers.result(of_row[number]) for of_row in experiments]
-        for number, name in enumerate(sets)
-    }
+    results: dict[str, list[xr.Dataset]] = {}
+    for number, name in enumerate(sets):
+        results[name] = [workers.result(of_row[number]) for of_row in experiments]
     seconds = {name: second_runs(protocol, sets[name]) for name in DRAWN if name in sets}
     workers([[experiment] for experiment in seconds.values()])
     apart = {name: reasons(protocol, workers.result(e)) for name, e in seconds.items()}
@@ -72,7 +73,7 @@ def run_protocol(
     # A run whose result in the test set is a failure is not timed.
     judged = judged_set(sets)
     sample = protocol.timed_runs(len(sets[judged]))
-    ends = np.array([row["status"].values[sample] for row in found[judged]])
+    ends = np.array([row["status"].values[sample] for row in results[judged]])
     tests = tuple(sets[judged][run] for run in sample)
     timed = _timed(protocol, rows, tests, np.isin(ends, FINISHED), path)
     keys = sorted(workers.asked)
@@ -81,7 +82,7 @@ def run_protocol(
         path,
         "cells",
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
-        lambda: protocol_dataset(protocol, rows, found, timed, apart),
+        lambda: protocol_dataset(protocol, rows, results, timed, apart),
         lambda: (run_path(folder, key) for key in keys),
         content_hash(protocol.definition),
     )
@@ -93,6 +94,13 @@ def second_runs(protocol: Protocol, scenarios: Scenarios) -> Experiment:
     preset = "recommended" if model.kind == "ae" else "paper"
     settings = complete_settings(model, "full_order", preset=preset)
     return make_experiment(model, "full_order", settings, (), scenarios, "errors")
+
+
+def validation_keys(protocol: Protocol) -> set[str]:
+    """Keys of the runs that the choice of candidates needs, which come first."""
+    validation = protocol.sets["validation"]
+    groups = (entry.experiments(protocol.model, validation) for entry in protocol.entries)
+    return {experiment.key for experiment in chain.from_iterable(groups)}
 
 
 def validate(
@@ -108,8 +116,8 @@ def validate(
     workers(experiments)
     rows: list[Row] = []
     for entry, candidates in zip(entries, experiments, strict=True):
-        found = map(workers.result, candidates)
-        results = tuple(validation_of(each, bounds, model.evaluations) for each in found)
+        datasets = map(workers.result, candidates)
+        results = tuple(validation_of(data, bounds, model.evaluations) for data in datasets)
         every = entry.role == FULL_ORDER
         chosen = range(len(candidates)) if every else [choose(results)]
         rows += [Row(entry, candidate, results) for candidate in chosen]
@@ -119,8 +127,8 @@ def validate(
 def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row]:
     """The rows, one of them marked as chosen among the contenders, by validation alone.
 
-    Of those that leave room to the bounds (`choice.MARGIN_OF_CHOSEN`) the one whose whole calls
-    take the least time, by our clock, on the validation set, of times that are nearly the same
+    Of those that leave room to the bounds (`choice.MARGIN_OF_CHOSEN`) the one whose calls take
+    the least time, by our clock, on the validation set, of times that are nearly the same
     (`choice.TIE_OF_TIMES`) the more accurate; if there is none, the one of the smallest score.
     """
     racing = [row for row in rows if row.entry.role == CONTENDER]

@@ -1,4 +1,4 @@
-"""Combined datasets: every run of a grid at its place, every row of a protocol on its tests."""
+"""Combined datasets: all runs of a grid on its dimensions, all rows of a protocol on its tests."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ QUANTITIES = ("output", "coordinate", "speed")
 
 
 def grid_digest(grid: Grid) -> str:
-    """Hash of a study and its runs at their places, for a combined dataset to be current."""
+    """Hash of a study and the keys of its runs, for a combined dataset to be current."""
     digest = hashlib.sha256(grid.definition.model_dump_json().encode())
     digest.update(layout_digest().encode())
     digest.update(grid.keys.tobytes())
@@ -39,51 +39,58 @@ def grid_digest(grid: Grid) -> str:
 def combined(grid: Grid, folder: Path) -> xr.Dataset:
     """All runs of a grid put together; `FileError` if one is missing, corrupt or foreign."""
     names, keys = tuple(grid.dimensions), grid.keys
-    found, numbers = np.unique(keys, return_inverse=True)
+    different, numbers = np.unique(keys, return_inverse=True)
+    # One run may stand at several points: points sorted by the number of their run.
     order = np.argsort(numbers, axis=None, kind="stable")
-    ends = np.cumsum(np.bincount(numbers.ravel(), minlength=len(found)))
-    first = read_run(folder, found[0].decode())
+    ends = np.cumsum(np.bincount(numbers.ravel(), minlength=len(different)))
+    run_keys = different.astype(str).tolist()
+    first = read_run(folder, run_keys[0])
     template = first.dataset()
-    # Texts of any length.
-    arrays = {
-        str(name): np.empty(keys.shape + v.shape, object if v.dtype.kind in "OU" else v.dtype)
-        for name, v in template.data_vars.items()
-    }
-    for key, flat in zip(found.astype(str), np.split(order, ends[:-1]), strict=True):
-        places = np.unravel_index(flat, keys.shape)
+    arrays: dict[str, np.ndarray] = {}
+    for name, variable in template.data_vars.items():
+        # Texts of any length.
+        dtype = object if variable.dtype.kind in "OU" else variable.dtype
+        arrays[str(name)] = np.empty(keys.shape + variable.shape, dtype)
+    for key, points in zip(run_keys, np.split(order, ends[:-1]), strict=True):
+        indices = np.unravel_index(points, keys.shape)
         run = read_run(folder, key)
         if run.layout != first.layout:
             raise CorruptError("not a run of the same model", run_path(folder, key), MEND)
         for name, array in arrays.items():
-            array[places] = run.variables[name][1][()]
-    whole = {
+            array[indices] = run.variables[name][1][()]
+    columns = {
         name: (names + template[name].dims, array, template[name].attrs)
         for name, array in arrays.items()
     }
-    whole |= variables({"cell_key": keys.astype(str).astype(object)}, *names)
+    columns |= variables({"cell_key": keys.astype(str).astype(object)}, *names)
     coordinates = {str(name): variable for name, variable in template.coords.items()}
-    dataset = xr.Dataset(whole, _coordinates(grid) | coordinates)
-    own = {"training": grid.definition.trained_on}
-    return _with_attributes(dataset, grid.name, grid.definition, grid.model, **own)
+    dataset = xr.Dataset(columns, _coordinates(grid) | coordinates)
+    return _with_attributes(
+        dataset, grid.name, grid.definition, grid.model, training=grid.definition.trained_on
+    )
 
 
 def _with_attributes(
     dataset: xr.Dataset, study: str, definition: StudyFile, model: Model, **further: object
 ) -> xr.Dataset:
-    own = {"study": study, "model": model.name}
-    own["configuration"] = definition.model_dump_json(exclude_defaults=True)
-    found = attributes(definition.title, model.kernel_hash, **own, **further)
-    return dataset.assign_attrs(found)
+    configuration = definition.model_dump_json(exclude_defaults=True)
+    of_study = {"study": study, "model": model.name, "configuration": configuration}
+    return dataset.assign_attrs(
+        attributes(definition.title, model.kernel_hash, **of_study, **further)
+    )
 
 
 def _coordinates(grid: Grid) -> dict[str, Any]:
     """Values of the dimensions, and of what is sampled; with meanings."""
-    found = {name: (name, values) for name, values in grid.dimensions.items()}
-    found |= {name: ("sample", values) for name, values in grid.samples.items()}
-    found["method"] = "label", [entry.method for entry in grid.definition.methods]
+    values: dict[str, tuple[str, list[Any]]] = {}
+    for name, points in grid.dimensions.items():
+        values[name] = name, points
+    for name, points in grid.samples.items():
+        values[name] = "sample", points
+    values["method"] = "label", [entry.method for entry in grid.definition.methods]
     return {
-        name: (dimension, values, described(grid.model, name))
-        for name, (dimension, values) in found.items()
+        name: (dimension, points, described(grid.model, name))
+        for name, (dimension, points) in values.items()
     }
 
 
@@ -113,12 +120,16 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
             rows = rows.drop_vars(f"{quantity}_unit")
         rows = rows.stack(cell=[d for d in rows.dims if d not in QUANTITIES]).reset_index("cell")
         parts.append(rows.assign_coords(study=("cell", [name] * rows.sizes["cell"])))
-    labels = sorted({str(c) for part in parts for c in part.coords if part[c].dims == ("cell",)})
-    for place, part in enumerate(parts):
+    labels: set[str] = set()
+    for part in parts:
+        labels |= {str(name) for name in part.coords if part[name].dims == ("cell",)}
+    complete: list[xr.Dataset] = []
+    for part in parts:
         missing = "cell", np.full(part.sizes["cell"], np.nan)
-        parts[place] = part.assign_coords({n: missing for n in labels if n not in part.coords})
+        absent = sorted(labels.difference(map(str, part.coords)))
+        complete.append(part.assign_coords(dict.fromkeys(absent, missing)))
     # Models differ in their quantities and counts: what a row does not have is missing in it.
-    dataset = xr.concat(parts, dim="cell", coords="minimal", compat="override", join="outer")
+    dataset = xr.concat(complete, dim="cell", coords="minimal", compat="override", join="outer")
     for quantity in (name for name in QUANTITIES if name in dataset.dims):
         column = [units[quantity][label] for label in dataset[quantity].values.tolist()]
         meaning = {"long_name": f"SI unit of the {quantity}"}
@@ -130,63 +141,75 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
 def protocol_dataset(
     protocol: Protocol,
     rows: Sequence[Row],
-    found: dict[str, list[xr.Dataset]],
+    results: dict[str, list[xr.Dataset]],
     timed: xr.Dataset,
     apart: Mapping[str, list[str]],
 ) -> xr.Dataset:
     """Results of all rows on the dimensions `label`, `scenario` and `output`.
 
-    Given by set are the results of the rows, and why scenarios are not judged; `timed` has
+    By set, `results` are those of the rows, `apart` says why scenarios are not judged; `timed` has
     those of the scenarios that are judged which the protocol times.
     """
     parts: list[xr.Dataset] = []
-    for name, datasets in found.items():
+    for name, datasets in results.items():
         number = datasets[0].sizes["scenario"]
         of_run = {"scenario_set": [name] * number, "apart": apart.get(name, [""] * number)}
         part = xr.concat(datasets, dim="label", combine_attrs="override")
         parts.append(part.assign_coords(variables(of_run, "scenario")))
     # What does not depend on the scenario is the same in every set, but for seconds.
     fixed = [n for n, v in parts[0].data_vars.items() if "scenario" not in v.dims]
-    rest = [part.drop_vars(fixed) for part in parts]
-    dataset = xr.concat(rest, dim="scenario", combine_attrs="override").merge(parts[0][fixed])
-    # How the files store text holds for their own longest words only.
+    by_scenario = [part.drop_vars(fixed) for part in parts]
+    dataset = xr.concat(by_scenario, dim="scenario", combine_attrs="override")
+    dataset = dataset.merge(parts[0][fixed])
+    # How the files store text holds for the longest words in each of them only.
     dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
-    cells = [
-        {name: sets[index].attrs["cell"] for name, sets in found.items()}
-        for index in range(len(rows))
-    ]
-    per_row: dict[str, list[Any]] = {
-        "role": [row.entry.role for row in rows],
-        "series": [row.entry.label for row in rows],
-        "winner": [row.winner for row in rows],
-        "method": [row.entry.method for row in rows],
-        "settings": [json.dumps(row.settings, sort_keys=True) for row in rows],
-        "cell_keys": [json.dumps(keys) for keys in cells],
-        "validation": [_validation(row) for row in rows],
-        "validation_score": [row.result.score for row in rows],
-        "offline_seconds": [float(value) for value in timed["offline_seconds"]],
-    }
+    per_row: dict[str, list[Any]] = {"offline_seconds": timed["offline_seconds"].values.tolist()}
+    for index, row in enumerate(rows):
+        keys = {name: datasets[index].attrs["cell"] for name, datasets in results.items()}
+        record = _record(row) | {"cell_keys": json.dumps(keys)}
+        for name, value in record.items():
+            per_row.setdefault(name, []).append(value)
     dataset = dataset.assign(variables(per_row, "label")).set_coords("method")
     dataset = dataset.assign_coords(label=[row.label for row in rows])
     for name in ("label", "scenario"):
         dataset[name].attrs["long_name"] = meaning_of(name)
-    judged = np.flatnonzero(dataset["scenario_set"].values == judged_set(found))
-    columns = judged[protocol.timed_runs(len(judged))]
-    for name in (n for n, variable in timed.data_vars.items() if "scenario" in variable.dims):
-        online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
-        online[:, columns] = timed[name].values
-        dataset[name] = (("label", "scenario"), online, dict(timed[name].attrs))
+    test_runs = np.flatnonzero(dataset["scenario_set"].values == judged_set(results))
+    columns = test_runs[protocol.timed_runs(len(test_runs))]
+    for name, variable in timed.data_vars.items():
+        if "scenario" in variable.dims:
+            online = np.full((len(rows), dataset.sizes["scenario"]), np.nan)
+            online[:, columns] = variable.values
+            dataset[name] = (("label", "scenario"), online, dict(variable.attrs))
     # Of the first run.
     dataset.attrs.clear()
-    own = {"evaluations": protocol.model.evaluations, "test_set": _test_set(protocol, found)}
-    return _with_attributes(dataset, protocol.study, protocol.definition, protocol.model, **own)
+    return _with_attributes(
+        dataset,
+        protocol.study,
+        protocol.definition,
+        protocol.model,
+        evaluations=protocol.model.evaluations,
+        test_set=_test_set(protocol, results),
+    )
 
 
-def _test_set(protocol: Protocol, found: Mapping[str, Sequence[xr.Dataset]]) -> str:
+def _record(row: Row) -> dict[str, Any]:
+    """What describes a row, by names of variables."""
+    return {
+        "role": row.entry.role,
+        "series": row.entry.label,
+        "winner": row.winner,
+        "method": row.entry.method,
+        "settings": json.dumps(row.settings, sort_keys=True),
+        "validation": _validation(row),
+        "validation_score": row.result.score,
+    }
+
+
+def _test_set(protocol: Protocol, results: Mapping[str, Sequence[xr.Dataset]]) -> str:
     """Name of what is judged, with a hash of the very runs where they are sampled."""
-    if "drawn" not in found:
+    if "drawn" not in results:
         return "listed"
-    labels = "\n".join(str(label) for label in found["drawn"][0]["scenario"].values)
+    labels = "\n".join(str(label) for label in results["drawn"][0]["scenario"].values)
     return f"{protocol.test_set}, runs {hashlib.sha256(labels.encode()).hexdigest()[:8]}"
 
 

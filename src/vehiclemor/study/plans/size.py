@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ import xarray as xr
 from vehiclemor.codegen.cache import compiler_identity
 from vehiclemor.exceptions import InputError
 from vehiclemor.failure import Failure
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.metrics import rms, signal_range
 from vehiclemor.progress import tell
@@ -33,7 +33,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.study.plans.loading import content_hash
-from vehiclemor.study.plans.study_file import MethodEntry, StudyFile
+from vehiclemor.study.plans.study_file import MethodEntry, SizeFile
 from vehiclemor.study.plans.study_runs import Size
 from vehiclemor.study.result import variables
 from vehiclemor.study.store import combined_path, stored
@@ -42,83 +42,113 @@ from vehiclemor.study.timing import called
 FULL = "full order"
 # Groups of outputs, of which the worst error counts: strains are what coarse meshes are worst at.
 GROUPS = ("motion", "strain")
+# Of each model.
+COLUMNS = (
+    *("effective_rank", "offline_seconds"),
+    *("seconds_median", "seconds_lower", "seconds_upper"),
+)
 ROUNDS = 5
-# What runs a maneuver, the maneuver or its beginning, and how many times as long the whole is.
-Call = tuple[Callable[[Maneuver], Any], Maneuver, float]
 
 
-def run_size(name: str, study: StudyFile, folder: Path) -> xr.Dataset:
+@dataclass(frozen=True)
+class SizedModel:
+    """A full or reduced model of a mesh: what runs it, and on what.
+
+    `mesh` and `label` are indices in the result.  The study's maneuver is `factor` times as long as
+    the one that is timed.
+    """
+
+    mesh: int
+    label: int
+    simulate: Callable[[Excitation], Any]
+    maneuver: Excitation
+    order: int
+    offline_seconds: float = np.nan
+    factor: float = 1.0
+
+
+def run_size(name: str, study: SizeFile, folder: Path) -> xr.Dataset:
     """Times and errors on the dimensions `mesh`, `label` and `group`; stored, as are its runs."""
-    assert study.size is not None
     if component("model", study.model).kind != "structural":
         raise InputError(f"size: {study.model} is no structure")
     kernel = build(study.model, overrides=study.size.meshes[0]).kernel_hash
-    codes = [code_digest(study.model, e.method, dict(e.settings)) for e in study.methods]
+    codes = [code_digest(study.model, e.method) for e in study.methods]
     content = [study.model_dump_json(), *codes, kernel, machine(), ROUNDS]
     text = json.dumps([*content, compiler_identity()])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    make = partial(_measured, name, study, study.size, folder)
+    make = partial(_measured, name, study, folder)
     return stored(combined_path(folder, name), "size", key, make, content=content_hash(study))
 
 
-def _measured(name: str, study: StudyFile, size: Size, folder: Path) -> xr.Dataset:
-    # What can't be had is told before anything is computed.
-    beside = [(strongest_full(model), rom(model)) for model in size.beside]
+def _measured(name: str, study: SizeFile, folder: Path) -> xr.Dataset:
+    size, maneuver = study.size, component("maneuver", study.maneuver)
+    maneuver = maneuver.perturbed(size.frequency, size.amplitude)
+    # A model that does not ship is named before anything is computed.
+    vehicles = [(strongest_full(vehicle), rom(vehicle)) for vehicle in size.beside]
     meshes: list[Any] = [build(study.model, overrides=mesh) for mesh in size.meshes]
-    chosen = component("maneuver", study.maneuver).perturbed(size.frequency, size.amplitude)
-    labels, vehicles = [FULL, *study.labelled], range(len(meshes), len(meshes) + len(beside))
-    texts = [[f"{name} {value:g}" for name, value in mesh.items()] for mesh in size.meshes]
-    rows = [*map(", ".join, texts), *size.beside]
-    n = [model.size for model in meshes] + [len(full.model.coordinates) for full, _ in beside]
     with one_thread():
-        references = [_reference(model, chosen, size.step, folder) for model in meshes]
-        # Reduced models by mesh and label.
-        models = {
-            (row, column): reduced
-            for row, model in enumerate(meshes)
-            for column, entry in enumerate(study.methods, start=1)
-            if (reduced := _fit(study, size, entry, model))
-        }
-        calls = {place: (model.simulate, chosen, 1.0) for place, model in models.items()}
-        calls |= {(row, 0): _full(model, chosen, size) for row, model in enumerate(meshes)}
-        for row, (full, reduced) in zip(vehicles, beside, strict=True):
-            models[row, 1] = reduced
+        references = [_reference(mesh, maneuver, size.step, folder) for mesh in meshes]
+        models = [_full(index, mesh, maneuver, size) for index, mesh in enumerate(meshes)]
+        for index, mesh in enumerate(meshes):
+            for label, entry in enumerate(study.methods, start=1):
+                if reduced := _fit(study, entry, mesh):
+                    models.append(_reduced(index, label, reduced, maneuver))
+        for index, (full, reduced) in enumerate(vehicles, start=len(meshes)):
             steering = component("maneuver", full.model.definition.maneuver)
-            calls[row, 0] = full.simulate, steering, 1.0
-            calls[row, 1] = reduced.simulate, steering, 1.0
-        timed = _timed(name, calls, (len(rows), len(labels)))
-    outputs = {(row, 0): reference["outputs"].values for row, reference in enumerate(references)}
-    order, offline = np.full((2, len(rows), len(labels)), np.nan)
-    order[:, 0] = n
-    for place, model in models.items():
-        order[place], offline[place] = model.reduced.order, model.reduced.offline.seconds
-        if place[0] not in vehicles:
-            outputs[place] = model.simulate(chosen).outputs
+            coordinates = len(full.model.coordinates)
+            models.append(SizedModel(index, 0, full.simulate, steering, coordinates))
+            models.append(_reduced(index, 1, reduced, steering))
+        models.sort(key=lambda model: (model.mesh, model.label))
+        seconds = _timed(name, models)
+    coordinates = {
+        "mesh": [*map(_mesh_text, size.meshes), *size.beside],
+        "label": [FULL, *study.labelled],
+        "group": list(GROUPS),
+        # What is refined first: meshes of one kind make one line.
+        "kind": (
+            "mesh",
+            [*(next(iter(mesh)) for mesh in size.meshes), *("vehicle",) * len(vehicles)],
+        ),
+    }
+    shape = len(coordinates["mesh"]), len(coordinates["label"])
+    table = {name: np.full(shape, np.nan) for name in COLUMNS}
+    errors = np.full((*shape, len(GROUPS)), np.nan)
     truth = references[-1]["outputs"]
-    strains = np.array([output.startswith("strain") for output in truth["output"].values])
+    quantiles = np.quantile(seconds, (0.5, 0.25, 0.75), axis=0)
+    for model, quartiles in zip(models, quantiles.T, strict=True):
+        row = model.order, model.offline_seconds, *quartiles
+        for column, value in zip(table.values(), row, strict=True):
+            column[model.mesh, model.label] = value
+        if model.mesh < len(meshes):
+            run = model.simulate(maneuver) if model.label else references[model.mesh]
+            errors[model.mesh, model.label] = _errors(run, truth)
+    columns = variables({"coordinates_of_mesh": table["effective_rank"][:, 0].astype(int)}, "mesh")
+    columns |= variables(table, "mesh", "label")
+    columns |= variables({"relative_error": errors}, "mesh", "label", "group")
+    return xr.Dataset(
+        columns,
+        coordinates,
+        attributes(
+            study.title,
+            meshes[0].kernel_hash,
+            study=name,
+            model=study.model,
+            configuration=study.model_dump_json(exclude_defaults=True),
+        ),
+    )
+
+
+def _mesh_text(mesh: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {value:g}" for name, value in mesh.items())
+
+
+def _errors(run: Any, truth: xr.DataArray) -> list[float]:
+    """Largest RMS error of a run in each group of outputs, over the range on the finest mesh."""
     scale = signal_range(truth.values)
     scale[scale == 0.0] = 1.0
-    errors = np.full((*order.shape, len(GROUPS)), np.nan)
-    for place, found in outputs.items():
-        relative = rms(found - truth.values) / scale
-        errors[place] = [relative[group].max(initial=0.0) for group in (~strains, strains)]
-    with warnings.catch_warnings():
-        # What is not made of a mesh was never timed.
-        warnings.filterwarnings("ignore", "All-NaN slice")
-        seconds, lower, upper = np.nanquantile(timed, (0.5, 0.25, 0.75), axis=0)
-    found = variables({"coordinates_of_mesh": np.array(n)}, "mesh")
-    found |= variables(
-        {"seconds_median": seconds, "seconds_lower": lower, "seconds_upper": upper}
-        | {"effective_rank": order, "offline_seconds": offline},
-        *("mesh", "label"),
-    )
-    found |= variables({"relative_error": errors}, "mesh", "label", "group")
-    # What is refined first: meshes of one kind make one line.
-    kinds = [next(iter(mesh)) for mesh in size.meshes] + ["vehicle"] * len(beside)
-    coordinates = {"mesh": rows, "label": labels, "group": list(GROUPS), "kind": ("mesh", kinds)}
-    title = attributes(study.title, meshes[0].kernel_hash, study=name, model=study.model)
-    own = {"configuration": study.model_dump_json(exclude_defaults=True)}
-    return xr.Dataset(found, coordinates, title | own)
+    relative = rms(np.asarray(run.outputs) - truth.values) / scale
+    strains = np.array([output.startswith("strain") for output in truth["output"].values])
+    return [relative[group].max(initial=0.0) for group in (~strains, strains)]
 
 
 def strongest_full(name: str) -> ReducedOrderModel:
@@ -128,54 +158,60 @@ def strongest_full(name: str) -> ReducedOrderModel:
     return ReducedOrderModel(model, method.name, {}, (), method.fit(model, (), settings))
 
 
-def _reference(model: Any, maneuver: Maneuver, step: float, folder: Path) -> xr.Dataset:
+def _reference(model: Any, maneuver: Excitation, step: float, folder: Path) -> xr.Dataset:
     """Stored full-order outputs of a run; they do not depend on the machine."""
     parameters = json.dumps({k: e.value for k, e in model.parameters.entries.items()})
-    parts = model.kernel_hash, code_digest(model.name, "full_order", {}), parameters
+    parts = model.kernel_hash, code_digest(model.name, "full_order"), parameters
     run = maneuver.name, maneuver.frequency_factor, maneuver.amplitude_factor, step
     key = hashlib.sha256(json.dumps([parts, run]).encode()).hexdigest()[:16]
 
     def make() -> xr.Dataset:
         tell(f"full order of {model.name}, n = {model.size}", 0, 1)
-        found = model.run(maneuver, step=step)
-        table = {"outputs": (("time", "output"), found.outputs), "steps": found.counts["steps"]}
-        labels = {"time": found.times, "output": list(model.outputs)}
+        run = model.run(maneuver, step=step)
+        table = {"outputs": (("time", "output"), run.outputs), "steps": run.counts["steps"]}
+        labels = {"time": run.times, "output": list(model.outputs)}
         about = attributes(f"full order of {model.name}", model.kernel_hash)
         return xr.Dataset(table, labels, about)
 
     return stored(folder / "references" / f"{key}.nc", "reference", key, make)
 
 
-def _fit(study: StudyFile, size: Size, entry: MethodEntry, model: Any) -> ReducedOrderModel | None:
-    """A method fitted to a mesh; none where the mesh is larger than it is made."""
-    method, label = component("method", entry.method), entry.label or entry.method
-    if not method.accepts(model)[0] or model.size > size.up_to.get(label, model.size):
+def _fit(study: SizeFile, entry: MethodEntry, mesh: Any) -> ReducedOrderModel | None:
+    """A method fitted to a mesh; none where the mesh is larger than the method is fitted to."""
+    method, size = component("method", entry.method), study.size
+    if not method.accepts(mesh)[0] or mesh.size > size.up_to.get(entry.name, mesh.size):
         return None
-    tell(f"{label} of {model.name}, n = {model.size}", 0, 1)
-    runs = (TrainingRun(model, component("maneuver", str(study.training)), model.starts[0]),)
-    own = {"step_size": size.step, **entry.settings}
-    settings = validated(method, model.kind, own, entry.preset)
-    reduced = fitted(method, model, runs, settings)
-    return ReducedOrderModel(model, entry.method, settings.model_dump(), (), reduced)
+    tell(f"{entry.name} of {mesh.name}, n = {mesh.size}", 0, 1)
+    runs = (TrainingRun(mesh, component("maneuver", study.training), mesh.starts[0]),)
+    chosen = {"step_size": size.step, **entry.settings}
+    settings = validated(method, mesh.kind, chosen, entry.preset)
+    reduced = fitted(method, mesh, runs, settings)
+    return ReducedOrderModel(mesh, entry.method, settings.model_dump(), (), reduced)
 
 
-def _full(model: Any, maneuver: Maneuver, size: Size) -> Call:
-    """The full order of a mesh: of a large one its beginning."""
+def _reduced(mesh: int, label: int, model: ReducedOrderModel, maneuver: Maneuver) -> SizedModel:
+    fit = model.reduced
+    return SizedModel(mesh, label, model.simulate, maneuver, fit.order, fit.offline.seconds)
+
+
+def _full(mesh: int, model: Any, maneuver: Maneuver, size: Size) -> SizedModel:
+    """The full order of a mesh; that of a large mesh is timed on the beginning of the run."""
+    simulate = partial(model.run, step=size.step)
     if model.size <= size.whole:
-        return partial(model.run, step=size.step), maneuver, 1.0
+        return SizedModel(mesh, 0, simulate, maneuver, model.size)
     samples = round(size.window / maneuver.duration * (maneuver.samples - 1)) + 1
-    begun = replace(maneuver, duration=size.window, samples=samples)
-    return partial(model.run, step=size.step), begun, maneuver.duration / size.window
+    beginning = replace(maneuver, duration=size.window, samples=samples)
+    factor = maneuver.duration / size.window
+    return SizedModel(mesh, 0, simulate, beginning, model.size, factor=factor)
 
 
-def _timed(name: str, calls: Mapping[tuple[int, int], Call], shape: tuple[int, int]) -> np.ndarray:
-    """Seconds of whole runs (rounds, meshes, labels); NaN where there is none."""
-    seconds = np.full((ROUNDS, *shape), np.nan)
+def _timed(name: str, models: Sequence[SizedModel]) -> np.ndarray:
+    """Seconds of runs (rounds, models); NaN of those that fail."""
+    seconds = np.full((ROUNDS, len(models)), np.nan)
     for turn in range(ROUNDS):
-        for done, place in enumerate(sorted(calls)):
-            tell(f"{name}: round {turn + 1} of {ROUNDS}", done, len(calls))
-            simulate, maneuver, factor = calls[place]
-            measured = called(simulate, (maneuver,), 2, again=False)
+        for number, model in enumerate(models):
+            tell(f"{name}: round {turn + 1} of {ROUNDS}", number, len(models))
+            measured = called(model.simulate, (model.maneuver,), 2, again=False)
             if not isinstance(measured, Failure):
-                seconds[turn, *place] = factor * measured.whole
+                seconds[turn, number] = model.factor * measured.call
     return seconds

@@ -1,14 +1,16 @@
-"""Study files, `data/studies/*.toml`: methods and scenarios, found by name and validated.
+"""Schemas of study files, `data/studies/*.toml`: grids, protocols, size studies and collections.
 
-The scenarios of a study are a grid, a product of axes; or, where it has bounds, a training set, a
-validation set and a test set, which are lists or sampled from boxes.
+A key that only one of them has decides which schema reads a file, see `schema_of`.
 """
 
+import itertools
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from vehiclemor.exceptions import InputError, did_you_mean
 from vehiclemor.study.plans.study_runs import (
     MOST_POINTS,
     PARAMETER,
@@ -26,20 +28,14 @@ from vehiclemor.toml_files import FileSchema, Line
 
 # Of the test sets of every study that gives none.
 SEED, MOST_SEED = 20261122, 2**63 - 1
-# Sets of scenarios that a study with bounds lists, and those that it samples.
+# Sets of scenarios that a protocol lists, and those that it samples.
 SETS = ("training", "validation", "test", "outside")
 DRAWN = ("drawn", "drawn_outside")
-# Keys that go without bounds alone, and with bounds alone; and of a method.
-OF_GRIDS = ("grid", "sampling", "maneuver", "start", "training_set", "keep")
-OF_TESTS = (
-    *(*SETS[1:], *DRAWN, "version", "seed", "timed", "reported"),
-    *("sensitive", "targets", "failure_rate", "flagged_misses", "straight"),
-)
-OF_SIZES = {"title", "model", "maneuver", "training", "size", "methods"}
-OF_ENTRIES = ("candidates", "role")
 
 Training = str | Annotated[list[str], Field(min_length=1)]
 Settings = dict[str, int | float | str]
+Groups = Annotated[list[Group], Field(min_length=1)]
+PARAMETERS = table_of("parameter -> value in SI units where the study's are not the model's")
 
 
 class Bound(FileSchema):
@@ -55,11 +51,29 @@ class Bound(FileSchema):
     reason: str = Field("ours", min_length=1, description="where the number comes from")
 
 
-Groups = Annotated[list[Group], Field(min_length=1)]
-Learned = Annotated[
-    Annotated[Training, Tag("names")] | Annotated[Groups, Tag("runs")],
-    Discriminator(lambda value: "runs" if _is_listed(value) else "names"),
-]
+def _bound_by_output(value: Any) -> Any:
+    """Bounds by output; each table of a list is the bound of all its `outputs`."""
+    if not isinstance(value, list):
+        return value
+    bounds: dict[str, Any] = {}
+    for table in value:
+        if not isinstance(table, dict) or not isinstance(table.get("outputs"), list):
+            raise ValueError("each table of [[bounds]] has a list of outputs")
+        bound = {key: entry for key, entry in table.items() if key != "outputs"}
+        for output in table["outputs"]:
+            if output in bounds:
+                raise ValueError(f"{output} is in two tables")
+            bounds[output] = bound
+    return bounds
+
+
+def _every_combination(value: Any) -> Any:
+    """Candidates; a table of lists stands for every combination of their values."""
+    if not isinstance(value, dict):
+        return value
+    if not all(isinstance(choices, list) for choices in value.values()):
+        raise ValueError("a table of candidates has a list of values for each setting")
+    return [dict(zip(value, choice, strict=True)) for choice in itertools.product(*value.values())]
 
 
 class SpeedTarget(FileSchema):
@@ -83,7 +97,7 @@ class Straight(FileSchema):
 
 
 class MethodEntry(FileSchema):
-    """One method of a study: settings that differ from a preset, under a label of its own."""
+    """A method of a study: settings that differ from a preset, under a label."""
 
     method: str = Field(description="registered name")
     label: Line = Field("", description="name of its results; the method's by default")
@@ -91,43 +105,71 @@ class MethodEntry(FileSchema):
     settings: Settings = table_of("setting -> value; see vehiclemor show METHOD")
     training: Training = Field(
         "",
-        description="as of the study, whose it is by default; of a training set the maneuvers that "
-        "are learned from",
+        description="as of the study, whose it is by default; in a protocol the maneuvers of its "
+        "training set that are learned from",
     )
-    candidates: list[Settings] = Field(
+
+    @property
+    def name(self) -> str:
+        """Label of its results."""
+        return self.label or self.method
+
+
+class ProtocolEntry(MethodEntry):
+    """A method of a protocol: validation chooses one of its candidates."""
+
+    candidates: Annotated[list[Settings], BeforeValidator(_every_combination)] = Field(
         default=[{}],
         min_length=1,
-        description="with bounds: further settings, and `preset` beside them; validation chooses",
+        description="further settings, and `preset` beside them: a list of tables, or a table "
+        "setting -> list of values, of which every combination is a candidate",
     )
     role: Literal["full order", "baseline", "contender"] = Field(
         "contender",
-        description="with bounds: of full order every candidate has a result; of the contenders "
-        "one is chosen",
+        description="of full order every candidate has a result; of the contenders one is chosen",
     )
 
 
-class StudyFile(FileSchema):
-    """Schema of `data/studies/*.toml`.
+class StudyOfModel(FileSchema):
+    """What all studies of one model say."""
 
-    A grid of one model, or a test: with `bounds`, sets of scenarios; or a collection that names
-    other studies.
-    """
+    kind: ClassVar[str]
 
     title: Line = Field(description="one line")
     extends: str = Field("", description="study or file that gives all but methods, where not here")
-    rows: list[str] = list_of("labels of methods of the extended study that are rows here too")
-    studies: list[str] = list_of("of a collection: names of studies, or TOML files")
-    model: str = Field("", description="registered name; needed for a grid")
-    parameters: dict[str, float | list[float]] = table_of(
-        "parameter -> value in SI units where the study's are not the model's"
+    rows: list[str] | dict[str, list[str]] = list_of(
+        "labels of methods of the extended study that are rows here too; or a table study -> labels"
     )
-    maneuver: str = Field("", description="registered name; the model's own by default")
+    model: str = Field(min_length=1, description="registered name")
+    methods: list[MethodEntry] = Field(min_length=1, description="each is run in every scenario")
+
+    @property
+    def labelled(self) -> dict[str, MethodEntry]:
+        """Label -> method of the study."""
+        return {entry.name: entry for entry in self.methods}
+
+    @model_validator(mode="after")
+    def _different_labels(self) -> "StudyOfModel":
+        labels = [entry.name for entry in self.methods]
+        for label in labels:
+            if labels.count(label) > 1:
+                raise ValueError(f"label {label!r} is used twice")
+        return self
+
+
+class GridFile(StudyOfModel):
+    """A grid: every method at every combination of the values of some axes."""
+
+    kind = "a grid"
+
+    parameters: dict[str, float | list[float]] = PARAMETERS
+    maneuver: str = Field("", description="registered name; by default that of the model")
     start: list[str] = list_of("initial conditions; the model's first by default")
-    training: Learned = Field(
+    training: Training = Field(
         "matched",
-        description="input that is trained on: matched (the tested one), nominal (the model's own "
-        "maneuver), the name of a maneuver, protocol (the training of the model's protocol), set, "
-        "or a list of these; with bounds: the runs that methods learn from",
+        description="input that is trained on: matched (the tested one), nominal (the maneuver of "
+        "the model), the name of a maneuver, protocol (the training of the model's protocol), set, "
+        "or a list of these",
     )
     training_set: list[list[float]] = list_of(
         "of training = set: pairs [frequency factor, amplitude factor]"
@@ -142,13 +184,82 @@ class StudyFile(FileSchema):
     sampling: Sampling | None = Field(
         None, description="points of a dimension `sample` beside those of the grid"
     )
-    methods: list[MethodEntry] = list_of("each is run in every scenario")
-    bounds: dict[str, Bound] = table_of("of a test: output -> largest allowed error")
+
+    @property
+    def trained_on(self) -> str:
+        """What is trained on, in one line."""
+        return self.training if isinstance(self.training, str) else ", ".join(self.training)
+
+    @property
+    def points(self) -> int:
+        """Number of points; one run may stand at several of them."""
+        sizes = [len(values(axis)) for axis in self.grid.values()]
+        sizes += [len(self.start) or 1, self.sampling.count if self.sampling else 1]
+        return math.prod(sizes) * len(self.methods)
+
+    @field_validator("training_set")
+    @classmethod
+    def _pairs(cls, value: list[list[float]]) -> list[list[float]]:
+        if any(len(pair) != 2 for pair in value):
+            raise ValueError("each entry is a pair [frequency factor, amplitude factor]")
+        return value
+
+    @field_validator("grid")
+    @classmethod
+    def _not_empty(cls, value: dict[str, Axis]) -> dict[str, Axis]:
+        for name, axis in value.items():
+            points = values(axis)
+            if not points:
+                raise ValueError(f"{name} has no values")
+            if len(set(points)) != len(points):
+                raise ValueError(f"{name} has the same value twice")
+        return value
+
+    @model_validator(mode="after")
+    def _few_points(self) -> "GridFile":
+        if self.points > MOST_POINTS:
+            raise ValueError(f"the grid has {self.points} points, more than {MOST_POINTS}")
+        return self
+
+    @model_validator(mode="after")
+    def _each_set_once(self) -> "GridFile":
+        of_study = {f"{PARAMETER}{name}" for name in self.parameters}
+        of_study |= {name for name in ("maneuver", "start") if getattr(self, name)}
+        sampled = set(self.sampling.ranges) if self.sampling else set()
+        axes = {"grid": set(self.grid), "sampling": sampled}
+        names_by_part = axes | {"study": of_study}
+        for label, entry in self.labelled.items():
+            names = set(entry.settings)
+            if entry.training:
+                names.add("training")
+            names_by_part[f"settings of {label}"] = names
+        for axis, part in itertools.product(axes, names_by_part):
+            double = axes[axis] & names_by_part[part]
+            if double and axis != part:
+                raise ValueError(f"{min(double)} is set twice: in the {axis} and in the {part}")
+        return self
+
+
+class ProtocolFile(StudyOfModel):
+    """A protocol: methods learn from a training set, are chosen by a validation set and tested."""
+
+    kind = "a study with bounds"
+
+    parameters: dict[str, float | list[float]] = PARAMETERS
+    training: Groups = Field(description="runs that methods learn from")
+    # A schema is frozen: no entry of another class can be put in.
+    methods: list[ProtocolEntry] = Field(  # type: ignore[assignment]
+        min_length=1, description="each is tested with the settings that validation chooses"
+    )
+    bounds: Annotated[dict[str, Bound], BeforeValidator(_bound_by_output)] = Field(
+        min_length=1,
+        description="output -> largest allowed error; or a list of tables, each with `outputs`",
+    )
     timed: int | None = Field(
         None, ge=1, description="so many runs of the test set, evenly spread, are timed; else all"
     )
     reported: list[str] = list_of("outputs whose RMS errors are printed beside the bounded")
-    validation: list[Group] = list_of("what candidates are chosen by")
+    validation: Groups = Field(description="runs that candidates are chosen by")
     test: list[Group] = list_of("listed test runs; judged if none are drawn")
     outside: list[Group] = list_of("beyond what was trained: reported, not judged")
     version: int = Field(1, ge=1, description="of the drawn test set, part of its name")
@@ -170,107 +281,75 @@ class StudyFile(FileSchema):
     )
     straight: Straight | None = Field(None, description="whether a vehicle drives straight on")
 
-    size: Size | None = Field(None, description="meshes: what full and reduced runs cost on each")
-
     @property
-    def labelled(self) -> dict[str, MethodEntry]:
-        """Label -> method of the study."""
-        return {entry.label or entry.method: entry for entry in self.methods}
-
-    @property
-    def trained_on(self) -> str:
-        """What is trained on, in one line."""
-        given = [self.training] if isinstance(self.training, str) else self.training
-        return ", ".join(one if isinstance(one, str) else one.maneuver for one in given)
+    def draws(self) -> dict[str, Draw]:
+        """Sets that are sampled, by name."""
+        drawn = {name: getattr(self, name) for name in DRAWN}
+        return {name: draw for name, draw in drawn.items() if draw}
 
     @property
     def points(self) -> int:
-        """Number of points of the grid, or of tests; one run may stand at several of them."""
-        if self.bounds:
-            listed = sum(group.scenarios for group in (*self.test, *self.outside))
-            draws = sum(draw.runs for draw in (self.drawn, self.drawn_outside) if draw)
-            return (listed + draws) * len(self.methods)
-        sizes = [len(values(entry)) for entry in self.grid.values()]
-        sizes += [len(self.start) or 1, self.sampling.count if self.sampling else 1]
-        return math.prod(sizes) * len(self.methods)
-
-    @field_validator("training_set")
-    @classmethod
-    def _pairs(cls, value: list[list[float]]) -> list[list[float]]:
-        if any(len(pair) != 2 for pair in value):
-            raise ValueError("each entry is a pair [frequency factor, amplitude factor]")
-        return value
-
-    @field_validator("grid")
-    @classmethod
-    def _not_empty(cls, value: dict[str, Axis]) -> dict[str, Axis]:
-        for name, entry in value.items():
-            points = values(entry)
-            if not points:
-                raise ValueError(f"{name} has no values")
-            if len(set(points)) != len(points):
-                raise ValueError(f"{name} has the same value twice")
-        return value
+        """Number of test runs of all methods."""
+        listed = sum(group.scenarios for group in (*self.test, *self.outside))
+        sampled = sum(draw.runs for draw in self.draws.values())
+        return (listed + sampled) * len(self.methods)
 
     @model_validator(mode="after")
-    def _complete(self) -> "StudyFile":
-        for name in ("studies", "bounds"):
-            if name in self.model_fields_set and not getattr(self, name):
-                raise ValueError(f"{name} is empty")
-        if self.studies:
-            if self.model or self.grid or self.methods:
-                raise ValueError("a collection names studies and nothing else")
-            return self
-        for name in ("model", "methods"):
-            if not getattr(self, name):
-                raise ValueError(f"{name} is missing")
-        labels = [entry.label or entry.method for entry in self.methods]
-        if doubles := [label for label in labels if labels.count(label) > 1]:
-            raise ValueError(f"label {doubles[0]!r} is used twice")
-        foreign = [name for name in OF_GRIDS if name in self.model_fields_set]
-        if self.size:
-            foreign = sorted(self.model_fields_set - OF_SIZES)
-            if foreign:
-                raise ValueError(f"a size study has no {foreign[0]}")
-            if not self.model_fields_set >= OF_SIZES or not isinstance(self.training, str):
-                raise ValueError("a size study names a model, a maneuver, a training and methods")
-            return self
-        if self.bounds:
-            for name in SETS[:2]:
-                if not _is_listed(getattr(self, name)):
-                    raise ValueError(f"a study with bounds needs [[{name}]]")
-            if not (self.test or self.drawn):
-                raise ValueError("there is nothing to test: neither test nor drawn is given")
-            if foreign:
-                raise ValueError(f"a study with bounds has no {foreign[0]}")
-            return self
-        given = self.model_fields_set.union(*(entry.model_fields_set for entry in self.methods))
-        foreign = [name for name in (*OF_TESTS, *OF_ENTRIES) if name in given]
-        if foreign or _is_listed(self.training):
-            raise ValueError(f"{[*foreign, '[[training]]'][0]} is of a study with bounds")
-        self._check_set_once()
-        if self.points > MOST_POINTS:
-            raise ValueError(f"the grid has {self.points} points, more than {MOST_POINTS}")
+    def _tested(self) -> "ProtocolFile":
+        if not (self.test or self.drawn):
+            raise ValueError("there is nothing to test: give [[test]] or [drawn]")
         return self
 
-    def _check_set_once(self) -> None:
-        own = {f"{PARAMETER}{name}" for name in self.parameters}
-        own |= {name for name in ("maneuver", "start") if getattr(self, name)}
-        axes = {
-            "grid": {*self.grid},
-            "sampling": {*(self.sampling.ranges if self.sampling else ())},
-        }
-        settings = {
-            f"settings of {label}": {*entry.settings, *["training"] * bool(entry.training)}
-            for label, entry in self.labelled.items()
-        }
-        others = axes | {"study": own} | settings
-        for one, names in axes.items():
-            for other, more in others.items():
-                for name in sorted(names & more) if other != one else ():
-                    raise ValueError(f"{name} is set twice: in the {one} and in the {other}")
+
+class SizeFile(StudyOfModel):
+    """A size study: what full and reduced runs of a structure cost on each of its meshes."""
+
+    kind = "a size study"
+
+    maneuver: str = Field(description="registered name")
+    training: str = Field(description="name of the maneuver that is trained on")
+    size: Size = Field(description="meshes, and how they are run")
+
+    @property
+    def points(self) -> int:
+        """Number of runs of all methods, and of full order."""
+        return len(self.size.meshes) * (len(self.methods) + 1)
 
 
-def _is_listed(value: object) -> bool:
-    """Whether what is given are scenarios, not names of them."""
-    return isinstance(value, list) and bool(value) and isinstance(value[0], dict | Group)
+class CollectionFile(FileSchema):
+    """A collection of studies."""
+
+    kind: ClassVar[str] = "a collection"
+
+    title: Line = Field(description="one line")
+    studies: list[str] = Field(min_length=1, description="names of studies, or TOML files")
+
+
+StudyFile = GridFile | ProtocolFile | SizeFile
+# The key that makes a file a study of a kind; without any of these it is a grid.
+SCHEMAS = {"studies": CollectionFile, "size": SizeFile, "bounds": ProtocolFile}
+
+
+def schema_of(content: Mapping[str, Any]) -> type[StudyFile | CollectionFile]:
+    """Schema of the content of a study file; `InputError` if a key is of none or of another."""
+    schema = next((SCHEMAS[key] for key in SCHEMAS if key in content), GridFile)
+    for key in content:
+        if key not in schema.model_fields:
+            raise InputError(f"{key} is not a key of {schema.kind}: {_hint(key, schema)}")
+    return schema
+
+
+def _hint(key: str, schema: type[StudyFile | CollectionFile]) -> str:
+    """Where a key belongs, or what it may be meant to be."""
+    others = [other for other in (GridFile, *SCHEMAS.values()) if key in other.model_fields]
+    if others:
+        kinds = " or ".join(other.kind for other in others)
+        return f"it belongs to {kinds}"
+    return did_you_mean(key, schema.model_fields) or f"known: {', '.join(schema.model_fields)}"
+
+
+def study_from(content: Mapping[str, Any]) -> StudyFile:
+    """A study with this content, validated."""
+    schema = schema_of(content)
+    assert schema is not CollectionFile
+    return schema.model_validate(content)  # type: ignore[return-value]

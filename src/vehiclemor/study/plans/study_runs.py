@@ -32,7 +32,7 @@ def _printable(limits: list[float]) -> list[float]:
 
 
 def without_speed(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Parameters of scenarios; `ValueError` if the speed is among them, which has its own key."""
+    """Parameters of scenarios; `ValueError` if the speed is among them, which has another key."""
     if SPEED in parameters:
         raise ValueError(f"{SPEED} is not given as a parameter, but by speed = [...]")
     return parameters
@@ -74,7 +74,7 @@ Axis = Annotated[
 
 
 class Sampling(FileSchema):
-    """Points spread over ranges, in place of every combination of some values."""
+    """Points spread over ranges, instead of every combination of some values."""
 
     plan: Literal["latin_hypercube", "sobol"] = Field(description="how points are spread")
     count: int = Field(ge=1, le=MOST_POINTS, description="how many; of sobol a power of two")
@@ -118,9 +118,9 @@ class Group(FileSchema):
     points: list[list[float]] = list_of("[frequency, amplitude] or [frequency, amplitude, speed]")
     frequency: list[float] = list_of("factors, 1 by default")
     amplitude: list[float] = list_of("factors, 1 by default")
-    speed: list[float] = list_of("m/s, the model's own by default")
+    speed: list[float] = list_of("m/s, that of the model by default")
     parameters: Annotated[dict[str, list[float]], AfterValidator(without_speed)] = table_of(
-        "parameter -> values in SI units, to combine with all else; the model's own by default"
+        "parameter -> values in SI units, to combine with all else; that of the model by default"
     )
 
     @property
@@ -154,12 +154,14 @@ class Box(FileSchema):
     frequency: Range = Field([1.0, 1.0], description="factors, from and to")
     amplitude: Range = Field([1.0, 1.0], description="factors, from and to")
     both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
-    speed: Range | None = Field(None, description="m/s, the model's own by default")
+    speed: Range | None = Field(None, description="m/s, that of the model by default")
     start: list[str] = list_of("initial conditions, equally likely; the model's first")
     members: Numbers | None = Field(
         None, description="of a family: numbers of its members, from and to; MANEUVER:NUMBER is run"
     )
-    parameters: Drawn = table_of("parameter -> [from, to] in SI units; the model's own by default")
+    parameters: Drawn = table_of(
+        "parameter -> [from, to] in SI units; that of the model by default"
+    )
 
     @field_validator("frequency")
     @classmethod
@@ -173,7 +175,19 @@ class Draw(FileSchema):
     """Runs sampled from boxes."""
 
     runs: int = Field(ge=1, le=100_000, description="how many")
+    common: dict[str, Any] = table_of("keys of every box that does not say otherwise")
     boxes: list[Box] = Field(min_length=1, description="what they are sampled from")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_common(cls, value: Any) -> Any:
+        """The keys in common stand in each box."""
+        if not isinstance(value, dict) or not isinstance(value.get("common"), dict):
+            return value
+        common, boxes = value["common"], value.get("boxes")
+        if not isinstance(boxes, list) or not all(isinstance(box, dict) for box in boxes):
+            return value
+        return value | {"common": {}, "boxes": [common | box for box in boxes]}
 
 
 class Size(FileSchema):
@@ -189,7 +203,7 @@ class Size(FileSchema):
     window: float = Field(1.0, ge=0.1, description="s of the run, over which it is timed beyond")
     up_to: dict[str, int] = Field(
         default_factory=dict,
-        description="label -> coordinates of the largest mesh that it is made of",
+        description="label -> coordinates of the largest mesh that it reduces",
     )
     beside: list[str] = Field(
         default_factory=list, description="models whose shipped reduced models are timed beside"

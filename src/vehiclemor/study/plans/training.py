@@ -7,14 +7,14 @@ from functools import cache, lru_cache
 from vehiclemor.arguments import MOST_NAMES, quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.checks import checked_maneuver
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.protocol import CONTENDER, Protocol, load_protocol, protocol_names
 from vehiclemor.study.scenario import Scenario, check
 
 # One of `NAMED`, the name of a maneuver, or what is run.
-Entry = str | Scenario | Maneuver
+Entry = str | Scenario | Excitation
 Given = Entry | Sequence[Entry]
 Pairs = Sequence[tuple[float, float]]
 # The tested run itself and that with listed factors; what any model has, and some.
@@ -78,7 +78,7 @@ def _checked(model: Model, scenario: Scenario) -> Scenario:
 
 
 def _of_protocol(model: str, method: str) -> tuple[Scenario, ...]:
-    """What a method learns from in a model's own protocol; nothing if it does not compete."""
+    """What a method learns from in the protocol of a model; nothing if it does not compete."""
     if model not in protocol_names():
         return ()
     entries = _protocol_of(model).entries

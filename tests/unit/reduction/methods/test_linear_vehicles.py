@@ -15,7 +15,7 @@ from vehiclemor.inputs.steering import (
     rack_straight_ahead,
     straight_ahead,
 )
-from vehiclemor.reduction.methods.modal_truncation import truncated
+from vehiclemor.reduction.methods.linearised import ModalVehicleSettings, truncated
 from vehiclemor.reduction.vehicle.linear_modes import lateral_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 
@@ -104,7 +104,7 @@ def test_steering_without_its_derivatives_drives_lateral_modes_alone(shape):
 
 
 def test_static_correction_keeps_steady_cornering(shape):
-    kept, follow = truncated(*lateral_modes(shape), 20.0, static=True)
+    kept, follow = truncated(shape, *lateral_modes(shape), ModalVehicleSettings(fastest=20.0))
     moved = follow[:, 0] - kept.right @ np.linalg.solve(kept.rates, kept.input_matrix)
     assert shape.linearised.motion_a[0] @ moved == pytest.approx(steady_turn(shape), rel=1e-5)
 

@@ -1,4 +1,4 @@
-"""Kernels of whole steps do what the formulas of their methods say."""
+"""The kernel of whole steps does what the formulas of its method say."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,9 @@ import pytest
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.reduction.vehicle.features import FeatureListing, feature_system
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.integrators import catalogue, etdrk4, ros34pw2
+from vehiclemor.simulation.integrators import catalogue, etdrk4
 from vehiclemor.simulation.integrators.etdrk4 import phi_functions
+from vehiclemor.simulation.integrators.step_kernels import exponential_step
 from vehiclemor.simulation.system import System
 
 # With pairs that turn with the heading and without; in the mirror image's two blocks.
@@ -40,18 +41,7 @@ def in_frame(system: System, y: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     return turn @ matrix @ turn.T
 
 
-def w_step(system: System, rhs, y: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """New state and error of `ros34pw2` in dense matrices."""
-    a, n = ros34pw2.tableau(), len(y)
-    inverse = np.linalg.inv(np.eye(n) - ros34pw2.GAMMA * H * system.frozen_jacobian)
-    inverse, s = in_frame(system, y, inverse), np.zeros((4, n))
-    for k in range(4):
-        b = ros34pw2.GAMMA * H * rhs(y + a[k] @ s, u[k])
-        s[k] = inverse @ (b + a[4 + k] @ s)
-    return y + a[ros34pw2.M] @ s, a[ros34pw2.E] @ s
-
-
-def exponential_step(system: System, rhs, y, u, y_past, f_past, stretch, weights):
+def dense_step(system: System, rhs, y, u, y_past, f_past, stretch, weights):
     """New state, rates there and error of `etdrk4` in dense matrices."""
     jacobian = in_frame(system, y, stretch * system.frozen_jacobian)
     _, half_1, half_2, _ = phi_functions(0.5 * H * jacobian)
@@ -74,9 +64,8 @@ def exponential_step(system: System, rhs, y, u, y_past, f_past, stretch, weights
     return y + v, rhs(y + v, u[2]), abs(error) + abs(middle)
 
 
-@pytest.mark.parametrize("solver", ["ros34pw2", "etdrk4"])
 @pytest.mark.parametrize("name", [*VEHICLES, "reduced"])
-def test_a_step_as_one_kernel_is_the_step_of_the_formulas(name, solver):
+def test_a_step_as_one_kernel_is_the_step_of_the_formulas(name):
     if name == "reduced":
         system, start, blocks = reduced_vehicle(), np.array([0.1, -0.2, 0.05, 0.0, 0.0, 0.0]), 1
     else:
@@ -93,25 +82,17 @@ def test_a_step_as_one_kernel_is_the_step_of_the_formulas(name, solver):
         return system.values_at("derivative", x[None], inputs[None], n)[0]
 
     f, stretch = rhs(y, u[0]), 1.1
-    if solver == "ros34pw2":
-        given = [y, f, [H], u[1:].ravel()]
-        wanted = w_step(system, rhs, y, u)
-    else:
-        weights, f_past = [0.3, -4.0, 1.7, 0.9 * H], rhs(y_past, u[0])
-        given = [y, f, y_past, f_past, [H, stretch], weights, u[1:3].ravel()]
-        wanted = exponential_step(system, rhs, y, u, y_past, f_past, stretch, weights)
-    operators = system.method(solver, system.active).bundle.operators[PLACE].ravel()
-    if solver == "etdrk4":
-        # The functions of a step that is stretched so are those of the nearest in the grid.
-        tables = catalogue.INTEGRATORS[solver].tables
-        steps = [stretch * H]
-        blocks_of = system.frame.diagonal(system.frozen_jacobian)
-        packed = system.frame.packed([tables(block, grid=steps) for block in blocks_of])
-        operators = packed.ravel()
-    kernel = catalogue.INTEGRATORS[solver].step_kernel(system.frame, system.inputs)
+    weights, f_past = [0.3, -4.0, 1.7, 0.9 * H], rhs(y_past, u[0])
+    given = [y, f, y_past, f_past, [H, stretch], weights, u[1:3].ravel()]
+    wanted = dense_step(system, rhs, y, u, y_past, f_past, stretch, weights)
+    # The functions of a step that is stretched so are those of the nearest in the grid.
+    diagonal = system.frame.diagonal(system.frozen_jacobian)
+    tables = [etdrk4.exponential_tables(block, [stretch * H]) for block in diagonal]
+    operators = system.frame.packed(tables).ravel()
+    kernel = exponential_step(system.frame, system.inputs)
     # Behind the results there is room for what it works in.
     result = np.zeros((40, -(-n // 4) * 4))
-    addresses = np.array(system.called("full", solver).bundle.kernels).view(float)
+    addresses = np.array(system.called("full", "etdrk4").bundle.kernels).view(float)
     kernels = Kernels([kernel])
     kernels.call(
         kernel.name, np.concatenate(given), operators, system.constants, result.ravel(), addresses

@@ -1,8 +1,7 @@
 """Order conditions of the integrators' coefficients.
 
 E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (2nd ed., 1993),
-section II.2; E. Hairer, G. Wanner, II (2nd ed., 1996), sections IV.7 and IV.15; J. Rang,
-L. Angermann, BIT Numer. Math. 45 (2005) 761-787.
+section II.2; E. Hairer, G. Wanner, II (2nd ed., 1996), sections IV.7 and IV.15.
 """
 
 from itertools import chain
@@ -11,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from vehiclemor.simulation.integrators import dopri5 as pair
-from vehiclemor.simulation.integrators import rodas4, ros34pw2
+from vehiclemor.simulation.integrators import rodas4
 
 
 def weighted(b: np.ndarray, conditions: list, tolerance: float) -> float:
@@ -66,9 +65,8 @@ def rosenbrock(a, c, m, e, gamma) -> SimpleNamespace:
     )
 
 
-ROWS, OTHER = rodas4.tableau(), ros34pw2.tableau()
+ROWS = rodas4.tableau()
 RODAS4 = rosenbrock(ROWS[:6], ROWS[6:12], ROWS[14], ROWS[15], 0.25)
-ROS34PW2 = rosenbrock(OTHER[:4], OTHER[4:8] / ros34pw2.GAMMA, OTHER[9], OTHER[10], ros34pw2.GAMMA)
 
 
 def test_rodas4_satisfies_the_conditions_of_orders_4_and_3():
@@ -83,15 +81,3 @@ def test_rodas4_satisfies_the_conditions_of_orders_4_and_3():
     # Times of the stages and weights of the time derivative belong to the same matrices.
     np.testing.assert_allclose(at, ROWS[12], atol=1e-13)
     np.testing.assert_allclose(own.gamma.sum(axis=1), ROWS[13], atol=1e-13)
-
-
-def test_ros34pw2_has_order_3_and_2_with_any_matrix_in_place_of_the_jacobian():
-    own = ROS34PW2
-    at, turned = own.alpha @ own.one, own.gamma @ own.one
-    second = [(own.one, 1.0), (at, 1 / 2), (turned, 0.0)]
-    third = [(at**2, 1 / 3), (own.alpha @ at, 1 / 6), (own.alpha @ turned, 0.0)]
-    third += [(own.gamma @ at, 0.0), (own.gamma @ turned, 0.0)]
-    weighted(own.b, second + third, 1e-14)
-    weighted(own.embedded, second, 1e-14)
-    assert weighted(own.embedded, third, np.inf) > 1e-3
-    np.testing.assert_allclose(at, OTHER[8], atol=1e-15)

@@ -9,7 +9,7 @@ import pytest
 
 import vehiclemor as vm
 
-EXAMPLES = Path(__file__).parents[3] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 CARS = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 
 

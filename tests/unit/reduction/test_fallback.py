@@ -1,4 +1,4 @@
-"""A fast model with the full order behind it, which runs where the fast one leaves."""
+"""A reduced model with the full order behind it, which repeats what is not to be trusted."""
 
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vehiclemor.exceptions import InputError
+from vehiclemor.reduction.fallback import FallbackModel
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods.full_order import FullOrderSystem
-from vehiclemor.reduction.methods.guarded import METHOD, FallbackModel
-from vehiclemor.reduction.validation import validated
+from vehiclemor.reduction.validation import fitted, validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trust
@@ -23,7 +23,7 @@ STEER = component("maneuver", "step_steer")
 
 @dataclass(frozen=True)
 class LeavesAt:
-    """A fast model that is right until it leaves; from then on nothing that it gives is."""
+    """A reduced model that is right until it leaves; from then on nothing that it gives is."""
 
     until: float
     status: str = "untrusted"
@@ -51,14 +51,13 @@ def model():
     return build("independent_suspension_vehicle")
 
 
-def guarded(fast):
-    safe = FullOrderSystem(model(), "dopri5", TOLERANCE)
-    return FallbackModel(fast, safe, OfflineCost())
+def guarded(reduced):
+    return FallbackModel(reduced, FullOrderSystem(model(), "dopri5", TOLERANCE))
 
 
 @settings(max_examples=15)
 @given(until=st.floats(0.0, 5.0))
-def test_the_safe_model_does_the_run_wherever_the_fast_one_leaves(until):
+def test_the_full_order_does_the_run_wherever_the_reduced_model_leaves(until):
     run, full = guarded(LeavesAt(until)).simulate(STEER, "dropped"), whole()
     np.testing.assert_array_equal(run.times, full.times)
     np.testing.assert_array_equal(run.outputs, full.outputs)
@@ -68,61 +67,53 @@ def test_the_safe_model_does_the_run_wherever_the_fast_one_leaves(until):
     assert run.counts["rhs_calls"] > full.counts["rhs_calls"]
 
 
-def test_a_trusted_run_is_the_fast_one():
-    fast = LeavesAt(np.inf, status="ok")
-    run, own = guarded(fast).simulate(STEER, "dropped"), fast.simulate()
+def test_a_trusted_run_is_the_reduced_one():
+    reduced = LeavesAt(np.inf, status="ok")
+    run, own = guarded(reduced).simulate(STEER, "dropped"), reduced.simulate()
     assert (run.status, run.remark) == ("ok", own.remark)
     np.testing.assert_array_equal(run.outputs, own.outputs)
 
 
-def test_a_fast_run_that_fails_without_a_warning_is_trusted_nowhere():
-    fast = LeavesAt(3.0, status="diverged", told=False)
-    run = guarded(fast).simulate(STEER, "dropped")
+def test_a_reduced_run_that_fails_without_a_warning_is_trusted_nowhere():
+    run = guarded(LeavesAt(3.0, status="diverged", told=False)).simulate(STEER, "dropped")
     np.testing.assert_array_equal(run.outputs, whole().outputs)
     assert run.remark.startswith("full_order did the run: why, from t = 0 s on")
 
 
-def test_what_the_safe_model_tells_of_itself_is_kept():
+def test_warnings_of_the_full_order_stay():
     class Doubtful(FullOrderSystem):
         def simulate(self, *given):
             return super().simulate(*given).judged(Trust(3.0, 4.0, "an arm is beyond"))
 
-    safe = Doubtful(model(), "dopri5", TOLERANCE)
-    run = replace(guarded(LeavesAt(2.0)), safe=safe).simulate(STEER, "dropped")
+    full = Doubtful(model(), "dopri5", TOLERANCE)
+    run = replace(guarded(LeavesAt(2.0)), full=full).simulate(STEER, "dropped")
     assert run.status == "untrusted"
     assert "an arm is beyond" in run.message
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"fast": "guarded"}, "guard itself"),
-        ({"fast": "no_such"}, "no_such"),
-        ({"fast_settings": "terms = "}, "fast_settings"),
-        ({"fast_settings": "terms = 1.5"}, "terms"),
-        ({"fast_settings": "no_such = 1"}, "no_such"),
-        ({"fast_settings": "tolerance = 1e-3"}, "setting of its own"),
-        ({"fast_settings": "terms.high = 3"}, "terms"),
-    ],
+    "settings", [{"safe_solver": "rodas4", "safe_tolerance": 1e-5}, {"fallback": "rodas4"}]
 )
-def test_wrong_settings_are_named(given, words):
-    with pytest.raises(InputError, match=words):
-        METHOD.check(model(), validated(METHOD, "ode", given))
+def test_guarded_has_a_fallback_by_either_name(settings):
+    method = component("method", "guarded")
+    chosen = validated(method, "ode", settings)
+    assert chosen.fallback == "rodas4"
+    assert chosen.fallback_tolerance == settings.get("safe_tolerance", 1e-4)
 
 
-@pytest.mark.parametrize("text", ["rank = 2, snapshots = 9", "rank = 2\n\nsnapshots = 9,\n"])
-def test_settings_of_the_fast_model_stand_in_one_line_or_several(text):
-    given = {"fast": "fixed_basis", "solver": "dopri5", "fast_settings": text}
-    METHOD.check(model(), validated(METHOD, "ode", given))
-    with pytest.raises(InputError, match="snapshots"):
-        METHOD.check(
-            model(), validated(METHOD, "ode", given | {"fast_settings": text.replace("9", "1")})
-        )
+def test_wrong_fallbacks_are_refused():
+    for method, wrong in (("slow_manifold", "euler"), ("guarded", "none")):
+        with pytest.raises(InputError, match=f"{method}: fallback"):
+            validated(component("method", method), "ode", {"fallback": wrong})
 
 
 def test_settings_reach_both_models():
-    vehicle = model()
-    given = {"fast": "full_order", "solver": "dopri5", "tolerance": 1e-4, "safe_tolerance": 1e-5}
-    fitted = METHOD.fit(vehicle, [], validated(METHOD, "ode", given))
-    assert (fitted.fast.solver, fitted.fast.tolerance) == ("dopri5", 1e-4)
-    assert (fitted.safe.solver, fitted.safe.tolerance) == ("etdrk4", 1e-5)
+    method, vehicle = component("method", "modal_truncation"), model()
+    settings = {"tolerance": 1e-4, "fallback": "dopri5", "fallback_tolerance": TOLERANCE}
+    reduced = fitted(method, vehicle, [], validated(method, "ode", settings))
+    assert reduced.reduced.tolerance == 1e-4
+    # It has no trust indicator, so that the full order does all of its runs.
+    run = reduced.simulate(STEER, "dropped")
+    np.testing.assert_array_equal(run.outputs, whole().outputs)
+    assert run.remark.startswith("full_order did the run: the reduced model does not judge itself")
+    assert fitted(method, vehicle, [], validated(method, "ode", {})).tolerance == 1e-3

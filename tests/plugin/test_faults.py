@@ -1,14 +1,13 @@
 """Components by their entry points: unknown names, and plug-ins that break and harm nothing."""
 
 import re
-from importlib.metadata import EntryPoint
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
 
 import vehiclemor as vm
-from tests.plugin.installation import installed
-from vehiclemor import registry
+from tests.plugin.installation import installed, package, registered
 from vehiclemor.cli import main
 from vehiclemor.codegen.sources import plug_in_digest
 from vehiclemor.exceptions import InputError, VehiclemorError
@@ -39,35 +38,30 @@ def test_nearest_names_come_best_first_and_of_many_the_nearest_alone():
     assert len(many) < 120
 
 
-def test_plug_ins_register_as_built_ins_do_and_take_no_name_of_theirs(monkeypatch):
-    group = registry.GROUPS["method"]
-    of_others = [EntryPoint("mine", "vehiclemor.reduction.methods.replay:METHOD", group)]
-    of_others += [EntryPoint("pod", "thief:METHOD", group)]
-    found = [*registry.entry_points(group=group), *of_others]
-    monkeypatch.setattr(registry, "entry_points", lambda **_: found)
-    registry._entries.cache_clear()
-    try:
-        assert names("method") == sorted({entry.name for entry in found})
+def test_plug_ins_register_as_built_ins_do_and_take_no_name_of_theirs(tmp_path):
+    (tmp_path / "mine.py").write_text("from vehiclemor.reduction.methods.replay import METHOD")
+    built_in = names("method")
+    with installed(package(tmp_path, mine="mine:METHOD", pod="thief:METHOD")):
+        assert names("method") == sorted([*built_in, "mine"])
         assert component("method", "mine") is replay.METHOD
         assert component("method", "pod") is pod.METHOD
-    finally:
-        registry._entries.cache_clear()
+    assert names("method") == built_in
 
 
 @pytest.fixture
 def plug_in(tmp_path, monkeypatch):
     """Register a module text as a method or else, beside the built-ins."""
 
-    def register(name, text, attribute="", kind="method"):
-        # A name of its own in each test: what was imported before stays imported.
-        module = f"{name}_{tmp_path.name}"
-        (tmp_path / f"{module}.py").write_text(text)
-        monkeypatch.syspath_prepend(tmp_path)
-        known = {kind: dict(registry._entries(kind)) for kind in registry.GROUPS}
-        known[kind][name] = EntryPoint(name, f"{module}{attribute}", registry.GROUPS[kind])
-        monkeypatch.setattr(registry, "_entries", known.__getitem__)
+    with ExitStack() as stack:
 
-    return register
+        def register(name, text, attribute="", kind="method"):
+            # Another name in each test: what was imported before stays imported.
+            module = f"{name}_{tmp_path.name}"
+            (tmp_path / f"{module}.py").write_text(text)
+            monkeypatch.syspath_prepend(tmp_path)
+            stack.enter_context(registered(kind, name, f"{module}{attribute}"))
+
+        yield register
 
 
 @pytest.mark.parametrize(
@@ -226,14 +220,10 @@ def test_processes_go_on_after_a_method_that_ends_its_own(tmp_path, capsys):
     (tmp_path / "ending.py").write_text(
         f"{REPLAY}METHOD = replace(METHOD, name='ending', fit=ends(SystemExit(0)))\n"
     )
-    (tmp_path / "pyproject.toml").write_text(
-        '[project]\nname = "ending"\nversion = "1"\n'
-        '[project.entry-points."vehiclemor.methods"]\nending = "ending:METHOD"\n'
-    )
     grid = "[grid]\nfrequency_factor = [0.9, 1.0]\n"
     study = tmp_path / "mine.toml"
     study.write_text(STUDY.replace("faulty", "ending") + grid)
-    with installed(tmp_path):
+    with installed(package(tmp_path, ending="ending:METHOD")):
         assert main(["run", str(study), "--jobs", "2", "--results", str(tmp_path / "results")]) == 1
     assert "2 error, 2 ok" in capsys.readouterr().out
 

@@ -1,0 +1,31 @@
+from .api import describe as describe
+from .api import maneuvers as maneuvers
+from .api import methods as methods
+from .api import model as model
+from .api import models as models
+from .api import plot as plot
+from .api import reduce as reduce
+from .api import run_study as run_study
+from .api import simulate as simulate
+from .api import status as status
+from .api import studies as studies
+from .exceptions import VehiclemorError as VehiclemorError
+from .exporting.export import export as export
+from .inputs.maneuver import maneuver as maneuver
+from .inputs.road import road as road
+from .inputs.signal import Signal as Signal
+from .inputs.signal import many_signals as many_signals
+from .metrics import errors as errors
+from .metrics import weighted_rms as weighted_rms
+from .reduction.reduced_model import load as load
+from .reduction.reduced_model import rom as rom
+from .report.comparison import compare as compare
+from .report.figures.animation import animate as animate
+from .report.figures.catalogue import figures as figures
+from .report.page import write_report as write_report
+from .report.study_formats import convert as convert
+from .simulation.batches import simulate_many as simulate_many
+from .study.dataset import dataset as dataset
+from .study.judge import judge as judge
+
+__version__: str

@@ -1,0 +1,175 @@
+"""Excitations: inputs u(t) that drive a model over a fixed duration, as piecewise polynomials."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Hashable
+from dataclasses import replace
+from functools import cache, cached_property, wraps
+from typing import Any, NamedTuple, Self, TypeVar
+
+import numpy as np
+
+from vehiclemor.arguments import number, quoted, real_array, within
+from vehiclemor.codegen.loops import Loop, Ready, loops, ready
+from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.polynomial_loops import Pieces
+from vehiclemor.short_repr import ShortRepr
+
+# Bounds far beyond anything that is meant.  A maneuver that is a thousand times slower does not
+# begin within its run, one that is a thousand times faster is over between two output times.
+FACTORS = {"frequency": (1e-3, 1e3), "amplitude": (-1e6, 1e6)}
+LONGEST_DURATION = 1e5
+MOST_SAMPLES = 10_000_000
+
+Result = TypeVar("Result")
+
+
+def cached(compute: Callable[..., Result]) -> Callable[..., Result]:
+    """A function of an excitation that computes each result once, see `Excitation.results`."""
+
+    @wraps(compute)
+    def result(excitation: Excitation, *arguments: Hashable) -> Result:
+        key = compute, *arguments
+        if key not in excitation.results:
+            excitation.results[key] = compute(excitation, *arguments)
+        return excitation.results[key]
+
+    return result
+
+
+class Extent(NamedTuple):
+    """Extremes of the inputs of a whole run, see `polynomial_loops.extent`.
+
+    Largest (3, inputs) are magnitudes of the inputs, of what of them is above 2 Hz, and the root of
+    the integral of the square of what is above 8 Hz.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    largest: np.ndarray
+
+
+class Excitation(ShortRepr):
+    """Inputs of a model over a fixed duration: a `Maneuver` of functions, a `Signal` of samples."""
+
+    repr_fields = ("name", "inputs", "duration", "samples", "frequency_factor", "amplitude_factor")
+
+    name: str
+    summary: str
+    inputs: tuple[str, ...]
+    duration: float
+    samples: int
+    frequency_factor: float
+    amplitude_factor: float
+
+    @cached_property
+    def results(self) -> dict[Any, Any]:
+        """Results that are `cached`, by function and arguments."""
+        return {}
+
+    @property
+    def times(self) -> np.ndarray:
+        """Equidistant output times (samples,) in s."""
+        return np.linspace(0.0, self.duration, self.samples)
+
+    @property
+    @abstractmethod
+    def break_points(self) -> tuple[float, ...]:
+        """Times in s inside the run at which the inputs are not smooth."""
+
+    @property
+    @abstractmethod
+    def pieces(self) -> Pieces:
+        """Inputs as piecewise polynomials; `InputError` if they have none."""
+
+    @abstractmethod
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Inputs (n, number of inputs) at times (n,) in s."""
+
+    @abstractmethod
+    def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Self:
+        """The excitation with its factors set; `InputError` if one is out of its bounds."""
+
+    def for_inputs(self, names: tuple[str, ...]) -> Self:  # noqa: ARG002
+        """The excitation of a model with these inputs."""
+        return self
+
+    def subdivided(self, parts: int) -> Self:
+        """The same inputs with so many output intervals in place of each."""
+        return replace(self, samples=(self.samples - 1) * parts + 1)  # type: ignore[type-var]
+
+    @property
+    @cached
+    def packed_pieces(self) -> Ready:
+        """The pieces as an argument of compiled loops."""
+        return ready(self.pieces)
+
+    @property
+    @cached
+    def recorded_inputs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Output times (samples,) in s and inputs (samples, inputs) at these, read-only."""
+        times, inputs = self._record()
+        times.flags.writeable = inputs.flags.writeable = False
+        return times, inputs
+
+    @abstractmethod
+    def _record(self) -> tuple[np.ndarray, np.ndarray]:
+        """Output times and the inputs at these."""
+
+    @property
+    @cached
+    def extent(self) -> Extent:
+        """Extremes of the inputs, between output times too."""
+        low, high, *quick, _ = self._extent(np.inf)
+        return Extent(low, high, np.array([np.maximum(-low, high), *quick]))
+
+    def first_beyond(self, limits: np.ndarray) -> np.ndarray:
+        """Times (inputs,) in s at which limits (4, inputs) of `polynomial_loops.extent` are passed.
+
+        Infinite of inputs that stay within their limits.
+        """
+        return self._extent(limits)[4]
+
+    def _extent(self, limits: np.ndarray | float) -> np.ndarray:
+        """Result (5, inputs) of `polynomial_loops.extent`."""
+        inputs = self.pieces.coefficients.shape[1]
+        bounds, result = np.empty((4, inputs)), np.empty((5, inputs))
+        bounds[:] = limits
+        polynomial_loops()["extent"](self.packed_pieces, bounds, result)
+        return result
+
+
+@cache
+def polynomial_loops() -> dict[str, Loop]:
+    """Compiled loops over pieces."""
+    return loops(("inputs.polynomial_loops",), ("sampled", "extent"))
+
+
+def values_at(pieces: Pieces, times: np.ndarray) -> np.ndarray:
+    """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
+    order = np.argsort(times)
+    increasing = np.empty((len(times), pieces.coefficients.shape[1]))
+    polynomial_loops()["sampled"](pieces, times[order], increasing)
+    values = np.empty_like(increasing)
+    values[order] = increasing
+    return values
+
+
+def checked_times(times: Any) -> np.ndarray:
+    """Finite times (n,) in s, or `InputError`."""
+    try:
+        array = real_array(times)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    if array.ndim != 1 or not np.isfinite(array).all():
+        raise InputError(f"times are {quoted(times)}, not a list of finite times in s")
+    return array
+
+
+def checked_factor(name: str, value: object) -> float:
+    """A factor on the frequency or amplitude; `InputError` if it is none, or out of bounds."""
+    factor = number(f"{name} factor", value)
+    if name == "frequency" and factor <= 0.0:
+        raise InputError(f"{name} factor: {factor:g} is not positive")
+    return within(f"{name} factor", factor, FACTORS[name])

@@ -1,0 +1,86 @@
+"""Fallback: the full order repeats the runs of a reduced vehicle that are not to be trusted.
+
+It repeats them from the beginning: the reduced model has mostly gone wrong before its trust
+indicator passes 1.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
+from vehiclemor.reduction.reduced_system import ReducedSystem
+from vehiclemor.reduction.settings import FallbackSettings
+from vehiclemor.registry import component
+from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.sizes import require
+
+# What users step and ask is the reduced model.
+STEPPED = ("states", "begin", "step", "rates", "sensitivities", "decode", "trust")
+
+
+@dataclass(frozen=True, eq=False)
+class FallbackModel(ShortRepr):
+    """A reduced model and the full order; it is stepped as the reduced one."""
+
+    reduced: FittedModel
+    full: ReducedSystem
+
+    def check_sizes(self) -> None:
+        """Raise `ValueError` if the first is no reduced model."""
+        for name in MEMBERS:
+            require(hasattr(self.reduced, name), name)
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in STEPPED:
+            raise AttributeError(f"a model with fallback has no {name}")
+        return getattr(self.reduced, name)
+
+    @property
+    def offline(self) -> OfflineCost:
+        """Cost of the reduced model."""
+        return self.reduced.offline
+
+    @property
+    def order(self) -> int:
+        """Order of the reduced model."""
+        return self.reduced.order
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """Best approximation of the reduced model."""
+        return self.reduced.best_approximation(states)
+
+    def simulate(
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
+        """The reduced run; where it can't be trusted, that of the full order."""
+        run = simulated(self.reduced, maneuver, start, outputs)
+        if run.status == "ok" and run.trust:
+            return run
+        # A model without a trust indicator is trusted nowhere.
+        reason = run.message or "the reduced model does not judge itself"
+        trust = run.trust or Trust(np.inf, 0.0, reason)
+        full = self.full.simulate(maneuver, start, outputs)
+        remarks = f"full_order did the run: {trust.message or run.message}", full.remark
+        return replace(
+            full,
+            counts={name: count + full.counts[name] for name, count in run.counts.items()},
+            seconds=run.seconds + full.seconds,
+            remark="; ".join(filter(None, remarks)),
+            trust=trust,
+        )
+
+
+def with_fallback(reduced: FittedModel, model: DynamicModel, settings: Any) -> FittedModel:
+    """A reduced model with the fallback that its settings name, if they name one."""
+    if not isinstance(settings, FallbackSettings) or settings.fallback == "none":
+        return reduced
+    full_order = component("method", "full_order")
+    chosen = full_order.settings[model.kind](
+        solver=settings.fallback, tolerance=settings.fallback_tolerance
+    )
+    return FallbackModel(reduced, full_order.fit(model, (), chosen))

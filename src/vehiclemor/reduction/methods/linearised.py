@@ -1,0 +1,342 @@
+"""Reductions of the linearised model, without training: single track, modes, balanced, IRKA.
+
+A vehicle is linearised at straight running:
+
+    z' = a z + b s,  shape = straight running + V z + K (s, s', ...) + speed mode
+
+Where the inputs contain derivatives of the steering s (a rack that is prescribed), the deviation d
+with d' = A d + B0 s + B1 s' + B2 s'' has none left in the rate of d - K0 s - K1 s', where K1 = B2
+and K0 = B1 + A B2.  What is left drives no stabilised constraint: the eigenvalues at which those
+cluster are no motion.  Speed, heading and position are those of every reduced vehicle: the speed
+stays that of the start, and the dynamics are those of the model's own speed.
+
+Reductors choose coordinates of the lateral modes, those that steering moves:
+
+- `modal_truncation` (E. Davison, IEEE Trans. Autom. Control 11 (1966), 93-101) takes the slow
+  modes.  The others are dropped, or follow the steering without delay (static correction), so that
+  steady cornering is that of the linearisation.  Of a structure it takes all modes up to a
+  frequency, linearised at the static state.
+- `balanced_truncation` (B. C. Moore, IEEE Trans. Autom. Control 26 (1981), 17-32) and `irka`
+  (S. Gugercin, A. C. Antoulas, C. Beattie, SIAM J. Matrix Anal. Appl. 30 (2008), 609-638) are
+  pyMOR's; their outputs are the yaw rate and the lateral speed.  Of structures pyMOR has the same
+  iteration in second-order form (SOR-IRKA), which did not converge on the truck.
+
+The single-track car (P. Riekert, T. E. Schunck, Ing.-Arch. 11 (1940), 210-224; M. Mitschke,
+H. Wallentowitz, Dynamik der Kraftfahrzeuge, Springer) has the lateral speed V and the yaw rate r at
+constant speed U.  With C_i, l_i effective cornering stiffness and position of the axles:
+
+    m V' = -m U r + sum_i F_i,   J r' = sum_i l_i F_i,   F_i = C_i (steer_i - (V + l_i r) / U)
+
+All other lateral states of the linearised model are eliminated as if they were at rest
+(A_kk - A_kf A_ff^-1 A_fk, static condensation).  So the stiffnesses are effective ones: pneumatic
+trail, roll steer, camber and, for a prescribed rack, the wheels' angle per rack are in them.  The
+2x2 matrix of the car at U0 gives that at all speeds,
+
+    A(U) = U [[0, -1], [0, 0]] + U0 / U A1
+
+Velocity and acceleration of the rack are left out, and so are heave and pitch.
+"""
+
+import time
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.exceptions import InputError
+from vehiclemor.reduction.interface import Method, OfflineCost, installed, offline_cost
+from vehiclemor.reduction.projection.balancing import (
+    BalancedStructureSettings,
+    balanced_structure,
+    check_balancing,
+)
+from vehiclemor.reduction.projection.structural import (
+    ReducedStructure,
+    StructuralSettings,
+    free_modes,
+    reduced,
+)
+from vehiclemor.reduction.settings import FallbackSettings
+from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle.features import PLANAR, FeatureListing
+from vehiclemor.reduction.vehicle.linear_modes import (
+    SlowModes,
+    lateral_modes,
+    slow_modes,
+    within,
+)
+from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
+from vehiclemor.simulation.dynamic import DynamicModel
+
+# Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
+CORNERING = 4.0
+# Error scales: a multiple of steady cornering; of the speed (m/s), heading (rad), position (m).
+MARGIN = 3.0
+SPEED, HEADING, POSITION = 10.0, 1.0, 10.0
+# Lateral speed (m/s) of a typical maneuver.
+SIDEWARD = 0.5
+# Module and class of pyMOR by reductor.
+PYMOR = {"balanced_truncation": ("bt", "BTReductor"), "irka": ("h2", "IRKAReductor")}
+
+
+class ModalVehicleSettings(FallbackSettings):
+    """Settings for a vehicle."""
+
+    fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
+    static_correction: Literal["yes", "no"] = Field(
+        "yes", description="dropped modes follow the steering without delay"
+    )
+
+
+class RankedVehicleSettings(FallbackSettings):
+    """Settings of what pyMOR reduces."""
+
+    rank: int = Field(4, ge=1, description="coordinates of the lateral dynamics")
+
+
+class StructuralModesSettings(StructuralSettings):
+    """Settings for a structure."""
+
+    highest: float = Field(100.0, gt=0.0, le=1e5, description="modes of up to so many Hz are kept")
+
+
+# Shape, its lateral modes, what of it follows the inputs at once, settings -> these of the reduced
+# vehicle.
+Reductor = Callable[
+    [VehicleShape, SlowModes, np.ndarray, Any],
+    tuple[SlowModes, np.ndarray],
+]
+
+
+def truncated(
+    shape: VehicleShape,
+    modes: SlowModes,
+    static_response: np.ndarray,
+    settings: ModalVehicleSettings,
+) -> tuple[SlowModes, np.ndarray]:
+    """The slow modes; `InputError` if there are none."""
+    # In real form, rows of a block have the length |lambda|.
+    slow = np.linalg.norm(modes.rates, axis=1) <= settings.fastest
+    if not slow.any():
+        limit = settings.fastest
+        raise InputError(f"fastest is {limit:g} 1/s: no mode that steering moves is that slow")
+    if settings.static_correction == "yes" and not slow.all():
+        steady = np.linalg.solve(modes.rates[~slow][:, ~slow], modes.input_matrix[~slow])
+        static_response = static_response.copy()
+        static_response[:, 0] -= modes.right[:, ~slow] @ steady
+    chosen = np.eye(len(slow))[slow]
+    return within(modes, chosen, chosen.T), static_response
+
+
+def by_pymor(name: str) -> Reductor:
+    """A reductor of pyMOR; `InputError` if pyMOR is missing."""
+    module, kind = PYMOR[name]
+    with installed("pyMOR"):
+        reductor = getattr(import_module(f"pymor.reductors.{module}"), kind)
+
+    def projected(
+        shape: VehicleShape,
+        modes: SlowModes,
+        static_response: np.ndarray,
+        settings: RankedVehicleSettings,
+    ) -> tuple[SlowModes, np.ndarray]:
+        """The modes in pyMOR's bases; `InputError` if the rank is too high."""
+        from pymor.core.logger import log_levels
+        from pymor.models.iosys import LTIModel
+
+        if settings.rank >= (most := len(modes.rates)):
+            raise InputError(
+                f"rank is {settings.rank}; {shape.model.name} allows at most {most - 1}"
+            )
+        outputs = shape.linearised.motion_a[[0, 2]] @ modes.right
+        full = LTIModel.from_matrices(modes.rates, modes.input_matrix[:, None], outputs)
+        with log_levels({"pymor": "ERROR"}):
+            projection = reductor(full)
+            projection.reduce(settings.rank)
+        trial, test = projection.V.to_numpy(), projection.W.to_numpy()
+        return within(modes, np.linalg.solve(test.T @ trial, test.T), trial), static_response
+
+    return projected
+
+
+def linear_vehicle(model: DynamicModel, settings: Any, reductor: Reductor) -> ReducedVehicle:
+    """The reduced vehicle of linear dynamics in the coordinates that a reductor chooses."""
+    began = time.process_time()
+    shape = VehicleShape(model)
+    modes, static_response = reductor(shape, *lateral_modes(shape), settings)
+    linear = shape.linearised
+    k, inputs = len(modes.rates), linear.b.shape[1]
+    listing = FeatureListing(k + 1, inputs)
+    terms = [(value,) for value in (listing.number(1.0), *listing.z, *listing.u)]
+    odd, even = [*range(1, k + 1), *range(k + 2, k + 2 + inputs)], [0, k + 1]
+    # The vehicle is its own mirror image: the speed moves nothing sideways, steering changes no U.
+    groups = ((tuple(odd), (*range(k), k + 1, k + 3)), (tuple(even), (k, k + 2)))
+    features = listing.features(terms, groups)
+    decoding = np.zeros((len(features.terms), len(linear.a)))
+    decoding[odd] = np.vstack([modes.right.T, static_response.T])
+    decoding[k + 1] = modes.speed_right
+    c = np.zeros((len(features.terms), k + 1 + PLANAR))
+    c[odd[: k + 1], :k] = np.vstack([modes.rates.T, modes.input_matrix])
+    for column, row in ((k + 1, 0), (k + 3, 2)):
+        c[odd, column] = decoding[odd] @ linear.motion_a[row]
+        c[odd[k:], column] += linear.motion_b[row]
+    c[even, k + 2] = shape.speed, 1.0
+    lateral_scale = error_scale(shape, modes, static_response)
+    return ReducedVehicle(
+        model,
+        shape,
+        features,
+        parameters=np.zeros(0),
+        coefficients=c,
+        decoding=decoding,
+        encoding=modes.encoding,
+        feedthrough=modes.input_shift,
+        error_scale=np.concatenate([lateral_scale, [SPEED, HEADING, POSITION, POSITION]]),
+        offline=linearisation_cost(shape, began),
+        solver=settings.solver,
+        tolerance=settings.tolerance,
+        transient=modes.symmetric,
+    )
+
+
+def error_scale(shape: VehicleShape, modes: SlowModes, static_response: np.ndarray) -> np.ndarray:
+    """Magnitudes (k,) of lateral coordinates: a multiple of those in steady cornering."""
+    steady = -np.linalg.solve(modes.rates, modes.input_matrix)
+    turn = shape.linearised.motion_a[0] @ (modes.right @ steady + static_response[:, 0])
+    # At least a thousandth of the largest one, for coordinates that steady cornering leaves alone.
+    sizes = np.maximum(np.abs(steady), 1e-3 * np.abs(steady).max())
+    return MARGIN * CORNERING / shape.speed / abs(turn) * sizes
+
+
+def linearisation_cost(shape: VehicleShape, began: float) -> OfflineCost:
+    """Seconds since `began` (`time.process_time()`); two evaluations for every state and input."""
+    return offline_cost(began, shape.model, further=2 * sum(shape.linearised.b.shape))
+
+
+def single_track(
+    model: DynamicModel, training: Training, settings: FallbackSettings
+) -> ReducedVehicle:
+    """The single-track car by static condensation."""
+    began = time.process_time()
+    shape = VehicleShape(model)
+    linear, modes, inputs = shape.linearised, slow_modes(shape, np.inf), len(model.inputs)
+    # States of the shape that are nearest to V and r; the others follow them and the steering.
+    planar = np.argmax(np.abs(linear.motion_a[[2, 0]]), axis=1)
+    others = np.setdiff1d(np.arange(len(linear.a)), planar)
+    drive = np.column_stack([linear.a[np.ix_(others, planar)], linear.b[others, 0]])
+    response = np.zeros((len(linear.a), 3))
+    # The speed's zero eigenvalue makes the matrix singular: the least-squares solution cuts it.
+    response[others] = -np.linalg.lstsq(linear.a[np.ix_(others, others)], drive, rcond=1e-10)[0]
+    response[planar, [0, 1]] = 1.0
+    condensed = linear.a[planar] @ response
+    condensed[:, 2] += linear.b[planar, 0]
+    # What comes from the tires goes as one over the speed.
+    tire = condensed[:, :2] - np.array([[0.0, -shape.speed], [0.0, 0.0]])
+    # States V, r and the deviation of the speed.
+    listing = FeatureListing(3, inputs)
+    (v, r, slower), u, p = listing.z, listing.u[0], listing.p(0)
+    part, speed = listing.let(p / (p + slower)), p + slower
+    terms = ((v,), (r,), (u,), (part, v), (part, r), (speed, r), (speed,), (slower,))
+    groups = (((0, 1, 2, 3, 4, 5), (0, 1, 3, 5)), ((6, 7), (4,)))
+    c = np.zeros((len(terms), 3 + PLANAR))
+    c[[3, 4], :2], c[2, :2], c[5, 0] = tire.T, condensed[:, 2], -1.0
+    c[1, 3], c[6, 4], c[0, 5] = 1.0, 1.0, 1.0
+    decoding = np.zeros((len(terms), len(shape.reference)))
+    decoding[:3], decoding[7] = response.T, modes.speed_right
+    turn = CORNERING / shape.speed
+    scales = [MARGIN * SIDEWARD, MARGIN * turn, SPEED, HEADING, POSITION, POSITION]
+    return ReducedVehicle(
+        model,
+        shape,
+        listing.features(terms, groups),
+        parameters=np.array([shape.speed]),
+        coefficients=c,
+        decoding=decoding,
+        encoding=np.vstack([np.eye(len(linear.a))[planar], modes.speed_left]),
+        feedthrough=np.zeros((3, inputs)),
+        error_scale=np.array(scales),
+        offline=linearisation_cost(shape, began),
+        solver=settings.solver,
+        tolerance=settings.tolerance,
+    )
+
+
+def modal(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
+    """Linearise and truncate."""
+    if model.kind != "structural":
+        return linear_vehicle(model, settings, truncated)
+    began = time.process_time()
+    return reduced(model, [free_modes(model, settings.highest)], settings, began)
+
+
+def balanced(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
+    """Balance and truncate; `InputError` if pyMOR is missing."""
+    if model.kind != "structural":
+        return linear_vehicle(model, settings, by_pymor("balanced_truncation"))
+    return balanced_structure(model, settings)
+
+
+def interpolated(
+    model: DynamicModel, training: Training, settings: RankedVehicleSettings
+) -> ReducedVehicle:
+    """Interpolate by IRKA; `InputError` if pyMOR is missing."""
+    return linear_vehicle(model, settings, by_pymor("irka"))
+
+
+def no_linear_model(model: Any) -> str:
+    """Why a model is no vehicle whose lateral modes steering moves; every structure is linear."""
+    return "" if model.kind == "structural" else no_steered_vehicle(model)
+
+
+LINEAR_SINGLE_TRACK = Method(
+    name="linear_single_track",
+    summary="linear single-track car with the model's own effective stiffnesses",
+    reference="10.1007/BF02086921",
+    settings=dict.fromkeys(("ode", "dae"), FallbackSettings),
+    refusal=no_steered_vehicle,
+    fit=single_track,
+    learns_from="nothing",
+)
+
+MODAL_TRUNCATION = Method(
+    name="modal_truncation",
+    summary="slow modes of the linearised model: lateral ones of a car, all of a structure",
+    reference="10.1109/TAC.1966.1098264",
+    settings={
+        **dict.fromkeys(("ode", "dae"), ModalVehicleSettings),
+        "structural": StructuralModesSettings,
+    },
+    refusal=no_linear_model,
+    fit=modal,
+    learns_from="nothing",
+    band="highest",
+)
+
+BALANCED_TRUNCATION = Method(
+    name="balanced_truncation",
+    summary="what the inputs move and the outputs see most, of a linearised model, by pyMOR",
+    reference="10.1109/9.544000",
+    settings={
+        **dict.fromkeys(("ode", "dae"), RankedVehicleSettings),
+        "structural": BalancedStructureSettings,
+    },
+    refusal=no_linear_model,
+    fit=balanced,
+    check=check_balancing,
+    learns_from="nothing",
+    packages=("pymor",),
+)
+
+IRKA = Method(
+    name="irka",
+    summary="lateral dynamics that interpolate the linearised ones best (IRKA), by pyMOR",
+    reference="10.1137/060666123",
+    settings=dict.fromkeys(("ode", "dae"), RankedVehicleSettings),
+    refusal=no_steered_vehicle,
+    fit=interpolated,
+    learns_from="nothing",
+    packages=("pymor",),
+)
