@@ -22,6 +22,7 @@ from vehiclemor.report.printed_numbers import (
     printed_errors_and_savings,
 )
 from vehiclemor.report.published import Claim, Number, load_published
+from vehiclemor.report.result_selection import result_kind
 from vehiclemor.report.sizes import size_rows
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.resources import data_names
@@ -174,9 +175,12 @@ def study_comparison(
 
 def result_rows(dataset: xr.Dataset) -> Sequence[Row]:
     """Rows of one study, by what it is."""
-    if "mesh" in dataset.dims:
-        return list(size_rows(dataset))
-    return protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
+    match result_kind(dataset):
+        case "size study":
+            return list(size_rows(dataset))
+        case "protocol":
+            return protocol_rows(dataset)
+    return grid_rows(dataset)
 
 
 def timing_of(model: str, folder: Path) -> xr.Dataset:
