@@ -62,7 +62,7 @@ def _points(drawing: Drawing) -> Points:
         values = load_parameters(name, component("model", name).parameters).values()
         for point, value in values.items():
             if np.shape(value) == (3,):
-                origin = drawing.get("rear") if point.startswith("rear_") else drawing["front"]
+                origin = drawing["rear" if point.startswith("rear_") else "front"]
                 points[point] = np.add(origin, value)
     return points | {point: np.array(value) for point, value in drawing["points"].items()}
 
