@@ -14,10 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from vehiclemor.array_shapes import check_shapes, require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
-from vehiclemor.sizes import require, shaped
 
 # Edges in Hz of bands in which inputs of structures are known, and time (s) between samples.  A
 # reduced structure holds motion up to a frequency: on a corrugated road hardly anything is slower.
@@ -133,11 +133,11 @@ class InputRange:
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if the magnitudes or the histories are no tables of floats."""
-        shaped("largest", (self.largest, len(self.largest), *self.largest.shape[1:2]))
+        check_shapes("largest", (self.largest, len(self.largest), *self.largest.shape[1:2]))
         if self.histories is not None:
             runs_and_samples = self.histories.shape[:2]
             require(min(runs_and_samples) > 0, "histories")
-            shaped("histories", (self.histories, *runs_and_samples, self.largest.shape[1]))
+            check_shapes("histories", (self.histories, *runs_and_samples, self.largest.shape[1]))
 
     @property
     def _sizes(self) -> np.ndarray:

@@ -13,7 +13,7 @@ import vehiclemor as vm
 from tests.refusing import refused
 from vehiclemor.exceptions import FileError
 from vehiclemor.netcdf_file import write_dataset
-from vehiclemor.reduction.parts import Reader, Writer
+from vehiclemor.reduction.parts import Parts
 
 # What refers to no model.
 NOTHING: Any = SimpleNamespace()
@@ -39,25 +39,21 @@ def rewritten(path, change):
 
 
 def replaced(changes):
-    """Puts values, or functions of what is there, at places `a.b.c` in the parts of a model."""
+    """Puts values, or functions of what is there, at paths `a.b.c` in the parts of a model."""
 
     def change(dataset, tree):
-        arrays = {str(name): variable.values for name, variable in dataset.items()}
-        writer = Writer(NOTHING)
-        for number, (place, value) in enumerate(changes.items()):
+        stored = {str(name): variable.values for name, variable in dataset.items()}
+        for path, value in changes.items():
             holder, key, node = tree, "", tree
-            for name in place.split("."):
-                inside = isinstance(node, list) or name in node
-                holder = node if inside else node.get("fields") or node["tuple"]
-                key = int(name) if isinstance(holder, list) else name
-                node = holder[key]
-            stored = isinstance(node, dict) and "array" in node
-            old = Reader(NOTHING, arrays).value(node, "") if stored else node
-            new = value(old) if callable(value) else value
-            part = writer.part(new, f"changed{number}") if isinstance(new, np.ndarray) else new
-            holder[key] = part
-        for name, array in writer.arrays.items():
-            dataset[name] = [f"{name}_{axis}" for axis in range(array.ndim)], array
+            for name in path.split("."):
+                holder, key = node, int(name) if isinstance(node, list) else name
+                node = node[key]
+            is_array = isinstance(node, dict) and "@array" in node
+            old = Parts(NOTHING, stored).read(node, path) if is_array else node
+            new, parts_of = value(old) if callable(value) else value, Parts(NOTHING)
+            holder[key] = parts_of.write(new, path) if isinstance(new, np.ndarray) else new
+            for array in parts_of.arrays.values():
+                dataset[path] = [f"{path}_changed_{axis}" for axis in range(array.ndim)], array
 
     return change
 

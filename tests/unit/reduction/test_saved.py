@@ -6,6 +6,7 @@ import math
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import netCDF4
@@ -21,7 +22,7 @@ from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.reduction import parts
-from vehiclemor.reduction.parts import Reader, Writer
+from vehiclemor.reduction.parts import Parts
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.simulation.build import build
 from vehiclemor.study.plans.protocol import protocol_names
@@ -57,30 +58,58 @@ def test_another_process_gets_the_same_to_the_bit_and_derives_nothing(car, tmp_p
     assert not {"sympy", "numba", "xarray"} & set(modules)
 
 
-def parted(value):
-    """A value, written and read again; arrays as they were written."""
-    writer = Writer(NOTHING)
-    written = json.loads(json.dumps(writer.part(value, "value")))
-    return Reader(NOTHING, writer.arrays).value(written, "value"), writer.arrays
+class Kinds(NamedTuple):
+    """Fields of all types that a plug-in may declare."""
+
+    arrays: tuple[np.ndarray, ...]
+    scalars: tuple[float | int | bool | str | None, ...]
+    pair: Pair
+    open: Any
+    choice: Pair | float
+    items: list[Pair]
+    by_name: dict[str, tuple[float, ...]]
+    bare: tuple
+
+
+def read_again(value):
+    """A value, written and read again."""
+    writer = Parts(NOTHING)
+    written = json.loads(json.dumps(writer.write(value, "value")))
+    return Parts(NOTHING, writer.arrays).read(written, "value")
 
 
 def test_parts_are_what_they_were(monkeypatch):
     # As of a plug-in that is in use.
-    monkeypatch.setattr(parts, "_plug_ins", lambda: {"tests"})
+    monkeypatch.setattr(parts, "_plug_ins", lambda: {__name__.partition(".")[0]})
     table = np.arange(6.0).reshape(2, 3)
-    whole = table.astype(int), table > 2.0, table + 1j * table
-    arrays = (table, table.T, *whole, np.zeros((0, 3)), np.array([np.nan, -np.inf]), np.array(2.0))
-    values = 1, -0.0, np.inf, True, None, "text", np.float64(0.1), [Pair(1, (2, [3.0]))], {"b": ()}
-    (made, others), _ = parted((arrays, values))
-    for before, after in zip(arrays, made, strict=True):
+    numbers = table.astype(int), table > 2.0, table + 1j * table, np.array(2j)
+    arrays = (
+        table,
+        table.T,
+        *numbers,
+        np.zeros((0, 3)),
+        np.array([np.nan, -np.inf]),
+        np.array(2.0),
+    )
+    scalars = 1, -0.0, np.inf, True, None, "text", np.float64(0.1)
+    further = Pair(1, (2, (3.0,))), 2.0, [Pair(table, "a")], {"b": (), "c": (1.0,)}, (1, Pair(1, 2))
+    kinds = Kinds(arrays, scalars, Pair(1, 2), *further)
+    again = read_again(kinds)
+    for before, after in zip(arrays, again.arrays, strict=True):
         assert (after.dtype, after.shape) == (before.dtype, before.shape)
         np.testing.assert_array_equal(after, before)
-    assert others == values
-    assert math.copysign(1.0, others[1]) == -1.0
-    assert isinstance(others[-2][0], Pair)
     # Rows or columns stand together as they did: products are rounded by it.
-    assert made[1].flags.f_contiguous
-    assert len(parted((table, table))[1]) == 1
+    assert again.arrays[1].flags.f_contiguous
+    assert math.copysign(1.0, again.scalars[1]) == -1.0
+    np.testing.assert_array_equal(again.items[0].first, table)
+    assert again._replace(arrays=(), items=[]) == kinds._replace(arrays=(), items=[])
+
+
+def test_values_of_another_type_than_declared_are_not_written(monkeypatch):
+    monkeypatch.setattr(parts, "_plug_ins", lambda: {__name__.partition(".")[0]})
+    for wrong in ([1.0], {"a": 1.0}, np.zeros(3, dtype=np.float32), SimpleNamespace()):
+        with pytest.raises(InputError, match="it can't be saved: value\\.first is"):
+            read_again(Pair(wrong, 1.0))
 
 
 def test_parameters_settings_and_training_come_along(tmp_path):
@@ -116,7 +145,7 @@ def test_a_path_that_is_taken_is_refused_unless_asked(car, saved):
 
 UNWRITABLE = [
     *((lambda state: state, "offline"), (build(CAR).start, "offline"), (Pair(1.0, 2.0), "offline")),
-    *((KERNELS, "offline"), ([1.0, KERNELS], "offline.1"), ({2: 3.0}, "offline")),
+    *((KERNELS, "offline"), ([1.0, KERNELS], "offline"), ({2: 3.0}, "offline")),
     *((np.array(["text"]), "offline"), (np.zeros(3, dtype=np.float32), "offline")),
     (dataclasses.replace(build(CAR).system, inputs=1), "offline"),
 ]
