@@ -19,7 +19,7 @@ Results = Annotated[Path, Parameter(help="Results folder.")]
 Jobs = Annotated[int, Parameter(help="Number of processes, for what is missing.")]
 Seed = Annotated[
     int | None,
-    Parameter(help="Samples fresh test runs of protocols, for an audit whose results are stored separately."),
+    Parameter(help="Samples fresh test runs of protocols, for an audit with separate results."),
 ]
 # One value or several: separated by spaces, or behind the same option again.
 Several = Parameter(consume_multiple=True)
