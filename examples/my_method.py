@@ -22,9 +22,7 @@ from numpy.polynomial.polynomial import polyvander2d
 from pydantic import Field
 
 import vehiclemor as vm
-from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
-from vehiclemor.reduction.settings import Settings
-from vehiclemor.simulation.run_timer import clock
+from vehiclemor.plugin import Method, OfflineCost, Settings, clock, offline_cost
 
 
 class PolynomialSettings(Settings):

@@ -17,12 +17,7 @@ import numpy as np
 import sympy as sp
 
 import vehiclemor as vm
-from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.quantities import Quantity
-from vehiclemor.parameters import Declared
-from vehiclemor.symbolic.program import assemble
-from vehiclemor.symbolic.tape import Tape
+from vehiclemor.plugin import Declared, Maneuver, ModelDefinition, Quantity, Tape, assemble
 
 folder = Path(tempfile.mkdtemp())
 VALUES = {"m_s": (250, "kg"), "m_u": (45, "kg"), "k": (16e3, "N/m"), "c": (1e3, "N s/m")}

@@ -93,7 +93,7 @@ def stale(name: str, choice: Choice) -> list[str]:
         "settings": (json.loads(written["settings"]), choice.settings),
         "training": (json.loads(written["training"]), json.loads(json.dumps(training))),
         "parameters": (json.loads(written["parameters"]), parameters_of(choice.protocol.model)),
-        "source": (attributes["code"], code_digest(name, choice.method, choice.settings)),
+        "source": (attributes["code"], code_digest(name, choice.method)),
     }
     return [what for what, (then, now) in here.items() if then != now]
 

@@ -8,9 +8,7 @@ import numpy as np
 from pydantic import Field
 from scipy.linalg import expm, schur
 
-from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
-from vehiclemor.reduction.settings import Settings
-from vehiclemor.simulation.run_timer import clock
+from vehiclemor.plugin import Method, OfflineCost, Settings, clock, offline_cost
 
 
 class ModalSettings(Settings):

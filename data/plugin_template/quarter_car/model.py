@@ -8,11 +8,7 @@ from pathlib import Path
 import numpy as np
 import sympy as sp
 
-from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.quantities import Quantity
-from vehiclemor.parameters import Declared
-from vehiclemor.symbolic.program import assemble
-from vehiclemor.symbolic.tape import Tape
+from vehiclemor.plugin import Declared, ModelDefinition, Quantity, Tape, assemble
 
 # Name -> unit and bounds.  Values, with their sources, stand in parameters.toml.
 MASS = Declared("kg", above=0.0, at_most=1e5)

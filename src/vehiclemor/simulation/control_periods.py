@@ -8,7 +8,7 @@ import numpy as np
 from vehiclemor.array_shapes import check_indices, check_shapes, require
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.integrators.structures import Spans, Subspaces
+from vehiclemor.simulation.loop_arguments import Spans, Subspaces
 
 # Lists of spans that are kept.
 MOST_SPANS = 64

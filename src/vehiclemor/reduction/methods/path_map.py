@@ -19,7 +19,7 @@ from numpy.polynomial import chebyshev
 from pydantic import Field
 
 from vehiclemor.array_shapes import check_distinct_indices, check_indices, check_shapes, require
-from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
+from vehiclemor.codegen.derivatives import JacobianProduct, jacobian_product
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
 from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value
@@ -154,9 +154,9 @@ class PathMapModel(ReducedMechanism):
         return self._evaluated(np.array([time]), inputs, ready(Samples(inputs)))
 
     @cached_property
-    def _sensitivity(self) -> Sensitivity:
+    def _jacobian(self) -> JacobianProduct:
         kernel = self._kernel
-        return sensitivity(kernel, kernel.arguments[0], len(self.columns), len(self.ranges))
+        return jacobian_product(kernel, kernel.arguments[0], len(self.columns), len(self.ranges))
 
     def slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
         """Derivatives of coordinates, or of the model's outputs there, by the inputs."""
@@ -167,7 +167,7 @@ class PathMapModel(ReducedMechanism):
         indices = np.clip(within, 0.0, cells.tops).astype(int)
         cell = np.ravel_multi_index(tuple(indices), tuple(cells.numbers))
         arrays = 2.0 * (within - indices) - 1.0, cells.coefficients[cell].ravel()
-        table = self._sensitivity.jacobian(arrays) * (2.0 * cells.halves * cells.scales)
+        table = self._jacobian.jacobian(arrays) * (2.0 * cells.halves * cells.scales)
         moved = table[: len(self.model.coordinates)]
         if of == "coordinates":
             return moved
