@@ -275,7 +275,7 @@ def judge(
         return
     errors = ["score", "median_score"]
     columns = ["label", "runs", "misses", "silent", "flagged", *errors, "output"]
-    if rows["seconds"].notna().any():
+    if bool(rows["seconds"].notna().any()):
         columns.append("seconds")
     methods, outputs = (rows.query(f"kind == {kind!r}") for kind in ("method", "output"))
     print(Table(methods, columns))
