@@ -214,7 +214,7 @@ def _allows(choice: Any, kind: type) -> bool:
         return kind not in (list, dict)
     if origin is float:
         return kind in (float, int)
-    # A truth value is a whole number to Python, and a list a sequence.
+    # To Python a truth value is an integer, and a list a sequence.
     return kind is origin or (kind not in (bool, list) and issubclass(kind, origin))
 
 
