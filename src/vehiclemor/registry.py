@@ -82,8 +82,6 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
     """Error for an unknown name, with the nearest known ones."""
     known = sorted(set(known))
     hint = did_you_mean(name, known) or f"known: {', '.join(known)}"
-    if kind == "maneuver":
-        hint += "; a CSV file is read by vm.Signal.from_csv, in a shell by --maneuver FILE.csv"
     return InputError(f"unknown {kind} {quoted(name)}; {hint}")
 
 

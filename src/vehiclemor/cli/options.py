@@ -21,17 +21,20 @@ Seed = Annotated[
     int | None,
     Parameter(help="Samples fresh test runs of protocols, for an audit with results of its own."),
 ]
+# One value or several: separated by spaces, or behind the same option again.
+Several = Parameter(consume_multiple=True)
 Settings = Annotated[
     list[str] | None,
-    Parameter(name="--set", help="key=value: a setting of the method; may be given several times."),
+    Several,
+    Parameter(name="--set", help="key=value, one or several: settings of the method."),
 ]
 Parameters = Annotated[
     list[str] | None,
+    Several,
     Parameter(
         name="--parameter",
-        help="name=value: a parameter of the model in SI units, a point as x,y,z or one component "
-        "as name.z=value; may be given several times. `vehiclemor show MODEL` has names, units and "
-        "bounds.",
+        help="name=value, one or several: parameters of the model in SI units, a point as x,y,z or "
+        "one component as name.z=value. `vehiclemor show MODEL` has names, units and bounds.",
     ),
 ]
 ParameterFile = Annotated[
@@ -48,6 +51,14 @@ def strict(wanted: Any, tokens: Sequence[Token]) -> Any:
         if Path in (wanted, *get_args(wanted)):
             file_path(name, text)
     return convert(wanted, tokens)
+
+
+def check_names(option: str, names: Iterable[str]) -> None:
+    """Raise `InputError` if commas separate names."""
+    for name in names:
+        if "," in name and not Path(name).exists():
+            spaced = name.replace(",", " ")
+            raise InputError(f"{option} {quoted(name)}: spaces separate names, {option} {spaced}")
 
 
 def key_values(option: str, given: Iterable[str] | None) -> dict[str, Any]:

@@ -15,6 +15,8 @@ from vehiclemor.cli.options import (
     Parameters,
     Results,
     Settings,
+    Several,
+    check_names,
     key_values,
     new_file,
     picture_file,
@@ -35,18 +37,16 @@ def simulate(
     method: str = "full_order",
     settings: Settings = None,
     maneuver: str | None = None,
-    csv: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    csv: Annotated[list[str] | None, Several] = None,
     frequency: float = 1.0,
     amplitude: float = 1.0,
     start: str | None = None,
     preset: str = "recommended",
-    training: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = (
-        "matched",
-    ),
+    training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = ("matched",),
     parameter: Parameters = None,
     parameter_file: ParameterFile = None,
     out: Path | None = None,
-    plot: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
+    plot: Annotated[list[Path] | None, Several] = None,
     animate: Path | None = None,
     all_outputs: bool = False,
 ) -> int:
@@ -61,7 +61,7 @@ def simulate(
     maneuver
         Registered name, or a CSV file of a log; the model's own by default.
     csv
-        key=value, once or several: how to read a CSV file. INPUT=COLUMN says which column is an
+        key=value, one or several: how to read a CSV file. INPUT=COLUMN says which column is an
         input; time=COLUMN, unit=deg (or mm), ratio=16 (steering wheel to wheels), hold=cubic,
         separator=; and decimal=, are the words of vm.Signal.from_csv.
     frequency
@@ -84,6 +84,7 @@ def simulate(
     all_outputs
         Print errors of every output, not only of those that tables show.
     """
+    check_names("--training", training)
     chosen = key_values("--set", settings)
     for key in inspect.signature(vm.simulate).parameters.keys() & chosen.keys():
         raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
@@ -141,7 +142,7 @@ def plot(
     result: str,
     *,
     kind: Kind = "histories",
-    select: list[str] | None = None,
+    select: Annotated[list[str] | None, Several] = None,
     out: Path | None = None,
     animate: Path | None = None,
     results: Results = RESULTS,
@@ -155,8 +156,8 @@ def plot(
     kind
         What is drawn.
     select
-        dimension=value of the study's grid; may be given several times.  Where none is given,
-        factors are 1, other values are the first, errors are over all and methods all drawn.
+        dimension=value of the study's grid, one or several.  Without it factors are 1, other
+        values are the first, errors are over all and methods all drawn.
     out
         Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
     animate
@@ -273,7 +274,9 @@ def judge(
         print(json_text(rows))
         return
     own, errors = ["label", "runs", "misses", "silent", "flagged"], ["score", "median_score"]
-    own += [*errors, "output"] + ["seconds"] * bool(rows["seconds"].notna().any())
+    own += [*errors, "output"]
+    if rows["seconds"].notna().any():
+        own.append("seconds")
     methods, outputs = (rows.query(f"kind == {kind!r}") for kind in ("method", "output"))
     print(Table(methods, own))
     each = ["output", "measure", "bound", "unit", "misses", "silent", *errors]

@@ -12,7 +12,18 @@ from cyclopts import Parameter
 
 import vehiclemor as vm
 from vehiclemor.api import RESULTS
-from vehiclemor.cli.options import FAILED, MISSED, All, Jobs, Json, Results, Seed, new_file
+from vehiclemor.cli.options import (
+    FAILED,
+    MISSED,
+    All,
+    Jobs,
+    Json,
+    Results,
+    Seed,
+    Several,
+    check_names,
+    new_file,
+)
 from vehiclemor.exceptions import InputError
 from vehiclemor.report.printing import ends_text, wrapped
 from vehiclemor.report.study_formats import Format
@@ -118,7 +129,7 @@ def compare(
 
 def figures(
     *,
-    only: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    only: Annotated[list[str] | None, Several] = None,
     out: Path | None = None,
     results: Results = RESULTS,
     jobs: Jobs = 1,
@@ -142,6 +153,7 @@ def figures(
     """
     if only is not None and not only:
         raise InputError("--only names no figure")
+    check_names("--only", only or ())
     failed: dict[str, str] = {}
     with shown_progress():
         written = vm.figures(only or (), out, results, jobs, style=style, dpi=dpi, failed=failed)
@@ -167,6 +179,7 @@ def report(
     out
         The file, which ends with .html.
     """
+    check_names("report", studies)
     new_file("--out", out, (".html", ".htm"))
     with shown_progress():
         print(f"written: {vm.write_report(studies, out, results, jobs)}")

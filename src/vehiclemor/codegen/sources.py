@@ -14,7 +14,7 @@ from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
-from vehiclemor.codegen.cache import fetched
+from vehiclemor.codegen.cache import from_cache
 from vehiclemor.exceptions import PlugInError
 from vehiclemor.resources import data_folder
 
@@ -76,7 +76,7 @@ def source_digest(layers: Sequence[str], files: Sequence[str] = ()) -> str:
     # This file decides what a text means.
     written = _hash([("", Path(__file__).read_bytes()), *texts])
     name = f"sources/source-{written}"
-    return fetched(name, lambda: _hash([(n, _meaning(t)) for n, t in texts]).encode()).decode()
+    return from_cache(name, lambda: _hash([(n, _meaning(t)) for n, t in texts]).encode()).decode()
 
 
 def _hash(texts: Sequence[tuple[str, bytes]]) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.array_shapes import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
 from vehiclemor.reduction.reduced_system import ReducedSystem
@@ -16,7 +17,6 @@ from vehiclemor.reduction.settings import FallbackSettings
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
-from vehiclemor.sizes import require
 
 # What users step and ask is the reduced model.
 STEPPED = ("states", "begin", "step", "rates", "sensitivities", "decode", "trust")

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import file_path, flag
+from vehiclemor.array_shapes import require
 from vehiclemor.exceptions import FileError, InputError, VehiclemorError, one_line
 from vehiclemor.files import replaceable
 from vehiclemor.multibody.quantities import Quantity
@@ -33,7 +34,6 @@ from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.sizes import require
 
 # Of the layout of these files.
 SCHEMA = 6

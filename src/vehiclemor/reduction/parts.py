@@ -22,11 +22,11 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from vehiclemor.arguments import quoted
+from vehiclemor.array_shapes import require
 from vehiclemor.codegen.operations import Operation, as_arrays, of_arrays
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import GROUPS
 from vehiclemor.simulation.model import Model
-from vehiclemor.sizes import require
 
 # Where the classes are that may be parts of reduced models.
 ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.codegen.derivatives import sensitivity
+from vehiclemor.codegen.derivatives import jacobian_product
 from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def constant_derivatives(
         directions[:, len(flat) :] = differences(solved, flat, numbers)
     given = np.concatenate([flat, solved(flat)]) if definition.solved else flat
     source = equations.sources["constants"]
-    found = sensitivity(source, source.arguments[0], equations.constants, len(given))
+    found = jacobian_product(source, source.arguments[0], equations.constants, len(given))
     return found.columns((given,), directions)
 
 

@@ -5,10 +5,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from vehiclemor.array_shapes import check_indices, check_shapes, require
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.integrators.structures import Spans, Subspaces
-from vehiclemor.sizes import require, shaped, within
+from vehiclemor.simulation.loop_arguments import Spans, Subspaces
 
 # Lists of spans that are kept.
 MOST_SPANS = 64
@@ -39,11 +39,11 @@ class ControlPeriods(ShortRepr):
             (self.trial_basis, windows, rows, columns),
             (self.test_basis, windows, rows, columns),
         )
-        shaped("spaces", (self.edges, windows + 1), (self.means, windows, columns), *bases)
+        check_shapes("spaces", (self.edges, windows + 1), (self.means, windows, columns), *bases)
         if form != "full":
             # A coordinate and its rate share a row where coordinates are projected.
             most = rows * (2 if form == "coordinates" else 1)
-            within("ranks", self.ranks.tolist(), min(most, columns) + 1)
+            check_indices("ranks", self.ranks.tolist(), min(most, columns) + 1)
 
     @cached_property
     def subspaces(self) -> Ready:

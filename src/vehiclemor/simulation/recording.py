@@ -12,7 +12,7 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import limits_of
 from vehiclemor.simulation.evaluation import address_of, evaluate, path_loops
-from vehiclemor.simulation.integrators.structures import Outputs
+from vehiclemor.simulation.loop_arguments import Outputs
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.workspaces import Run
 
@@ -106,7 +106,7 @@ class Recording:
     Attributes
     ----------
     states, inputs
-        At the points (points, number), see `structures.Output`.
+        At the points (points, number), see `loop_arguments.Output`.
     places
         How the samples follow from them (samples, 2); empty (0, 2) if they are these.
     """

@@ -19,10 +19,10 @@ from vehiclemor.codegen.loops import ready
 from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.polynomial_loops import Pieces
 from vehiclemor.simulation.evaluation import CONSTANTS, STATE, directional, partial
-from vehiclemor.simulation.integrators.structures import Output, Spans
+from vehiclemor.simulation.loop_arguments import Output, Spans
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Pool, Solver, Workspace
+from vehiclemor.simulation.workspaces import DrivenBy, Pool, Solver, Workspace
 
 # Shortest step in s: the time loop takes times that differ by less for one.
 SHORTEST = 1e-9
@@ -115,7 +115,7 @@ class SteppedSystem:
             if status:
                 reached = time + begin + space.buffer[0]
                 raise ConvergenceError(f"{REASONS[status]} at t = {reached:.6g} s")
-            start[:] = output.path[0]
+            start[:] = output.states[0]
         found = start.copy()
         self._pool.give_back(None, held)
         return found
@@ -145,8 +145,8 @@ class SteppedSystem:
         path, windows = np.empty((1, len(self.system.error_scale))), self.spaces
         if self.moved:
             windows = replace(windows, means=windows.means.copy())
-        drive = DrivenBy(signal, spans, NO_POINTS[0])
-        output = Output(sample, path, counts, *NO_POINTS, np.inf)
+        drive = DrivenBy(signal, spans, np.empty((0, 0)))
+        output = Output.at_samples(sample, path, counts)
         space = self.system.packed(windows, Solver(self.solver, self.tolerance), drive, output)
         words = space.call.words
         first = c_double.from_buffer(words, 8 * space.call.address("control.first"))

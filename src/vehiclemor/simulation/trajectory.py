@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import quoted, real_array
+from vehiclemor.array_shapes import check_shapes
 from vehiclemor.exceptions import InputError
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.run_timer import CLOCK
-from vehiclemor.sizes import shaped
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -128,9 +128,9 @@ class Trajectory(ShortRepr):
     def check_sizes(self) -> None:
         """Raise `ValueError` if histories are of other samples than the times."""
         samples = max(len(self.times), 1)
-        shaped("times", (self.times, samples))
+        check_shapes("times", (self.times, samples))
         for history in (self.inputs, self.coordinates, self.speeds, self.outputs):
-            shaped("samples", (history, samples, *history.shape[1:2]))
+            check_shapes("samples", (history, samples, *history.shape[1:2]))
 
     @classmethod
     def of(cls, **fields: Any) -> Trajectory:

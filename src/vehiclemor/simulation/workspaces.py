@@ -15,13 +15,12 @@ import numpy as np
 from vehiclemor.codegen.loops import Prepared, Ready
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.control_periods import ControlPeriods
-from vehiclemor.simulation.integrators.structures import NODES, Output
+from vehiclemor.simulation.loop_arguments import Output
 
 Kept = TypeVar("Kept")
 # Kinds of runs whose workspaces are kept.
 MOST_KINDS = 64
-# Of a run that is recorded at the samples: no inputs, points and places.
-NO_POINTS = np.empty((0, 0)), np.empty((0, 0)), np.empty(0), np.empty((0, 2))
+ALL_SAMPLES = np.empty((0, 2))
 
 
 class Pool(Generic[Kept]):
@@ -88,7 +87,7 @@ class Workspace:
         self.call.give("signal", drive.signal)
         self.call.give("spans", drive.spans)
         self.signal = drive.signal
-        self.output.given[:] = drive.inputs
+        self.output.sample_inputs[:] = drive.inputs
 
 
 @dataclass(eq=False, slots=True)
@@ -109,22 +108,19 @@ class Run:
     def __post_init__(self) -> None:
         """Find how far it is recorded."""
         self.rows = len(self.whole)
-        places = self.places
-        if len(places):
-            reached = int(places[:, 0].argmax()) if self.failure else -1
-            row, part = places[reached].tolist()
+        if self.space is not None and len(self.places):
             # Kernels take so many at once.
-            self.rows = max(int(row) + (1 if part < 0.0 else NODES), LANES)
+            self.rows = max(int(self.space.output.rows[0]), LANES)
 
     @property
     def path(self) -> np.ndarray:
-        """States (samples, dim) at the output times, or at points, see `structures.Output`."""
+        """States (samples, dim) at the output times, or at points, see `loop_arguments.Output`."""
         return self.whole[: self.rows]
 
     @property
     def places(self) -> np.ndarray:
         """How the samples follow from points (samples, 2); empty (0, 2) if they are these."""
-        return NO_POINTS[-1] if self.space is None else self.space.output.places
+        return ALL_SAMPLES if self.space is None else self.space.output.point_of_sample
 
     def recorded_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Times (s) and inputs of its rows, or of more; those at the samples are given.
@@ -135,8 +131,8 @@ class Run:
             return self.times, inputs
         output = self.space.output
         if len(self.places):
-            return output.point_times, output.inputs
-        return self.times, output.given
+            return output.point_times, output.point_inputs
+        return self.times, output.sample_inputs
 
     @property
     def kept(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.evaluation import path_loops
-from vehiclemor.simulation.integrators.structures import NODE_1, NODE_2, Outputs
+from vehiclemor.simulation.loop_arguments import NODE_1, NODE_2, Outputs
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.simulation.workspaces import MOST_KINDS, Pool, Solver
 

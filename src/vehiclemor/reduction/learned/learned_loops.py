@@ -4,8 +4,8 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
+from vehiclemor.array_shapes import check_shapes, require
 from vehiclemor.codegen.loop_types import Float, Int, IntMatrix, IntVector, Matrix, Vector, vector
-from vehiclemor.sizes import require, shaped
 
 # Beyond this magnitude of a standardised coordinate a run has diverged.
 LARGEST = 1e3
@@ -38,11 +38,11 @@ class Equations(NamedTuple):
         terms, layers, kernels = self.terms, self.widths.tolist(), len(self.centres)
         require(terms.ndim == 2 and terms.shape[1] > 0, "terms")
         require(bool(((terms >= 0) & (terms <= arguments)).all()), "terms")
-        shaped("coefficients", (self.coefficients, len(terms), m))
-        shaped("kernels", (self.centres, kernels, arguments), (self.heights, kernels, m))
+        check_shapes("coefficients", (self.coefficients, len(terms), m))
+        check_shapes("kernels", (self.centres, kernels, arguments), (self.heights, kernels, m))
         if layers:
             require(min(layers) > 0 and (layers[0], layers[-1]) == (arguments, m), "widths")
-            shaped("weights", (self.weights, sum((a + 1) * b for a, b in pairwise(layers))))
+            check_shapes("weights", (self.weights, sum((a + 1) * b for a, b in pairwise(layers))))
 
 
 def evaluate(equations: Equations, v: Vector, buffer: Vector, result: Vector) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.array_shapes import check_shapes, require
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
@@ -29,7 +30,6 @@ from vehiclemor.reduction.trust import trust_of
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.sizes import require, shaped
 
 # Runge-Kutta steps: longest as a multiple of the fastest linear time, and how many a sample at
 # most.
@@ -276,15 +276,15 @@ class LearnedModel(ShortRepr):
             require((arguments, m) == sizes, "equations")
         require(SHORTEST <= self.time_step < np.inf, "time_step")
         r, online = len(self.forward), len(self.model.definition.online)
-        shaped("ranges", (self.ranges, r + online, 2))
+        check_shapes("ranges", (self.ranges, r + online, 2))
         require(len(self.input_scale) == len(self.model.inputs) + online, "input_scale")
         require(self.forward.shape == self.back.T.shape, "components")
         if not static and self.model.kind != "structural":
             n = len(self.states.of(self.model.start()[None])[0])
-            shaped("components", (self.forward, r, n), (self.back, n, r))
+            check_shapes("components", (self.forward, r, n), (self.back, n, r))
         elif self.model.kind == "structural":
             rows = r + len(self.input_scale) + 1
-            shaped("outputs", (self.outputs, rows, len(self.model.outputs)))
+            check_shapes("outputs", (self.outputs, rows, len(self.model.outputs)))
         require(bool(((self.observables >= 0) & (self.observables <= r)).all()), "observables")
 
     @property

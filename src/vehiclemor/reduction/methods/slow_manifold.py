@@ -132,7 +132,8 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
         (odd, lateral), (even, symmetric) = reduced.features.groups
         # What heave and pitch do in straight running is exact, and speed is constant there.
         even = even[2 + listing.symmetric :]
-        free = [*((odd, i) for i in lateral), *((even, i) for i in symmetric)]
+        free = [(odd, i) for i in lateral]
+        free += [(even, i) for i in symmetric]
         reduced = improved(reduced, targets, free, settings.steps, power=1.0)
         reduced = improved(reduced, targets, free, settings.steps)
     reduced = _with_decoding(reduced, training, settled, samples, settings.ridge)

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.array_shapes import require
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
@@ -35,7 +36,6 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 from vehiclemor.simulation.workspaces import Solver
-from vehiclemor.sizes import require
 
 # A state whose range is below this share of the largest one is noise, not motion.
 SMALLEST_RANGE = 1e-6

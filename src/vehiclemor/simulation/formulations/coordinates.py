@@ -7,7 +7,7 @@ basis are V^T, those of the test basis its left inverse.
 from vehiclemor.codegen.loop_types import call_kernel
 from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.integrators.dense_solves import small_solve
-from vehiclemor.simulation.integrators.structures import DERIVATIVE, RHS_CALLS, SECOND_ORDER, SPEEDS
+from vehiclemor.simulation.loop_arguments import DERIVATIVE, RHS_CALLS, SECOND_ORDER, SPEEDS
 
 INLINED = ("rhs", "reconstruct", "origin", "add_motion", "galerkin", "product")
 

@@ -11,6 +11,7 @@ that are their own mirror image, one of those that reverse.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
@@ -229,9 +230,12 @@ class _Step(Listing):
             own = self.at(to, first), padded(len(block)), ("_u", rows), self.at(vector, first)
             self.new("product", detail=(*own, columns, kept, weight))
 
-    def made(self, name: str) -> Kernel:
-        """The kernel."""
-        return self.kernel(name, ("_x", "_u", "_constants", "_result", "_kernels"))
+    def step_kernel(self, name: str) -> Kernel:
+        """The kernel; it needs room in the result for all vectors, as long as they are padded."""
+        arguments = ("_x", "_u", "_constants", "_result", "_kernels")
+        kernel = self.kernel(name, arguments)
+        x, u, constants, _, kernels = kernel.sizes
+        return replace(kernel, sizes=(x, u, constants, self.used, kernels))
 
 
 def _total(terms: Sequence[Value]) -> Value:
@@ -245,8 +249,7 @@ def exponential_step(frame: Frame, inputs: int) -> Kernel:
     The numbers are h, stretch, three weights of the quadrature and the share of the defect; the
     second argument the tables of the step.  Result: (new, rates there, error).
     """
-    given = ("y", "f", "y_past", "f_past")
-    step = _Step(frame, given, 6)
+    step = _Step(frame, etdrk4.ARGUMENTS, len(etdrk4.NUMBERS))
     n, (h, stretch, at_past, at_half, at_end, share) = step.n, step.scalars
     for name in RESULTS:
         step.at(name)
@@ -296,4 +299,4 @@ def exponential_step(frame: Frame, inputs: int) -> Kernel:
     for i in range(n):
         one, other = (step.entry(*step.at(name, i)) for name in ("error", "middle"))
         step.store(step.at("error", i)[1], abs(one) + abs(other))
-    return step.made("etdrk4_step")
+    return step.step_kernel("etdrk4_step")
