@@ -326,7 +326,10 @@ def _of_cell(cell: np.ndarray, moving: int, degree: int) -> np.ndarray:
     for axis in range(moving):
         cell = _along(to_powers, cell, axis)
     terms = monomials(moving, degree)
-    powers = [np.array([term.count(k) for term in terms]) for k in range(moving)]
+    powers = np.zeros((moving, len(terms)), dtype=int)
+    for column, term in enumerate(terms):
+        for variable in term:
+            powers[variable, column] += 1
     return cell[tuple(powers)]
 
 

@@ -101,13 +101,9 @@ class AlgebraicProjection(ReducedMechanism):
             bases[k, : basis.rank] = basis.vectors.T
             if self.tests is not None:
                 tests[k, : basis.rank] = self.tests[k].T
-        subspaces = Windows(
-            first_samples(times, self.edges),
-            np.array([basis.mean for basis in self.bases]),
-            bases,
-            tests,
-            np.array([basis.rank for basis in self.bases]),
-        )
+        means = np.array([basis.mean for basis in self.bases])
+        ranks = np.array([basis.rank for basis in self.bases])
+        subspaces = Windows(first_samples(times, self.edges), means, bases, tests, ranks)
         iteration = Iteration(self.tolerance, ITERATION_LIMIT, np.inf)
         least_squares = int(self.tests is None)
         kernels = model.addresses("jacobian_entries", "jacobian_product")
