@@ -96,8 +96,8 @@ class ReplayModel(ShortRepr):
         shared = times <= run.times[-1]
         difference = _resampled(run.times, run.inputs, times[shared]) - inputs[shared]
         of_inputs = np.sqrt(np.mean(difference**2, axis=0))
-        apart = np.append(of_inputs, self.conditions[number] - conditions)
-        return float(np.linalg.norm(apart / self._ranges))
+        differences = np.append(of_inputs, self.conditions[number] - conditions)
+        return float(np.linalg.norm(differences / self._ranges))
 
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""

@@ -135,10 +135,10 @@ def fit_windows(
     """POD subspaces between edges (windows + 1,) in s, of snapshots as in `dynamic.fit_windows`."""
     began = time.process_time()
     count, rank = settings.snapshots, settings.rank
-    moments = [np.linspace(a, b, count) for a, b in pairwise(edges)]
-    histories = [run.at(np.concatenate(moments)) for run in training]
+    snapshot_times = [np.linspace(a, b, count) for a, b in pairwise(edges)]
+    histories = [run.at(np.concatenate(snapshot_times)) for run in training]
     bases = []
-    for k in range(len(moments)):
+    for k in range(len(snapshot_times)):
         part = slice(k * count, (k + 1) * count)
         snapshots = np.concatenate([history.coordinates[part] for history in histories]).T
         if seed := settings.rounding_seed:
