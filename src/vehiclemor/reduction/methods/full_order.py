@@ -40,6 +40,7 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 class AlgebraicSettings(Settings):
     """How algebraic equations are solved."""
 
+    integration = ("solver", "tolerance")
     solver: Literal["newton", "newton_lanes"] = Field(
         "newton",
         description="newton: fresh Jacobians; newton_lanes: with predictor, eight samples at once",
@@ -61,6 +62,7 @@ class DynamicSettings(OnlineSettings):
 class FullStructureSettings(StructuralSettings):
     """How structures are integrated."""
 
+    integration = ("solver", "tolerance")
     solver: Literal["generalised_alpha"] = Field(
         SOLVER, description="of order 2, one step size a run, damped at infinity"
     )

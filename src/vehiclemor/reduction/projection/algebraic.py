@@ -60,6 +60,7 @@ class AlgebraicPodSettings(Settings):
     reversed_coordinates: str = Field(
         "", description="galerkin: coordinates counted the other way round, separated by commas"
     )
+    integration = ("tolerance",)
     tolerance: StepTolerance = 1e-12
     rounding_seed: int = Field(
         0, ge=0, description="seed of a relative noise of 2^-52 on the snapshots; 0: none"

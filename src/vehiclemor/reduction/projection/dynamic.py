@@ -49,6 +49,7 @@ class DynamicPodSettings(Settings):
     the projected equations keep the model's energy.
     """
 
+    integration = ("solver", "tolerance")
     solver: ProjectedSolver = "dopri5"
     tolerance: Tolerance = 1e-6
     rank: Rank = 3

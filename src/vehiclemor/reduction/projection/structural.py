@@ -47,6 +47,7 @@ RESULTS = {"rhs": "rhs", "outputs": "outputs"}
 class StructuralSettings(Settings):
     """What all reductions of structures share."""
 
+    integration = ("tolerance",)
     tolerance: float = Field(
         USUAL,
         gt=0.0,

@@ -2,7 +2,7 @@
 
 import itertools
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -101,7 +101,7 @@ def figure_histories(
     """
     texts = legend_of(dataset)
     runs = runs_of(dataset, texts)
-    rows = [draw_history]
+    rows: list[Callable[[Axes, Runs, str], object]] = [draw_history]
     if runs.compared:
         rows.append(draw_largest_errors if len(texts) > 1 else draw_errors)
     heights = [HISTORY, ERROR][: len(rows)]
