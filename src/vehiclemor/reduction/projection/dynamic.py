@@ -148,7 +148,7 @@ class DynamicProjection(ReducedSystem):
                 spaces = replace(spaces, means=np.tile(state, (len(spaces.means), 1)))
             how = Solver(self.solver, self.tolerance, times[first:end], begin=left)
             run = self.system.run(maneuver, state, spaces, how)
-            states[first:end], failure = run.whole, run.failure
+            states[first:end], failure = run.recorded_states, run.failure
             counts, seconds, first = counts + run.counts, seconds + run.seconds, end
         found = model.trajectory(times, maneuver.at(times), states, counts, seconds, failure)
         return found if outputs is None else found.chosen(outputs)

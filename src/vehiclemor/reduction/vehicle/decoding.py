@@ -269,11 +269,11 @@ class Decoding(ShortRepr):
 
         Of `start` see `decoding_loops.Known`.
         """
-        held = run.kept.get("decoded")
+        held = run.cached_loops.get("decoded")
         if held is None or held.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
-            held = self.space((times, run.whole, inputs), excited.copy(), run.rows)
-            run.kept["decoded"] = held
+            held = self.space((times, run.recorded_states, inputs), excited.copy(), run.rows)
+            run.cached_loops["decoded"] = held
         held.excited[:] = excited
         held.start[:] = start
         return self._lifted(held, run.rows)
