@@ -15,7 +15,7 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.control_periods import whole_space
-from vehiclemor.simulation.integrators.structures import FINISHED
+from vehiclemor.simulation.loop_arguments import FINISHED
 from vehiclemor.simulation.system import Solver
 from vehiclemor.study.run import run_studies
 from vehiclemor.symbolic.program import Program

@@ -4,7 +4,7 @@ import numpy as np
 from quarter_car.maneuver import ROAD
 
 import vehiclemor as vm
-from vehiclemor.contracts import check_method, check_model
+from vehiclemor.plugin import check_method, check_model
 
 
 def test_the_model_keeps_its_contract():

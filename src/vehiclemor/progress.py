@@ -1,7 +1,7 @@
-"""A word on standard error about what takes long: lines of the logger `vehiclemor`.
+"""Log slow first use, and report the progress of studies.
 
-They appear where the application has no handlers of its own, and are silenced as usual:
-`logging.getLogger("vehiclemor").setLevel(logging.WARNING)`.
+Lines go to the logger `vehiclemor`.  They appear on standard error where the application has no
+handlers, and are silenced as usual: `logging.getLogger("vehiclemor").setLevel(logging.WARNING)`.
 """
 
 import logging
@@ -9,14 +9,11 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from threading import Timer
 from time import perf_counter
 
-# What is done within this time (s) is not worth a word.
-QUIET = 1.0
 _LOG = logging.getLogger("vehiclemor")
-# Lines of this process.
-_SAID: set[str] = set()
+# Compilation of a lone kernel within this time (s) is not mentioned.
+QUICK = 1.0
 
 
 class StandardError(logging.Handler):
@@ -35,73 +32,62 @@ if not _LOG.handlers:
         _LOG.setLevel(logging.INFO)
 
 
-class _Task:
-    """What is told of as one: that it has begun, once it has taken long, and then its end."""
+class FirstUse:
+    """A use of something whose code may not be in the cache yet."""
 
-    def __init__(self, began: str, ended: str) -> None:
-        self.began, self.ended = began, ended
-        self.seconds, self.told = 0.0, False
-
-    def tell(self) -> None:
-        # One name may stand for several files.
-        if self.began not in _SAID:
-            _SAID.add(self.began)
-            self.told = True
-            _LOG.info(self.began)
-
-    def tell_end(self) -> None:
-        if self.told:
-            _LOG.info("%s in %.1f s", self.ended, self.seconds)
+    def __init__(self, what: str) -> None:
+        self.what, self.announced, self.seconds = what, False, 0.0
 
     @contextmanager
-    def running(self) -> Iterator[None]:
-        """A part of it; the seconds of all parts count."""
-        timer = Timer(max(QUIET - self.seconds, 0.0), self.tell)
-        timer.daemon = True
-        begun = perf_counter()
-        if not self.told:
-            timer.start()
+    def compiling(self, announce: bool) -> Iterator[None]:
+        """A part of its code that is missing, timed."""
+        if announce and not self.announced:
+            self.announced = True
+            _LOG.info("first use of %s: compiling, cached for later runs", self.what)
+        begin = perf_counter()
         try:
             yield
         finally:
-            timer.cancel()
-            if timer.is_alive():
-                timer.join()
-            self.seconds += perf_counter() - begun
+            self.seconds += perf_counter() - begin
 
 
-_CURRENT: ContextVar[_Task | None] = ContextVar("first use", default=None)
+_CURRENT: ContextVar[FirstUse | None] = ContextVar("first use", default=None)
 
 
 @contextmanager
-def first_use(what: str) -> Iterator[_Task]:
-    """All that is derived and compiled inside is told of as one; within another, part of that."""
-    if task := _CURRENT.get():
-        yield task
+def first_use(what: str) -> Iterator[FirstUse]:
+    """Code that is missing inside is announced once; a first use within another is part of it."""
+    if outer := _CURRENT.get():
+        yield outer
         return
-    task = _Task(f"first use of {what}: compiling; kept for later runs", f"{what}: compiled")
-    token = _CURRENT.set(task)
+    use = FirstUse(what)
+    token = _CURRENT.set(use)
     try:
-        yield task
+        yield use
     finally:
         _CURRENT.reset(token)
-    task.tell_end()
+    if use.announced or use.seconds > QUICK:
+        _LOG.info("%s: compiled in %.1f s", what, use.seconds)
 
 
 @contextmanager
-def making(what: str) -> Iterator[None]:
-    """Deriving or compiling something that is kept for later runs."""
-    with first_use(what) as task, task.running():
+def compiling(what: str, slow: bool = True) -> Iterator[None]:
+    """Derivation or compilation of something that is missing in the cache.
+
+    It is announced if it is slow, or part of a first use.
+    """
+    announce = slow or _CURRENT.get() is not None
+    with first_use(what) as use, use.compiling(announce):
         yield
 
 
 @contextmanager
-def telling(what: str) -> Iterator[None]:
-    """Anything else that may take long."""
-    task = _Task(what, f"{what}: done")
-    with task.running():
-        yield
-    task.tell_end()
+def announced(what: str) -> Iterator[None]:
+    """Anything else that takes long."""
+    begin = perf_counter()
+    _LOG.info(what)
+    yield
+    _LOG.info("%s: done in %.1f s", what, perf_counter() - begin)
 
 
 # Called with (study or other work, finished parts, all parts).
@@ -111,7 +97,7 @@ _LISTENER: ContextVar[Progress | None] = ContextVar("progress", default=None)
 
 @contextmanager
 def listening(progress: Progress | None) -> Iterator[None]:
-    """Tell a function of the progress of all that is run inside, deep in comparisons too."""
+    """Call a function with the progress of all that runs inside, deep in comparisons too."""
     token = _LISTENER.set(progress)
     try:
         yield
@@ -120,6 +106,6 @@ def listening(progress: Progress | None) -> Iterator[None]:
 
 
 def tell(work: str, done: int, total: int) -> None:
-    """Tell whoever listens."""
+    """Report progress to the function that listens."""
     if progress := _LISTENER.get():
         progress(work, done, total)

@@ -11,7 +11,7 @@ import pytest
 
 from tests.oracles import complex_step
 from tests.reducing import training_runs
-from vehiclemor.codegen.derivatives import Sensitivity
+from vehiclemor.codegen.derivatives import JacobianProduct
 from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.systems import exported_system
 from vehiclemor.inputs.maneuver import Maneuver
@@ -343,7 +343,7 @@ LONG_TO_COMPILE = ("fixed_basis", "pod")
 @pytest.mark.parametrize("by", ["state", "inputs"])
 def test_jacobians_are_the_slopes_of_rates_and_outputs(pair, by, monkeypatch):
     if pair.model.kind == "dae" and pair.name in LONG_TO_COMPILE:
-        monkeypatch.setattr(Sensitivity, "_products", complex_step.products)
+        monkeypatch.setattr(JacobianProduct, "_products", complex_step.products)
     pair.space()
     rom, time = ReducedOrderModel(pair.model, pair.name, {}, (), pair.fit()), 1.63
     u = pair.maneuver.at(np.array([time]))[0]

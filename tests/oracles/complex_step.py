@@ -79,12 +79,12 @@ def jacobian(kernel: Kernel, arrays: Sequence[np.ndarray], place: int) -> np.nda
     return derivative_along(kernel, arrays, directions)
 
 
-def products(sensitivity: Any, arrays: Sequence[np.ndarray], seeds: np.ndarray) -> np.ndarray:
-    """What a `Sensitivity` gives along all seeds at once, without machine code.
+def products(jacobian: Any, arrays: Sequence[np.ndarray], seeds: np.ndarray) -> np.ndarray:
+    """What a `JacobianProduct` gives along all seeds at once, without machine code.
 
     To compile the longest takes a quarter of a minute.
     """
-    kernel = sensitivity.kernel
+    kernel = jacobian.kernel
     given = dict(zip(kernel.arguments, [*arrays, seeds.T], strict=False))
     found = [np.broadcast_to(result, len(seeds)) for result in results(kernel, given)]
     return np.column_stack(found)

@@ -15,12 +15,11 @@ from pathlib import Path
 
 import pytest
 
-from vehiclemor import progress
 from vehiclemor.codegen import cache
-from vehiclemor.codegen.cache import cache_folder, fetched, once
+from vehiclemor.codegen.cache import cache_folder, cached_by_one_thread, from_cache
 from vehiclemor.exceptions import MachineError
 from vehiclemor.files import remove_leftovers, temporary_path, write_text, write_whole
-from vehiclemor.progress import first_use, making
+from vehiclemor.progress import compiling, first_use
 
 PACKAGE = Path(cache.__file__).parents[1]
 NAME = "kernels/some-0123.o"
@@ -48,7 +47,11 @@ def made() -> list[bytes]:
 
 @pytest.fixture
 def fetch(made: list[bytes]) -> Callable[..., bytes]:
-    return lambda name=NAME, content=CONTENT: fetched(name, lambda: made.append(content) or content)
+    def compute(content: bytes) -> bytes:
+        made.append(content)
+        return content
+
+    return lambda name=NAME, content=CONTENT: from_cache(name, lambda: compute(content))
 
 
 def flipped(content: bytes, bit: int) -> bytes:
@@ -182,7 +185,7 @@ def test_the_environment_chooses_the_folder(tmp_path, monkeypatch, fetch, made):
     monkeypatch.setattr(platformdirs, "user_cache_path", lambda name: tmp_path / "own" / name)
     monkeypatch.chdir(tmp_path)
     for chosen, expected in (("", "own/vehiclemor"), (tmp_path / "a", "a"), ("b", "b")):
-        cache._folder.cache_clear()
+        cache._cache.cache_clear()
         monkeypatch.setenv("VEHICLEMOR_CACHE", str(chosen))
         assert cache_folder() == tmp_path / expected
     # A process that goes elsewhere keeps its cache.
@@ -220,7 +223,7 @@ def test_nothing_is_read_that_could_run_code():
 def test_what_threads_ask_for_together_is_made_once_and_tried_again_if_it_fails():
     tries, gate = [], threading.Barrier(8)
 
-    @once
+    @cached_by_one_thread
     def thing(name: str) -> object:
         tries.append(name)
         time.sleep(0.05)
@@ -242,31 +245,26 @@ def test_what_threads_ask_for_together_is_made_once_and_tried_again_if_it_fails(
 
 LOOP = """
 import logging
-from vehiclemor import progress
-progress.QUIET = 0.0
 from vehiclemor.codegen.loops import loops
 {before}
 loops(("simulation.path_loops",), ("kernel_path",))
 """
 
 
-def test_what_takes_long_is_told_of_and_its_end_if_it_has_one(monkeypatch, caplog):
+def test_a_first_use_is_announced_when_it_compiles_and_its_end_if_it_has_one(caplog):
     caplog.set_level(logging.INFO, "vehiclemor")
-    with first_use("a model"), making("kernel"):
+    with first_use("what is in the cache"):
         pass
-    assert not caplog.messages
-    monkeypatch.setattr(progress, "QUIET", 0.3)
-    with suppress(ZeroDivisionError), first_use("what fails"), making("kernel"):
-        time.sleep(0.4)
+    with compiling("a kernel", slow=False):
+        pass
+    with suppress(ZeroDivisionError), first_use("what fails"), compiling("kernel"):
+        assert "first use of what fails" in caplog.messages[0]
         raise ZeroDivisionError
-    # No part of it takes so long, but both do; a second time it is no first use.
-    for _ in "12":
-        with first_use("a model"):
-            for part in ("derivation", "kernel"):
-                with making(part):
-                    time.sleep(0.2)
-    failed, began, ended = caplog.messages
-    assert "first use of what fails" in failed
+    with first_use("a model"):
+        for part in ("derivation", "kernel"):
+            with compiling(part):
+                time.sleep(0.2)
+    _, began, ended = caplog.messages
     assert "first use of a model" in began
     assert "a model: compiled in" in ended
     assert float(ended.split()[-2]) >= 0.4
@@ -301,7 +299,7 @@ def test_of_several_that_want_a_file_one_makes_it_and_others_wait(folder):
     found: list[bytes] = []
 
     def want() -> None:
-        found.append(fetched("kernels/some-0123.o", make))
+        found.append(from_cache("kernels/some-0123.o", make))
 
     threads = [threading.Thread(target=want) for _ in range(3)]
     threads[0].start()
@@ -321,8 +319,8 @@ def test_an_error_of_the_maker_is_its_own_and_frees_the_lock(folder):
         raise OSError("no compiler")
 
     with pytest.raises(OSError, match="no compiler"):
-        fetched("kernels/some-0123.o", fail)
-    assert fetched("kernels/some-0123.o", lambda: b"content") == b"content"
+        from_cache("kernels/some-0123.o", fail)
+    assert from_cache("kernels/some-0123.o", lambda: b"content") == b"content"
 
 
 def names_in(folder: Path) -> list[str]:

@@ -86,6 +86,7 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: of_inputs(inputs=["s"]), "derivatives of s follow from a cubic hold alone"),
         (lambda: of_inputs(inputs=["angle"]), "needs s, s_dot, s_ddot: say which column"),
         (lambda: vm.simulate(CAR, maneuver="log.csv"), "a CSV file is read by vm.Signal.from_csv"),
+        (lambda: vm.maneuver("lane_chang"), "did you mean lane_change or rack_lane_change.$"),
         (of_inputs, "1 columns without names"),
         (lambda: SQUARE.for_inputs(("s",)), "2 columns without names"),
         (lambda: vm.simulate(CAR, maneuver=BEYOND), r"input delta is 1\.08 rad at t = 0\.54 s"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.plugin import Maneuver
 
 
 def sine(times, frequency, amplitude):

@@ -8,11 +8,7 @@ from pathlib import Path
 import numpy as np
 import sympy as sp
 
-from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.quantities import Quantity
-from vehiclemor.parameters import Declared
-from vehiclemor.symbolic.program import assemble
-from vehiclemor.symbolic.tape import Tape
+from vehiclemor.plugin import Declared, ModelDefinition, Quantity, Tape, assemble
 
 # Name -> unit and bounds.  Values, with their sources, stand in parameters.toml.
 MASS = Declared("kg", above=0.0, at_most=1e5)
@@ -46,7 +42,7 @@ def derive():
         "outputs": ([body, z_u - z_s, tire], (3,)),
         # M and F of M q'' = F, side by side.
         "second_order": ([m_s, 0, strut, 0, m_u, tire - strut], (2, 3)),
-        # Speeds, where x holds the rates of the coordinates in their place.
+        # Speeds, where x holds the rates of the coordinates instead.
         "speeds": ([v_s, v_u], (2,)),
     }
     return assemble(tape, {"x": x, "u": u}, p, functions)

@@ -19,23 +19,26 @@ Results = Annotated[Path, Parameter(help="Results folder.")]
 Jobs = Annotated[int, Parameter(help="Number of processes, for what is missing.")]
 Seed = Annotated[
     int | None,
-    Parameter(help="Samples fresh test runs of protocols, for an audit with results of its own."),
+    Parameter(help="Samples fresh test runs of protocols, for an audit with separate results."),
 ]
+# One value or several: separated by spaces, or behind the same option again.
+Several = Parameter(consume_multiple=True)
 Settings = Annotated[
     list[str] | None,
-    Parameter(name="--set", help="key=value: a setting of the method; may be given several times."),
+    Several,
+    Parameter(name="--set", help="key=value, one or several: settings of the method."),
 ]
 Parameters = Annotated[
     list[str] | None,
+    Several,
     Parameter(
         name="--parameter",
-        help="name=value: a parameter of the model in SI units, a point as x,y,z or one component "
-        "as name.z=value; may be given several times. `vehiclemor show MODEL` has names, units and "
-        "bounds.",
+        help="name=value, one or several: parameters of the model in SI units, a point as x,y,z or "
+        "one component as name.z=value. `vehiclemor show MODEL` has names, units and bounds.",
     ),
 ]
 ParameterFile = Annotated[
-    Path | None, Parameter(help="Parameter file; the model's own public data by default.")
+    Path | None, Parameter(help="Parameter file; the model's public data by default.")
 ]
 
 
@@ -50,17 +53,25 @@ def strict(wanted: Any, tokens: Sequence[Token]) -> Any:
     return convert(wanted, tokens)
 
 
+def check_names(option: str, names: Iterable[str]) -> None:
+    """Raise `InputError` if commas separate names."""
+    for name in names:
+        if "," in name and not Path(name).exists():
+            spaced = name.replace(",", " ")
+            raise InputError(f"{option} {quoted(name)}: spaces separate names, {option} {spaced}")
+
+
 def key_values(option: str, given: Iterable[str] | None) -> dict[str, Any]:
     """Key -> an integer, a number, numbers that commas separate as a list, or text."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for text in given or ():
         key, separator, value = text.partition("=")
         if not separator or not key:
             raise InputError(f"{option} {text!r} is not key=value")
-        if key in found:
+        if key in values:
             raise InputError(f"{option} {key} is given twice")
-        found[key] = _parsed(value)
-    return found
+        values[key] = _parsed(value)
+    return values
 
 
 def _parsed(text: str) -> object:

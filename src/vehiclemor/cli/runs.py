@@ -15,6 +15,8 @@ from vehiclemor.cli.options import (
     Parameters,
     Results,
     Settings,
+    Several,
+    check_names,
     key_values,
     new_file,
     picture_file,
@@ -35,18 +37,16 @@ def simulate(
     method: str = "full_order",
     settings: Settings = None,
     maneuver: str | None = None,
-    csv: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    csv: Annotated[list[str] | None, Several] = None,
     frequency: float = 1.0,
     amplitude: float = 1.0,
     start: str | None = None,
     preset: str = "recommended",
-    training: Annotated[tuple[str, ...], Parameter(consume_multiple=True, show_default=False)] = (
-        "matched",
-    ),
+    training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = ("matched",),
     parameter: Parameters = None,
     parameter_file: ParameterFile = None,
     out: Path | None = None,
-    plot: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
+    plot: Annotated[list[Path] | None, Several] = None,
     animate: Path | None = None,
     all_outputs: bool = False,
 ) -> int:
@@ -59,9 +59,9 @@ def simulate(
     method
         Registered name.
     maneuver
-        Registered name, or a CSV file of a log; the model's own by default.
+        Registered name, or a CSV file of a log; the model's default maneuver if left out.
     csv
-        key=value, once or several: how to read a CSV file. INPUT=COLUMN says which column is an
+        key=value, one or several: how to read a CSV file. INPUT=COLUMN says which column is an
         input; time=COLUMN, unit=deg (or mm), ratio=16 (steering wheel to wheels), hold=cubic,
         separator=; and decimal=, are the words of vm.Signal.from_csv.
     frequency
@@ -73,7 +73,7 @@ def simulate(
     preset
         Preset of the method's settings.
     training
-        matched (the very run that is simulated; the default), nominal (the model's own maneuver),
+        matched (the very run that is simulated; the default), nominal (the model's maneuver),
         protocol (the training of the model's protocol), or names of maneuvers; one or several.
     out
         netCDF file for the result.
@@ -84,6 +84,7 @@ def simulate(
     all_outputs
         Print errors of every output, not only of those that tables show.
     """
+    check_names("--training", training)
     chosen = key_values("--set", settings)
     for key in inspect.signature(vm.simulate).parameters.keys() & chosen.keys():
         raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
@@ -141,7 +142,7 @@ def plot(
     result: str,
     *,
     kind: Kind = "histories",
-    select: list[str] | None = None,
+    select: Annotated[list[str] | None, Several] = None,
     out: Path | None = None,
     animate: Path | None = None,
     results: Results = RESULTS,
@@ -155,8 +156,8 @@ def plot(
     kind
         What is drawn.
     select
-        dimension=value of the study's grid; may be given several times.  Where none is given,
-        factors are 1, other values are the first, errors are over all and methods all drawn.
+        dimension=value of the study's grid, one or several.  Without it factors are 1, other
+        values are the first, errors are over all and methods all drawn.
     out
         Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
     animate
@@ -221,12 +222,12 @@ def export(
     """
     given, values = key_values("--set", settings), key_values("--parameter", parameter)
     file = Path(model).suffix == ".nc"
-    kept = file or method == SHIPPED
-    if (file and method) or (kept and (given or values)):
-        raise InputError("a reduced model that is kept has its method, settings and parameters")
+    saved = file or method == SHIPPED
+    if (file and method) or (saved and (given or values)):
+        raise InputError("a saved reduced model has its method, settings and parameters")
     if given and method is None:
         raise InputError("--set is for a method: --method NAME")
-    if kept:
+    if saved:
         chosen = vm.load(model) if file else vm.rom(model)
         out = destination(name_of(chosen.model.name, chosen.method), to, out, overwrite)
     else:
@@ -272,9 +273,11 @@ def judge(
     if json_output:
         print(json_text(rows))
         return
-    own, errors = ["label", "runs", "misses", "silent", "flagged"], ["score", "median_score"]
-    own += [*errors, "output"] + ["seconds"] * bool(rows["seconds"].notna().any())
+    errors = ["score", "median_score"]
+    columns = ["label", "runs", "misses", "silent", "flagged", *errors, "output"]
+    if bool(rows["seconds"].notna().any()):
+        columns.append("seconds")
     methods, outputs = (rows.query(f"kind == {kind!r}") for kind in ("method", "output"))
-    print(Table(methods, own))
+    print(Table(methods, columns))
     each = ["output", "measure", "bound", "unit", "misses", "silent", *errors]
     print(f"\n{Table(outputs, each, explain=False)}")

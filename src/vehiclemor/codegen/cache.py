@@ -1,10 +1,11 @@
 """Files in the user's cache, addressed by content and checked whenever they are read.
 
-Object code is executed, so a file counts only if it and its folders are this user's own and nobody
-else can write them, and if it is as it was written; else it is named once, and made again.
+Object code is executed, so a file counts only if it and its folders belong to this user, nobody
+else can write them, and its content is unchanged.  Otherwise a warning names the file and it is
+computed again.
 
-Names hold hashes of the source that the content is made from.  Of several processes that miss a
-file one makes it, of several threads too.
+Names hold hashes of the source that the content is computed from.  If several processes or threads
+miss a file, one computes it.
 """
 
 import atexit
@@ -17,7 +18,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from functools import cache, wraps
 from importlib.metadata import version
 from pathlib import Path
@@ -26,9 +27,9 @@ from typing import Any, TypeVar
 
 from vehiclemor.exceptions import FileError, MachineError
 from vehiclemor.files import write_whole
-from vehiclemor.progress import making
+from vehiclemor.progress import compiling
 
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 COMPILER_PACKAGES = ("numba", "llvmlite", "numpy")
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _LOG = logging.getLogger("vehiclemor")
@@ -44,53 +45,56 @@ def compiler_identity() -> str:
     return "\n".join([*parts, platform.machine(), llvm.get_host_cpu_name(), features])
 
 
-def cache_folder() -> Path:
-    """Folder of the cache: $VEHICLEMOR_CACHE, or the user's cache folder.
+class Cache:
+    """A folder of files; a temporary folder where it can't be written, or others could write it.
 
-    Where it can't be written, or others could write it, a temporary folder: then every process
-    compiles for itself, with its workers.
+    Then every process compiles for itself, with its workers.
     """
-    return _folder(os.environ.get("VEHICLEMOR_CACHE"))[0]
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                pass
+            reason = _distrust(folder.stat())
+        except OSError as error:
+            reason = error.strerror or "it can't be written"
+        if reason:
+            self.distrust(folder, reason)
+
+    def path(self, name: str) -> Path:
+        """Path of a file; others can't write to a folder on the way to it."""
+        for parent in list(Path(name).parents)[:-1]:
+            path = self.folder / parent
+            with suppress(OSError):
+                if reason := _distrust(path.lstat()):
+                    self.distrust(path, reason)
+        return self.folder / name
+
+    def distrust(self, path: Path, reason: str) -> None:
+        """Use a temporary folder from here on, removed when this process ends."""
+        _LOG.warning("cache %s is not used (%s): every process compiles for itself", path, reason)
+        self.folder = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
+        atexit.register(shutil.rmtree, self.folder, ignore_errors=True)
+
+
+def cache_folder() -> Path:
+    """Folder of the cache: $VEHICLEMOR_CACHE, or the user's cache folder, see `Cache`."""
+    return _cache(os.environ.get("VEHICLEMOR_CACHE")).folder
 
 
 @cache
-def _folder(chosen: str | None) -> list[Path]:
-    """The folder, the only item; another takes its place if files in it can't be trusted."""
+def _cache(chosen: str | None) -> Cache:
     import platformdirs
 
     folder = Path(chosen) if chosen else platformdirs.user_cache_path("vehiclemor")
-    # A process that changes its folder keeps its cache.
-    folder = folder.absolute()
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-        reason = _distrust(folder.stat())
-    except OSError as error:
-        reason = error.strerror or "it can't be written"
-    return [_instead(folder, reason) if reason else folder]
-
-
-def _folder_of(name: str) -> Path:
-    """The folder of the cache; from here on another if others may put a file of this name there."""
-    held = _folder(os.environ.get("VEHICLEMOR_CACHE"))
-    for part in list(Path(name).parents)[:-1]:
-        with suppress(OSError):
-            if reason := _distrust((held[0] / part).lstat()):
-                held[0] = _instead(held[0] / part, reason)
-    return held[0]
-
-
-def _instead(folder: Path, reason: str) -> Path:
-    """A temporary folder, removed when this process ends."""
-    _LOG.warning("cache %s is not used (%s): every process compiles for itself", folder, reason)
-    temporary = Path(tempfile.mkdtemp(prefix="vehiclemor-"))
-    atexit.register(shutil.rmtree, temporary, ignore_errors=True)
-    return temporary
+    # A process that changes its working directory stays with its cache.
+    return Cache(folder.absolute())
 
 
 def _distrust(status: os.stat_result) -> str:
-    """Why what lies there may be another user's; empty if it can't be."""
+    """Why a path may be another user's; empty if it can't be."""
     if stat.S_ISLNK(status.st_mode):
         return "it is a link"
     if not hasattr(os, "geteuid"):
@@ -107,30 +111,31 @@ def digest_of(parts: Sequence[str]) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
 
 
-def fetched(name: str, make: Callable[[], bytes]) -> bytes:
-    """Content of a file of the cache; made and written if it is missing, damaged or not ours.
+def from_cache(name: str, compute: Callable[[], bytes]) -> bytes:
+    """Content of a file of the cache; computed and written if it is missing, damaged or not ours.
 
-    One process makes it, while others that want it wait.  Its name, a path in the cache, holds the
-    hash of all that determines the content.
+    One process computes it, while others that want it wait.  Its name, a path in the cache, holds
+    the hash of all that determines the content.
     """
-    path = _folder_of(name) / name
+    path = _cache(os.environ.get("VEHICLEMOR_CACHE")).path(name)
     content, reason = _checked(path, name)
     if content is not None:
         return content
     if reason:
         _LOG.warning("%s is made again: %s", path, reason)
-    told = nullcontext() if name.startswith("sources") else making(path.stem.partition("-")[0])
-    with told, locked(path), _no_collection():
+    # Loops take seconds, most kernels a tenth of one.
+    announced = compiling(path.stem.partition("-")[0], slow=name.startswith("loops"))
+    with announced, locked(path), _no_collection():
         content, _ = _checked(path, name)
         if content is None:
-            content = make()
-            _keep(path, _digest(name, content) + b"\n" + content)
+            content = compute()
+            _write(path, _digest(name, content) + b"\n" + content)
     return content
 
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """A tenth of the time of what makes many small objects and drops few."""
+    """Pause the garbage collector: code that makes many small objects takes a tenth of the time."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -159,8 +164,8 @@ def _checked(path: Path, name: str) -> tuple[bytes | None, str]:
     return content, ""
 
 
-def _keep(path: Path, content: bytes) -> None:
-    """Write a file of the cache that nobody else can write; where that can't be, go on."""
+def _write(path: Path, content: bytes) -> None:
+    """Write a file of the cache that nobody else can write; warn where that fails."""
 
     def write(temporary: Path) -> None:
         temporary.touch(0o600)
@@ -175,9 +180,9 @@ def _keep(path: Path, content: bytes) -> None:
 
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Alone with the file at a path; the system ends the lock of a process that dies.
+    """Lock the file at a path; the system ends the lock of a process that dies.
 
-    Where it has no locks, or the folder can't be written, each makes the file for itself.
+    Without locks of the system, or in a folder that can't be written, each computes the file.
     """
     lock, file = path.with_name(f"{path.name}.lock"), None
     with suppress(ImportError, OSError):
@@ -190,26 +195,26 @@ def locked(path: Path) -> Iterator[None]:
         yield
     finally:
         if file:
-            # Who waits finds what was made, and who comes later does too.
+            # Those who wait, and those who come later, read the file.
             lock.unlink(missing_ok=True)
             file.close()
 
 
-def once(make: Callable[..., Made]) -> Callable[..., Made]:
-    """The function, with a result by its arguments that is made by one thread alone.
+def cached_by_one_thread(compute: Callable[..., Result]) -> Callable[..., Result]:
+    """The function with its results cached by arguments; one thread alone computes a result.
 
-    Machine code needs it: its addresses are handed out, so it must never be made twice and the
+    Machine code needs it: its addresses are handed out, so it must never be loaded twice and the
     first be thrown away, as `functools.cache` may do.
     """
-    made: dict[tuple[Any, ...], Made] = {}
+    results: dict[tuple[Any, ...], Result] = {}
     lock = RLock()
 
-    @wraps(make)
-    def found(*arguments: Any) -> Made:
-        if arguments not in made:
+    @wraps(compute)
+    def cached(*arguments: Any) -> Result:
+        if arguments not in results:
             with lock:
-                if arguments not in made:
-                    made[arguments] = make(*arguments)
-        return made[arguments]
+                if arguments not in results:
+                    results[arguments] = compute(*arguments)
+        return results[arguments]
 
-    return found
+    return cached

@@ -27,8 +27,8 @@ from numba.np.arrayobj import populate_array
 from vehiclemor.codegen.llvm_arithmetic import DOUBLE
 from vehiclemor.codegen.loop_types import declared_arguments
 
-# Straight-line kernels are one long block: with its own limits the compiler finds half of what left
-# and right have in common.
+# Straight-line kernels are one long block: with its default limits the compiler packs half of the
+# operations that left and right have in common.
 for option in ("-slp-schedule-budget=2000000", "-slp-max-look-ahead-depth=6"):
     llvm.set_option("vehiclemor", option)
 
@@ -45,7 +45,7 @@ OPTIONS = {
 
 
 class _Part(AOTCodeLibrary):
-    """Optimised code that is only linked into other code: it gets no machine code of its own."""
+    """Optimised code that is only linked into other code: it becomes no machine code alone."""
 
     def get_pointer_to_function(self, name: str) -> int:
         """No address: nothing is called from here."""
@@ -106,7 +106,7 @@ def compiled_loops(modules: Sequence[ModuleType], entries: Sequence[str]) -> byt
 
     Each entry becomes a C function of one pointer to 64-bit words: the arguments in order, an array
     as its address and its shape, see `loops.words`.  Functions know one another by name, those of a
-    later module take the place of earlier ones.
+    later module replace earlier ones.
     """
     functions = linked(modules)
     outer, libraries = ir.Module("loops"), []
@@ -154,10 +154,10 @@ def _export(module: ir.Module, name: str, described: Any) -> None:
     inner = ir.Function(module, kind, described.llvm_func_name)
     outer = ir.Function(module, ir.FunctionType(WORD, [WORD.as_pointer()]), name)
     builder = ir.IRBuilder(outer.append_basic_block())
-    place = iter(range(1 << 20))
+    index = iter(range(1 << 20))
 
     def word() -> Any:
-        return builder.load(builder.gep(outer.args[0], [WORD(next(place))]))
+        return builder.load(builder.gep(outer.args[0], [WORD(next(index))]))
 
     def taken(wanted: Any) -> Any:
         if hasattr(wanted, "types"):
@@ -220,7 +220,7 @@ def call_kernel(typing_context: Any, kernels: Any, index: Any, *arrays: Any) -> 
     """See `loop_types.call_kernel`."""
     del typing_context
     _require_plain(*arrays)
-    packed = types.StarArgTuple.from_types(arrays)
+    packed: Any = types.StarArgTuple.from_types(arrays)
     return types.void(kernels, index, packed), _call_kernel
 
 

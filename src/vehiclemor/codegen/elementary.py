@@ -109,7 +109,7 @@ def exp(x: Value) -> list[Value]:
 
 
 def floor(x: Value) -> Value:
-    """The largest whole number that is not above x."""
+    """The largest integer that is not above x."""
     return function("floor", x)
 
 

@@ -1,8 +1,8 @@
-"""Kernels of a model or a reduced model: derived once and kept, machine code, calls from Python.
+"""Kernels of a model or a reduced model: derivations on disk, machine code, calls from Python.
 
 Deriving a vehicle symbolically takes seconds, loading its machine code does not.  So the kernels'
-operations are kept with all that describes them, under the hash of the source that they were
-derived by: the model, the symbolic layer and this one.
+operations are cached under the hash of the source that derives them: the model, the symbolic layer
+and this one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.cache import cache_folder, compiler_identity, digest_of, fetched, once
+from vehiclemor.codegen.cache import (
+    cache_folder,
+    cached_by_one_thread,
+    compiler_identity,
+    digest_of,
+    from_cache,
+)
 from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import plug_in_digest, source_digest
 from vehiclemor.short_repr import ShortRepr
@@ -27,17 +33,17 @@ if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
 
 LAYERS = ("multibody", "symbolic", "codegen")
-# Kernels beside the functions of a program.
+# Kernels that are no functions of a program.
 BESIDE = ("constants", "jacobian_entries", "jacobian_product")
 
 
 class BareKernel(NamedTuple):
-    """A compiled function of a model for integrators of others.
+    """A compiled function of a model for other integrators.
 
-    Nothing is checked: arguments are C-contiguous arrays of floats that can be written, as long as
-    the model's.  The address is that of `void f(double *x, double *u, double *constants,
+    Nothing is checked: arguments are writable C-contiguous arrays of floats, as long as the
+    model's.  The address is that of `void f(double *x, double *u, double *constants,
     double *result)`, constants are its third argument; function and constants address are the same
-    for Python, and the owner keeps the machine code.
+    for Python.  The owner holds the machine code in memory.
     """
 
     address: int
@@ -54,7 +60,7 @@ class BareKernel(NamedTuple):
 
 
 class Kernels:
-    """Kernels, each compiled when it is first used; `sources` are their operations, by name."""
+    """Kernels, each compiled at its first use; `sources` are their operations by name."""
 
     def __init__(self, kernels: Iterable[Kernel]) -> None:
         self.sources = {kernel.name: kernel for kernel in kernels}
@@ -63,15 +69,17 @@ class Kernels:
         return name in self.sources
 
     def address(self, name: str, lanes: int = 1, results: tuple[int, ...] = ()) -> int:
-        """Address of a kernel's machine code, for loops; 0 where there is no such kernel.
+        """Address of a kernel's machine code, for loops; 0 if there is no such kernel.
 
         It takes `lanes` samples at once, see `llvm_kernels.kernel_module`, and computes the results
-        of these places, in this order; all where none are named.
+        with these indices, in this order; all if none are named.
         """
         if name not in self.sources:
             return 0
         kernel = self.sources[name]
-        return _machine(_of(kernel, results) if results else kernel, lanes)[0]
+        if results:
+            kernel = _of(kernel, results)
+        return _machine(kernel, lanes)[0]
 
     def bare(self, name: str, constants: np.ndarray) -> BareKernel:
         """A kernel of states and inputs without its checks."""
@@ -79,15 +87,16 @@ class Kernels:
         return BareKernel(address, constants, function, constants.ctypes.data, code)
 
     def call(self, name: str, *arrays: np.ndarray) -> None:
-        """Run a kernel on its arguments, the result last; `TypeError` if it can't take one."""
+        """Run a kernel on its arguments, the result last; `TypeError` if one does not fit."""
         kernel = self.sources[name]
         function = _machine(kernel, 1)[1]
         function(*[_checked(kernel, k, array) for k, array in enumerate(arrays)])
 
 
-def _checked(kernel: Kernel, place: int, array: Any) -> int:
-    last = place == len(kernel.arguments) - 1
-    dimensions, size = len(kernel.shape) if last else 1, kernel.sizes[place]
+def _checked(kernel: Kernel, index: int, array: Any) -> int:
+    """Address of the array for an argument of a kernel."""
+    last = index == len(kernel.arguments) - 1
+    dimensions, size = len(kernel.shape) if last else 1, kernel.sizes[index]
     if not (
         isinstance(array, np.ndarray)
         and array.dtype == np.float64
@@ -98,7 +107,7 @@ def _checked(kernel: Kernel, place: int, array: Any) -> int:
     ):
         kind = f"{array.dtype}{array.shape}" if hasattr(array, "dtype") else type(array)
         raise TypeError(
-            f"{kernel.name}: {kernel.arguments[place].removeprefix('_')} must be a C-contiguous "
+            f"{kernel.name}: {kernel.arguments[index].removeprefix('_')} must be a C-contiguous "
             f"array of at least {size} floats with {dimensions} dimension(s), not {kind}"
         )
     return array.ctypes.data
@@ -107,13 +116,13 @@ def _checked(kernel: Kernel, place: int, array: Any) -> int:
 class MachineCode:
     """Functions of an object file in memory, at addresses in this process.
 
-    LLVM's own loader loads it, without what has compiled it.
+    LLVM's loader loads it, without a compiler.
     """
 
     def __init__(self, content: bytes) -> None:
         import llvmlite.binding as llvm
 
-        # The engine owns the memory in which the code lies, and its target machine.
+        # The engine owns the memory of the code, and its target machine.
         machine = _target().create_target_machine()
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
@@ -121,13 +130,13 @@ class MachineCode:
 
     def address(self, name: str) -> int:
         """Address of a function."""
-        found = self._engine.get_function_address(name)
-        if not found:
+        address = self._engine.get_function_address(name)
+        if not address:
             raise ImportError(f"the object code has no function {name}")
-        return found
+        return address
 
 
-@once
+@cached_by_one_thread
 def _target() -> Any:
     import llvmlite.binding as llvm
 
@@ -139,9 +148,9 @@ def _target() -> Any:
 _of = lru_cache(maxsize=64)(Kernel.of)
 
 
-@once
+@cached_by_one_thread
 def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
-    """Address and C function of a kernel, and what owns its machine code."""
+    """Address and C function of a kernel, and the owner of its machine code."""
     parts = repr(kernel), str(lanes), source_digest(("codegen",)), compiler_identity()
 
     def make() -> bytes:
@@ -150,16 +159,16 @@ def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
 
         return compiled_module(kernel_module([kernel], lanes))
 
-    code = MachineCode(fetched(f"kernels/{kernel.name}-{digest_of(parts)}.o", make))
+    code = MachineCode(from_cache(f"kernels/{kernel.name}-{digest_of(parts)}.o", make))
     address = code.address(kernel.name)
     pointers = [ctypes.c_void_p] * len(kernel.arguments)
-    # It keeps the lock of the interpreter, which takes longer to get back than one call lasts.
+    # Calls keep the interpreter's lock: to acquire it again takes longer than a call.
     return address, ctypes.PYFUNCTYPE(None, *pointers)(address), code
 
 
 @dataclass(frozen=True, eq=False)
 class Derivation(ShortRepr):
-    """What is left of a program: kernels by name; `constants` gives those of the parameters."""
+    """Kernels of a program by name; `constants` computes constants from the parameters."""
 
     sources: dict[str, Kernel]
 
@@ -185,20 +194,20 @@ class Derivation(ShortRepr):
 
     @cached_property
     def kernels(self) -> Kernels:
-        """The kernels, compiled when they are first used."""
+        """The kernels, each compiled at its first use."""
         return Kernels(self.sources.values())
 
 
 def derivation(name: str, derive: Callable[[], Program]) -> Derivation:
-    """The derivation of a model: from disk, or made by `derive` and written there."""
+    """The derivation of a model: from disk, or by `derive` and then written there."""
 
     def make() -> bytes:
-        # Only here is anything symbolic: a model that was derived before starts without it.
+        # Nothing else is symbolic: a model that was derived before starts without SymPy.
         from vehiclemor.codegen.lowering import kernels_of
 
         return json.dumps([asdict(kernel) for kernel in kernels_of(derive()).values()]).encode()
 
-    return _read(fetched(_file(name, derive), make))
+    return _read(from_cache(_file(name, derive), make))
 
 
 def is_derived(name: str, derive: Callable[[], Program]) -> bool:

@@ -79,13 +79,13 @@ def _library(builder: Any, name: str, arguments: Sequence[Any]) -> Any:
 
 
 def _power_of_two(builder: Any, number: Any) -> Any:
-    # The last bits of the sum are the whole number, also a negative one.
-    whole = ir.IntType(64)
+    # The last bits of the sum are the integer, also a negative one.
+    integer = ir.IntType(64)
     if number.type != DOUBLE:
-        whole = ir.VectorType(whole, number.type.count)
-    bits = builder.bitcast(builder.fadd(number, constant(number.type, SHIFT)), whole)
-    biased = builder.add(bits, _whole(whole, 1023))
-    return builder.bitcast(builder.shl(biased, _whole(whole, 52)), number.type)
+        integer = ir.VectorType(integer, number.type.count)
+    bits = builder.bitcast(builder.fadd(number, constant(number.type, SHIFT)), integer)
+    biased = builder.add(bits, _integer(integer, 1023))
+    return builder.bitcast(builder.shl(biased, _integer(integer, 52)), number.type)
 
 
 def _function(builder: Any, name: str, *kinds: Any) -> Any:
@@ -102,5 +102,5 @@ def _declared(builder: Any, name: str, returned: ir.Type, kinds: Sequence[ir.Typ
     return known[name]
 
 
-def _whole(kind: Any, number: int) -> ir.Constant:
+def _integer(kind: Any, number: int) -> ir.Constant:
     return ir.Constant(kind, number if kind == ir.IntType(64) else [number] * kind.count)

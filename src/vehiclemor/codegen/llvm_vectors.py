@@ -1,23 +1,22 @@
-"""Sums of many terms with the same weights' layout, and statements on vectors, as instructions.
+"""Sums with rows of weights, and statements on vectors, as instructions.
 
 A kernel of a regression multiplies dozens of features by the coefficients of a handful of targets.
-Written out as scalars that is the whole cost of it.  The statement
+Written as scalars, nearly all of its time is spent there.  The statement
 
     a, b, c = weighted_sums(_constants, 7, (f0, f1, ...))
 
-gives a = sum_j _constants[7 + width j] f_j, b the same one place further on, and so on; rows of
-coefficients are padded to `width`, a multiple of the vectors' length.
+gives a = sum_j _constants[7 + width j] f_j, b = sum_j _constants[8 + width j] f_j, and so on; rows
+of coefficients are padded to `width`, a multiple of the vectors' length.
 
-Steps of integrators have statements on whole vectors in their arrays.  A vector is given by its
-first place, `_result[7]`; sizes and places are whole numbers.
+Steps of integrators have statements on vectors in their arrays.  A vector is named by its first
+entry, `_result[7]`; sizes and indices are integers.
 
     combine(to, n, a, x, b, y, ...)        to = a x + b y + ...; a, b are floats
-    product(to, n, rows, x, columns, kept, a)  to = sum_j rows[j] x[columns[j]] + a x, a x only at
-                                           places in kept
+    product(to, n, rows, x, columns, diagonal, a)  to = sum_j rows[j] x[columns[j]] + a x, a x only
+                                           at the indices in diagonal
     execute(kernels, x, u, constants, to)  the first kernel of a list of addresses
 
-Vectors of a product have whole lanes, n = `padded(n)`; it is a function of its own, called wherever
-it is needed.
+Vectors of a product are padded, n = `padded(n)`.  Products of the same layout share a function.
 """
 
 from collections.abc import Iterable, Sequence
@@ -30,9 +29,9 @@ from vehiclemor.codegen.vector_lanes import WIDTH, padded
 
 WORD = ir.IntType(64)
 POINTER = DOUBLE.as_pointer()
-# Sums in turn, so that no addition waits for the one before it.
+# Partial sums that take terms in turn, so that no addition waits for the previous one.
 CHAINS = 2
-# Sums of lanes that a loop makes at once.
+# Sums that one loop over terms accumulates.
 AT_ONCE = 12
 
 
@@ -42,14 +41,14 @@ def weighted_sums(
     """Write the sums; coefficients are rows of `padded(targets)` floats, one for each term."""
     chains: list[list[Any]] = [[None] * (padded(targets) // WIDTH) for _ in range(CHAINS)]
     totals = _added(builder, coefficients, terms, chains)
-    lane = [ir.Constant(ir.IntType(32), place) for place in range(WIDTH)]
+    lane = [ir.Constant(ir.IntType(32), k) for k in range(WIDTH)]
     return [builder.extract_element(totals[i // WIDTH], lane[i % WIDTH]) for i in range(targets)]
 
 
 def _added(
     builder: Any, rows: Any, factors: Iterable[Any], chains: Sequence[list[Any]]
 ) -> list[Any]:
-    """Rows of whole vectors times factors, added to sums in turn; the total of these."""
+    """Total of rows times factors; chains of partial sums, by vector, take the terms in turn."""
 
     def add(sums: list[Any], v: int, part: Any) -> None:
         sums[v] = part if sums[v] is None else builder.fadd(sums[v], part, flags=FLAGS)
@@ -70,7 +69,7 @@ def _added(
 def sums_of_lanes(
     builder: Any, coefficients: Any, terms: Iterable[Any], targets: int
 ) -> list[ir.Value]:
-    """The same where terms are vectors of samples, in loops: written out it compiles slowly."""
+    """Sums of terms that are vectors of samples, in loops: straight-line code compiles slowly."""
     factors = list(terms)
     kind, count, word = factors[0].type, len(factors), ir.IntType(64)
     with builder.goto_entry_block():
@@ -84,11 +83,11 @@ def sums_of_lanes(
         builder.position_at_end(body)
         j = builder.phi(word)
         j.add_incoming(word(0), before)
-        own = range(first, min(first + AT_ONCE, targets))
-        sums = [builder.phi(kind) for _ in own]
+        columns = range(first, min(first + AT_ONCE, targets))
+        sums = [builder.phi(kind) for _ in columns]
         row = builder.mul(j, word(padded(targets)))
         factor = builder.load(builder.gep(stored, [j]))
-        for i, total in zip(own, sums, strict=True):
+        for i, total in zip(columns, sums, strict=True):
             weight = builder.load(builder.gep(coefficients, [builder.add(row, word(i))]))
             product = builder.fmul(spread(builder, weight, kind.count), factor, flags=FLAGS)
             totals.append(builder.fadd(total, product, flags=FLAGS))
@@ -103,18 +102,18 @@ def sums_of_lanes(
 
 
 def spread(builder: Any, value: Any, width: int = WIDTH) -> Any:
-    """A vector with the same value in all places."""
-    nowhere = ir.Constant(ir.VectorType(DOUBLE, width), ir.Undefined)
-    single = builder.insert_element(nowhere, value, ir.Constant(ir.IntType(32), 0))
+    """A vector with the same value in all lanes."""
+    undefined = ir.Constant(ir.VectorType(DOUBLE, width), ir.Undefined)
+    single = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
     first = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
-    return builder.shuffle_vector(single, nowhere, first)
+    return builder.shuffle_vector(single, undefined, first)
 
 
 def write(name: str, builder: Any, arguments: Sequence[Any], factors: Sequence[Any]) -> None:
-    """Write a statement; arguments are as above, pointers for vectors, without factors."""
+    """Write a statement; arguments as above, vectors as pointers, factors apart."""
     match name, arguments:
-        case "combine", [to, n, *places]:
-            _combine(builder, to, n, factors, places)
+        case "combine", [to, n, *vectors]:
+            _combine(builder, to, n, factors, vectors)
         case "product", [to, n, rows, x, *shape]:
             builder.call(_product(builder.module, n, *shape), [to, rows, x])
         case "execute", [kernels, *pointers]:
@@ -124,41 +123,42 @@ def write(name: str, builder: Any, arguments: Sequence[Any], factors: Sequence[A
 
 
 def _parts(n: int) -> list[tuple[int, Any]]:
-    """First places and types of what a vector of n floats is taken in."""
-    whole = n // WIDTH * WIDTH
-    vectors: list[tuple[int, Any]] = [(place, VECTOR) for place in range(0, whole, WIDTH)]
-    return vectors + [(place, DOUBLE) for place in range(whole, n)]
+    """First index and type of the parts in which a vector of n floats is loaded."""
+    rest = n // WIDTH * WIDTH
+    vectors: list[tuple[int, Any]] = [(index, VECTOR) for index in range(0, rest, WIDTH)]
+    return vectors + [(index, DOUBLE) for index in range(rest, n)]
 
 
-def _at(builder: Any, pointer: Any, place: int, kind: ir.Type) -> Any:
-    moved = builder.gep(pointer, [WORD(place)])
+def _at(builder: Any, pointer: Any, index: int, kind: ir.Type) -> Any:
+    moved = builder.gep(pointer, [WORD(index)])
     return moved if kind == DOUBLE else builder.bitcast(moved, kind.as_pointer())
 
 
-def _load(builder: Any, pointer: Any, place: int, kind: ir.Type) -> Any:
-    return builder.load(_at(builder, pointer, place, kind), align=8)
+def _load(builder: Any, pointer: Any, index: int, kind: ir.Type) -> Any:
+    return builder.load(_at(builder, pointer, index, kind), align=8)
 
 
-def _store(builder: Any, value: Any, pointer: Any, place: int) -> None:
-    builder.store(value, _at(builder, pointer, place, value.type), align=8)
+def _store(builder: Any, value: Any, pointer: Any, index: int) -> None:
+    builder.store(value, _at(builder, pointer, index, value.type), align=8)
 
 
-def _combine(builder: Any, to: Any, n: int, factors: Sequence[Any], places: Sequence[Any]) -> None:
-    wide = [spread(builder, factor) for factor in factors]
-    for place, kind in _parts(n):
+def _combine(builder: Any, to: Any, n: int, factors: Sequence[Any], vectors: Sequence[Any]) -> None:
+    spread_factors = [spread(builder, factor) for factor in factors]
+    for index, kind in _parts(n):
         total = None
-        for one, many, pointer in zip(factors, wide, places, strict=True):
-            part = _load(builder, pointer, place, kind)
-            part = builder.fmul(one if kind == DOUBLE else many, part, flags=FLAGS)
+        multipliers = factors if kind == DOUBLE else spread_factors
+        for multiplier, pointer in zip(multipliers, vectors, strict=True):
+            part = _load(builder, pointer, index, kind)
+            part = builder.fmul(multiplier, part, flags=FLAGS)
             total = part if total is None else builder.fadd(total, part, flags=FLAGS)
-        _store(builder, total, to, place)
+        _store(builder, total, to, index)
 
 
 def _product(
-    module: Any, n: int, columns: Sequence[int], kept: Sequence[int], weight: float
+    module: Any, n: int, columns: Sequence[int], diagonal: Sequence[int], weight: float
 ) -> Any:
     """The function of a product, written once in a module."""
-    name = f"product {n} {columns} {kept} {weight}"
+    name = f"product {n} {columns} {diagonal} {weight}"
     if name in module.globals:
         return module.globals[name]
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [POINTER] * 3), name)
@@ -168,10 +168,10 @@ def _product(
     to, rows, x = function.args
     builder: Any = ir.IRBuilder(function.append_basic_block())
     vectors = n // WIDTH
-    # Two sums in turn where few stand beside one another: no addition waits for the one before.
+    # Two partial sums in turn for short vectors: no addition waits for the previous one.
     chains: list[list[Any]] = [[None] * vectors for _ in range(2 if vectors <= 4 else 1)]
     for v in range(vectors):
-        mask = [weight * (v * WIDTH + lane in kept) for lane in range(WIDTH)]
+        mask = [weight * (v * WIDTH + lane in diagonal) for lane in range(WIDTH)]
         if any(mask):
             first = _load(builder, x, v * WIDTH, VECTOR)
             chains[0][v] = builder.fmul(first, ir.Constant(VECTOR, mask), flags=FLAGS)

@@ -14,7 +14,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from vehiclemor.codegen.cache import compiler_identity, digest_of, fetched, once
+from vehiclemor.codegen.cache import cached_by_one_thread, compiler_identity, digest_of, from_cache
 from vehiclemor.codegen.kernels import MachineCode
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.sources import source_digest
@@ -31,7 +31,7 @@ ARRAYS = [struct.Struct(f"{dimensions + 1}q") for dimensions in range(4)]
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """A bundle of arrays and numbers, taken apart once for many runs; it must not change."""
+    """A bundle of arrays and numbers in words, for many runs; it must not change."""
 
     bundle: Any
     words: bytes
@@ -45,16 +45,18 @@ def ready(bundle: Any) -> Ready:
 class Prepared:
     """A loop with its arguments in words, some of which may be replaced from run to run."""
 
-    __slots__ = ("_entry", "_given", "_kept", "_places", "words")
+    __slots__ = ("_arguments", "_entry", "_given", "_offsets", "words")
 
     def __init__(
         self,
         entry: Callable[[Any], int],
         packed: bytes,
-        places: Mapping[str, int],
+        offsets: Mapping[str, int],
         arguments: tuple[Any, ...],
     ) -> None:
-        self._entry, self._places, self._kept = entry, places, arguments
+        self._entry, self._offsets = entry, offsets
+        # They own the memory at the addresses in the words.
+        self._arguments = arguments
         self._given: dict[str, Ready] = {}
         self.words = (ctypes.c_int64 * (len(packed) // 8)).from_buffer_copy(packed)
 
@@ -64,13 +66,13 @@ class Prepared:
 
     def give(self, name: str, bundle: Ready) -> None:
         """Replace an argument that is a bundle."""
-        place = ctypes.addressof(self.words) + LONG.size * self._places[name]
-        ctypes.memmove(place, bundle.words, len(bundle.words))
+        address = ctypes.addressof(self.words) + LONG.size * self._offsets[name]
+        ctypes.memmove(address, bundle.words, len(bundle.words))
         self._given[name] = bundle
 
     def address(self, name: str) -> int:
-        """Number of the word that is the address of an array; its shape follows."""
-        return self._places[name]
+        """Index of the word with the address of an array; its shape follows."""
+        return self._offsets[name]
 
 
 class Loop:
@@ -80,19 +82,20 @@ class Loop:
         self.name = name
         self._kinds = [_kinds(kind, argument) for argument, kind in declared.items()]
         self._entry, self._code = _ENTRY(code.address(name)), code
-        self._places, place = {}, 0
+        # Index of the first word of each argument and of each part of a bundle.
+        self._offsets, offset = {}, 0
         for argument, kinds in zip(declared, self._kinds, strict=True):
-            self._places[argument] = place
+            self._offsets[argument] = offset
             for part, _, dimensions in kinds:
-                self._places[part] = place
-                place += dimensions + 1
+                self._offsets[part] = offset
+                offset += dimensions + 1
 
     def __call__(self, *arguments: Any) -> int:
         """Run the loop; the lock of the interpreter is released meanwhile."""
         return self.prepared(*arguments)()
 
     def prepared(self, *arguments: Any) -> Prepared:
-        """The loop with its arguments, which it keeps alive; `TypeError` if one does not fit."""
+        """The loop with its arguments; `TypeError` if one does not fit."""
         name = self.name
         packed = b"".join(
             [
@@ -100,11 +103,11 @@ class Loop:
                 for kinds, value in zip(self._kinds, arguments, strict=True)
             ]
         )
-        return Prepared(self._entry, packed, self._places, arguments)
+        return Prepared(self._entry, packed, self._offsets, arguments)
 
 
 def address_of_array(array: np.ndarray) -> int:
-    """Where a C-contiguous array that can be written and holds something begins."""
+    """Address of the first entry of a writable C-contiguous array that is not empty."""
     # In a third of the time of `array.ctypes.data`.
     return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
 
@@ -127,9 +130,9 @@ def _part(loop: str, kind: Kind, part: Any) -> bytes:
         and part.dtype == DTYPES[code]
         and (flags := part.flags).c_contiguous
     ):
-        found = f"{part.dtype}{part.shape}" if hasattr(part, "dtype") else type(part)
+        kind_of_part = f"{part.dtype}{part.shape}" if hasattr(part, "dtype") else type(part)
         raise TypeError(
-            f"{loop}: {name} must be a C-contiguous array {code}[{dimensions}], not {found}"
+            f"{loop}: {name} must be a C-contiguous array {code}[{dimensions}], not {kind_of_part}"
         )
     address = address_of_array(part) if flags.writeable and part.size else part.ctypes.data
     return ARRAYS[dimensions].pack(address, *part.shape)
@@ -142,7 +145,7 @@ def _flat(value: Any) -> list[Any]:
     return [part for field in value for part in _flat(field)]
 
 
-@once
+@cached_by_one_thread
 def loops(modules: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, Loop]:
     """Compiled entries, functions with declared types, of modules of loops.
 
@@ -157,7 +160,7 @@ def loops(modules: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, Loop]
 
         return compiled_loops(imported, entries)
 
-    code = MachineCode(fetched(f"loops/{modules[-1].rpartition('.')[2]}-{key}.o", make))
+    code = MachineCode(from_cache(f"loops/{modules[-1].rpartition('.')[2]}-{key}.o", make))
     functions = {name: _entry(imported, name) for name in entries}
     return {
         name: Loop(name, declared_arguments(function), code) for name, function in functions.items()
@@ -171,7 +174,10 @@ def loops_digest(modules: Sequence[str]) -> str:
 
 
 def _entry(modules: Sequence[ModuleType], name: str) -> Any:
-    return next(found for m in reversed(modules) if inspect.isfunction(found := vars(m).get(name)))
+    for module in reversed(modules):
+        if inspect.isfunction(entry := vars(module).get(name)):
+            return entry
+    raise ImportError(f"no module of loops has the entry {name}")
 
 
 @cache

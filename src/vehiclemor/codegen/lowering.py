@@ -6,8 +6,8 @@ the order in which SymPy prints them, small powers are products.
 
 A tire formula at four wheels needs dozens of arctangents, sines and cosines; one call each would
 cost more than all the rest.  So assignments are put off until as many arguments as possible are
-known, and these are handed to one vector loop.  In a batch the same quantity of all wheels stands
-side by side: from there the compiler packs what comes before and after into vectors.
+known, and one vector loop takes these.  In a batch the same quantity of all wheels stands side by
+side: from there the compiler packs the operations before and after into vectors.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from vehiclemor.codegen.operations import KINDS, Kernel, Listing, Value
 from vehiclemor.codegen.vector_lanes import LANES, SMALLEST_BATCH, WIDTH
 from vehiclemor.symbolic.program import Function, Program
 
-# Where SymPy has another name.
+# SymPy's name -> kind of operation.
 RENAMED = {"Abs": "abs"}
 # Powers that are products.
 LARGEST_PRODUCT = 4
-# Functions that have a vector loop -> the calls that it answers.
+# Functions that have a vector loop -> the calls whose values it gives.
 BATCHED: dict[str, tuple[type, ...]] = {"sincos": (sp.sin, sp.cos), "atan": (sp.atan,)}
-# Assignments behind one another that tell whether two quantities are computed alike.
+# Depth of assignments that are compared to decide whether two quantities are computed alike.
 DEPTH = 4
 
 
 def kernels_of(program: Program) -> dict[str, Kernel]:
     """Kernels of the functions of a program, and of its constants."""
-    given = {"parameters": program.parameters}
-    found = {"constants": _kernel("constants", given, program.constants)}
+    parameters = {"parameters": program.parameters}
+    kernels = {"constants": _kernel("constants", parameters, program.constants)}
     for name, function in program.functions.items():
-        found[name] = _kernel(name, _arguments(program), function)
-    if "residual_jacobian" in found:
-        found |= _product_kernels(program)
-    return found
+        kernels[name] = _kernel(name, _arguments(program), function)
+    if "residual_jacobian" in kernels:
+        kernels |= _product_kernels(program)
+    return kernels
 
 
 def _arguments(program: Program) -> Mapping[str, Sequence[sp.Symbol]]:
@@ -54,16 +54,16 @@ def _kernel(name: str, arguments: Mapping[str, Sequence[sp.Symbol]], function: F
     used = set().union(*(e.free_symbols for e in expressions))
     # With an underscore: a model's own names may be `result`.
     for argument, symbols in arguments.items():
-        for place, symbol in enumerate(symbols):
+        for index, symbol in enumerate(symbols):
             if symbol in used:
-                lowering.known[symbol] = lowering.let(lowering.entry(f"_{argument}", place))
+                lowering.known[symbol] = lowering.let(lowering.entry(f"_{argument}", index))
     for step in schedule(function):
         if isinstance(step, Batch):
             lowering.evaluate(step)
         else:
             lowering.known[step[0]] = lowering.let(lowering.value(step[1]))
-    for place, expression in enumerate(function.results):
-        lowering.store(place, lowering.value(expression))
+    for index, expression in enumerate(function.results):
+        lowering.store(index, lowering.value(expression))
     columns = function.shape[1] if len(function.shape) > 1 else 0
     return lowering.kernel(name, [*(f"_{a}" for a in arguments), "_result"], columns)
 
@@ -110,20 +110,21 @@ class _Lowering(Listing):
 
     def evaluate(self, batch: Batch) -> None:
         """Write the evaluation of a function for several arguments at once."""
-        given, calls = batch.arguments, BATCHED[batch.name]
-        if len(given) < SMALLEST_BATCH:
-            for argument in given:
-                whole = self.let(self.new(batch.name, self.known[argument]))
-                results = [whole] if len(calls) == 1 else self.parts(whole, len(calls))
+        calls = BATCHED[batch.name]
+        if len(batch.arguments) < SMALLEST_BATCH:
+            for argument in batch.arguments:
+                value = self.let(self.new(batch.name, self.known[argument]))
+                results = [value] if len(calls) == 1 else self.parts(value, len(calls))
                 self.known |= {c(argument): r for c, r in zip(calls, results, strict=True)}
             return
-        for first in range(0, len(given), LANES):
-            own = given[first : first + LANES]
-            filled = [*(self.known[a] for a in own), *[self.number(0.0)] * (LANES - len(own))]
-            parts = self.parts(self.new("batch", *filled, detail=batch.name), LANES * len(calls))
+        for first in range(0, len(batch.arguments), LANES):
+            arguments = batch.arguments[first : first + LANES]
+            padding = [self.number(0.0)] * (LANES - len(arguments))
+            values = [*(self.known[argument] for argument in arguments), *padding]
+            parts = self.parts(self.new("batch", *values, detail=batch.name), LANES * len(calls))
             for k, call in enumerate(calls):
-                found = parts[LANES * k : LANES * k + len(own)]
-                self.known |= {call(a): part for a, part in zip(own, found, strict=True)}
+                for lane, argument in enumerate(arguments):
+                    self.known[call(argument)] = parts[LANES * k + lane]
 
     def value(self, expression: Any) -> Value:
         """Write an expression; `ValueError` if kernels have no operation of that kind."""
@@ -222,7 +223,7 @@ class _Lowering(Listing):
     def _extreme(self, expression: sp.Max | sp.Min) -> Value:
         """The largest or smallest argument; where 0 and x are equal, x alone changes Max(0, x)."""
         kind = ">" if isinstance(expression, sp.Max) else "<="
-        one, *others = (self.let(self.value(argument)) for argument in expression.args)
+        one, *others = [self.let(self.value(argument)) for argument in expression.args]
         for other in others:
             one = self.let(self.new("select", self.new(kind, one, other), one, other))
         return one
@@ -241,18 +242,18 @@ Step = tuple[sp.Symbol, sp.Expr] | Batch
 
 def calls(expression: sp.Expr) -> list[tuple[str, sp.Symbol]]:
     """Batched functions that an expression calls, with their arguments."""
-    found: dict[tuple[str, sp.Symbol], None] = {}
+    distinct: dict[tuple[str, sp.Symbol], None] = {}
     for name, kinds in BATCHED.items():
         for call in sorted(expression.atoms(*kinds), key=str):
             argument = call.args[0]
             if not isinstance(argument, sp.Symbol):
                 raise ValueError(f"{call}: name the argument on the tape first")
-            found[name, argument] = None
-    return list(found)
+            distinct[name, argument] = None
+    return list(distinct)
 
 
 def _shapes(function: Function) -> dict[sp.Symbol, str]:
-    """How symbols are computed, a few assignments deep, whatever from."""
+    """How symbols are computed, a few assignments deep, from any quantities."""
     shapes: dict[sp.Symbol, str] = {}
     for _ in range(DEPTH):
         shapes = {symbol: _shape(expression, shapes) for symbol, expression in function.assignments}
@@ -260,7 +261,7 @@ def _shapes(function: Function) -> dict[sp.Symbol, str]:
 
 
 def _shape(expression: sp.Basic, shapes: Mapping[sp.Symbol, str]) -> str:
-    """A short name of what is computed; signs and the order of operands don't count."""
+    """A short name of an expression's structure, without signs and the order of operands."""
     if isinstance(expression, sp.Symbol):
         return shapes.get(expression, "")
     if not expression.args:
@@ -274,7 +275,7 @@ def _shape(expression: sp.Basic, shapes: Mapping[sp.Symbol, str]) -> str:
 def _alike(
     arguments: Sequence[sp.Symbol], shapes: Mapping[sp.Symbol, str]
 ) -> tuple[sp.Symbol, ...]:
-    """Arguments in an order that puts those of all wheels side by side, in whole vectors first."""
+    """Arguments in an order that puts those of all wheels side by side, full vectors first."""
     groups: dict[str, list[sp.Symbol]] = {}
     for argument in arguments:
         groups.setdefault(shapes.get(argument, ""), []).append(argument)
@@ -283,7 +284,7 @@ def _alike(
 
 
 def schedule(function: Function) -> list[Step]:
-    """Assignments and batches in an order in which every argument is known when it is needed."""
+    """Assignments and batches in an order in which each argument is known before its use."""
     pending = list(function.assignments)
     assigned = {symbol for symbol, _ in pending}
     waiting = {symbol: set(expression.free_symbols) & assigned for symbol, expression in pending}

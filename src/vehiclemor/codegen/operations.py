@@ -4,16 +4,16 @@ A kernel takes arrays of floats and fills its result.  Its operations are execut
 other; each has a kind, numbers of earlier operations whose values it takes, and details:
 
     number            a float
-    entry             (array, place): an entry of an argument
+    entry             (array, index): an entry of an argument
     add ... >=        arithmetic, comparisons and functions, see `KINDS`
     sincos            sine and cosine of a value
     batch             `sincos` or `atan` of `LANES` values at once: its name
     sums              (array, first, targets): see `llvm_vectors`
-    part              number of one of several results of these three
-    store             place of the result, row by row
+    part              index of one of several results of these three
+    store             index of the result, row by row
     combine ...       statements on whole vectors, see `llvm_vectors`
 
-Those that have a name are executed in order, others when one of them needs their value.
+Named operations run in order; the others are inlined where used.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ FUNCTIONS = (
     *("floor", "abs", "power_of_two"),
 )
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
-# Operations of values with one result -> how many values they take.  Saved models hold places of
+# Operations of values with one result -> how many values they take.  Saved models hold indices into
 # this table: new kinds come last.
 KINDS = {
     **dict.fromkeys(("number", "entry"), 0),
@@ -45,10 +45,10 @@ KINDS = {
     **dict.fromkeys(("negate", *FUNCTIONS), 1),
     "select": 3,
 }
-# What NumPy calls otherwise.
+# Operations to which NumPy gives other names.
 OPERATORS = {"negative": "negate", "absolute": "abs"}
 VECTOR_STATEMENTS = ("combine", "product", "execute")
-# Nothing else depends on these, and these have a name whatever they are.
+# No value depends on these; they are always named.
 EFFECTS = ("store", *VECTOR_STATEMENTS)
 NAMED = ("sincos", "batch", "sums", "part", *EFFECTS)
 COUNTED = ("add", "multiply", "divide", "negate", "sqrt", "trigonometric", "power")
@@ -64,7 +64,7 @@ class Operation(NamedTuple):
 
 @dataclass(frozen=True)
 class Value(NDArrayOperatorsMixin):
-    """What an operation gives; arithmetic with it writes further operations."""
+    """Result of an operation; arithmetic with it writes further operations."""
 
     listing: Listing
     number: int
@@ -83,7 +83,7 @@ class Listing:
         self.named: set[int] = set()
 
     def new(self, kind: str, *arguments: Value | float, detail: Any = None) -> Value:
-        """Write an operation; what it gives."""
+        """Write an operation; its result."""
         numbers = tuple(
             a.number if isinstance(a, Value) else self.number(a).number for a in arguments
         )
@@ -100,35 +100,35 @@ class Listing:
         """Write a number."""
         return self.new("number", detail=float(value))
 
-    def entry(self, array: str, place: int) -> Value:
+    def entry(self, array: str, index: int) -> Value:
         """Read an entry of an argument."""
-        return self.new("entry", detail=(array, place))
+        return self.new("entry", detail=(array, index))
 
-    def parts(self, whole: Value, count: int) -> list[Value]:
+    def parts(self, value: Value, count: int) -> list[Value]:
         """Results of an operation that has several."""
-        return [self.new("part", whole, detail=place) for place in range(count)]
+        return [self.new("part", value, detail=index) for index in range(count)]
 
     def sums(self, array: str, first: int, targets: int, factors: Sequence[Value]) -> list[Value]:
-        """Sums of factors times the weights that stand in an array, see `llvm_vectors`."""
-        whole = self.new("sums", *factors, detail=(array, first, targets))
-        return self.parts(whole, targets)
+        """Sums of factors times weights from index `first` of an array on, see `llvm_vectors`."""
+        sums = self.new("sums", *factors, detail=(array, first, targets))
+        return self.parts(sums, targets)
 
-    def store(self, place: int, value: Value | float) -> None:
+    def store(self, index: int, value: Value | float) -> None:
         """Write a value into the result."""
-        self.new("store", value, detail=place)
+        self.new("store", value, detail=index)
 
     def kernel(self, name: str, arguments: Sequence[str], columns: int = 0) -> Kernel:
-        """What has been written as a kernel; with columns its result is a matrix.
+        """The written operations as a kernel; with columns its result is a matrix.
 
-        Operations that nothing depends on are left out.
+        Operations that no stored value depends on are left out.
         """
         sizes = dict.fromkeys(arguments, 0)
         roots = [n for n, operation in enumerate(self.operations) if operation.kind in EFFECTS]
-        operations, places = pruned(self.operations, roots)
+        operations, renumbered = pruned(self.operations, roots)
         for kind, numbers, detail in operations:
             for array, reach in _reaches(kind, len(numbers), detail):
                 sizes[array] = max(sizes[array], reach)
-        named = [places[n] for n in sorted(self.named) if n in places]
+        named = [renumbered[n] for n in sorted(self.named) if n in renumbered]
         listed = json.dumps([operations, named], separators=(",", ":"))
         return Kernel(name, tuple(arguments), tuple(sizes.values()), columns, listed)
 
@@ -140,8 +140,11 @@ def _reaches(kind: str, factors: int, detail: Any) -> list[tuple[str, int]]:
     if kind == "sums":
         array, first, targets = detail
         return [(array, first + factors * padded(targets))]
-    entries = [detail] if kind == "entry" else detail if kind in VECTOR_STATEMENTS else []
-    return [(entry[0], entry[1] + 1) for entry in entries if is_entry(entry)]
+    if kind == "entry":
+        return [(detail[0], detail[1] + 1)]
+    if kind in VECTOR_STATEMENTS:
+        return [(part[0], part[1] + 1) for part in detail if is_entry(part)]
+    return []
 
 
 def function(kind: str, *values: Value) -> Value:
@@ -151,11 +154,11 @@ def function(kind: str, *values: Value) -> Value:
 
 @dataclass(frozen=True)
 class Kernel:
-    """A kernel, and what it wants of its arrays.
+    """A kernel and the sizes of its arrays.
 
     Sizes are the smallest numbers of floats of its arguments, columns the length of the rows of its
-    result, 0 if that is a vector.  Operations and numbers of those with names are listed as JSON:
-    few programs ask for them.
+    result, 0 if that is a vector.  Operations and numbers of the named ones are listed as JSON: few
+    programs read them.
     """
 
     name: str
@@ -165,10 +168,10 @@ class Kernel:
     listed: str
 
     @classmethod
-    def read(cls, written: dict[str, Any]) -> Kernel:
-        """The kernel of what `dataclasses.asdict` has made of one, and JSON of that."""
-        arrays = {key: tuple(written[key]) for key in ("arguments", "sizes")}
-        return cls(**{**written, **arrays})
+    def read(cls, fields: dict[str, Any]) -> Kernel:
+        """A kernel from its fields, in which JSON has lists for tuples."""
+        arrays = {key: tuple(fields[key]) for key in ("arguments", "sizes")}
+        return cls(**{**fields, **arrays})
 
     @property
     def operations(self) -> list[Operation]:
@@ -177,33 +180,34 @@ class Kernel:
 
     @property
     def named(self) -> list[int]:
-        """Numbers of the operations that have names."""
+        """Numbers of the named operations."""
         return _read(self.listed)[1]
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the result."""
+        """Shape of the result."""
         size = self.sizes[self.arguments.index("_result")]
         return (size // self.columns, self.columns) if self.columns else (size,)
 
     @property
     def copies(self) -> tuple[int, ...]:
-        """By result the place in the first argument of which it is a copy; -1 of other results."""
-        operations, found = self.operations, [-1] * self.sizes[-1]
-        for kind, arguments, place in operations:
+        """Index of the first argument's entry that a result is a copy of; -1 of other results."""
+        operations, copied = self.operations, [-1] * self.sizes[-1]
+        for kind, arguments, result in operations:
             if kind == "store" and operations[arguments[0]].kind == "entry":
                 array, entry = operations[arguments[0]].detail
-                found[place] = entry if array == self.arguments[0] else -1
-        return tuple(found)
+                copied[result] = entry if array == self.arguments[0] else -1
+        return tuple(copied)
 
     def of(self, results: Sequence[int]) -> Kernel:
         """The kernel of some results alone, which become a vector in this order."""
-        stored = {op.detail: n for n, op in enumerate(self.operations) if op.kind == "store"}
-        wanted = {stored[result]: place for place, result in enumerate(results)}
-        operations, numbers = pruned(self.operations, wanted)
-        for old, place in wanted.items():
-            operations[numbers[old]] = operations[numbers[old]]._replace(detail=place)
-        named = [numbers[n] for n in self.named if n in numbers]
+        stores = {op.detail: n for n, op in enumerate(self.operations) if op.kind == "store"}
+        wanted = [stores[result] for result in results]
+        operations, renumbered = pruned(self.operations, wanted)
+        for index, old in enumerate(wanted):
+            new = renumbered[old]
+            operations[new] = operations[new]._replace(detail=index)
+        named = [renumbered[n] for n in self.named if n in renumbered]
         listed = json.dumps([operations, named], separators=(",", ":"))
         return Kernel(self.name, self.arguments, (*self.sizes[:-1], len(results)), 0, listed)
 
@@ -211,10 +215,12 @@ class Kernel:
     def by_row(self) -> list[str]:
         """Arguments that have a row for each of several samples: all but constants.
 
-        Of a directional derivative the rows are directions: seeds and results have some.
+        In a directional derivative these are seeds and result: a row belongs to a direction.
         """
         seeds = [name for name in self.arguments if name.startswith(SEED)]
-        return [*seeds, "_result"] if seeds else [n for n in self.arguments if n != "_constants"]
+        if seeds:
+            return [*seeds, "_result"]
+        return [name for name in self.arguments if name != "_constants"]
 
     def check(self, *lengths: int) -> None:
         """Raise `ValueError` if it needs more floats than its first arguments have (`lengths`)."""
@@ -224,23 +230,24 @@ class Kernel:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many operations it executes.
+        """Numbers of executed operations by kind, see `COUNTED`, and in `total`.
 
-        By kind, see `COUNTED` (`trigonometric`: sines, cosines and inverses), and in `total`.
+        `trigonometric` are sines, cosines and inverses.
         """
         operations, used = self.operations, uses(self.operations)
-        known = {kind: kind for kind in COUNTED} | {"subtract": "add", "atan2": "trigonometric"}
-        known |= dict.fromkeys(set(FUNCTIONS) - {"sqrt", "abs"}, "trigonometric")
+        counted_as = {kind: kind for kind in COUNTED}
+        counted_as |= {"subtract": "add", "atan2": "trigonometric"}
+        counted_as |= dict.fromkeys(set(FUNCTIONS) - {"sqrt", "abs"}, "trigonometric")
         counts: dict[str, int] = dict.fromkeys(COUNTED, 0)
         for number, (kind, arguments, _) in enumerate(operations):
-            if kind in known:
-                counts[known[kind]] += 1
+            if kind in counted_as:
+                counts[counted_as[kind]] += 1
             elif kind == "part" and used[number] and operations[arguments[0]].kind != "sums":
                 counts["trigonometric"] += 1
         return counts | {"total": sum(counts.values())}
 
 
-# Those of a kernel are asked for a few times one after the other.
+# A kernel's operations are read a few times in a row.
 @lru_cache(maxsize=8)
 def _read(listed: str) -> tuple[list[Operation], list[int]]:
     operations, named = json.loads(listed)
@@ -257,59 +264,57 @@ def _tuples(part: Any) -> Any:
 
 
 def uses(operations: Sequence[Operation]) -> list[int]:
-    """How often each operation's value is taken."""
-    found = [0] * len(operations)
+    """How many operations take each operation's value."""
+    counts = [0] * len(operations)
     for operation in operations:
         for number in operation.arguments:
-            found[number] += 1
-    return found
+            counts[number] += 1
+    return counts
 
 
 def needed(operations: Sequence[Operation], roots: Collection[int]) -> list[int]:
-    """Numbers of the operations that others depend on, these included, in order."""
-    kept = set(roots)
+    """Numbers of the roots and of all operations that they depend on, in order."""
+    numbers = set(roots)
     for number in range(len(operations) - 1, -1, -1):
-        if number in kept:
-            kept.update(operations[number].arguments)
-    return sorted(kept)
+        if number in numbers:
+            numbers.update(operations[number].arguments)
+    return sorted(numbers)
 
 
 def pruned(
     operations: Sequence[Operation], roots: Collection[int]
 ) -> tuple[list[Operation], dict[int, int]]:
-    """The operations that others depend on, these included; number -> its new number."""
-    kept = needed(operations, roots)
-    places = {number: place for place, number in enumerate(kept)}
-    found = []
-    for number in kept:
-        kind, arguments, detail = operations[number]
-        found.append(Operation(kind, tuple(places[n] for n in arguments), detail))
-    return found, places
+    """The roots and all operations that they depend on; old number -> new number."""
+    old_numbers = needed(operations, roots)
+    renumbered = {old: new for new, old in enumerate(old_numbers)}
+    remaining = []
+    for old in old_numbers:
+        kind, arguments, detail = operations[old]
+        remaining.append(Operation(kind, tuple(renumbered[n] for n in arguments), detail))
+    return remaining, renumbered
 
 
-# Operations that a file may have: the largest kernel of this package has 22,000, and compiles in
-# 9 s.
+# Most operations of a file: the largest kernel of this package has 22,000, and compiles in 9 s.
 MOST_SIZE = 90_000
-# Arguments of which files may have entries.
+# Arguments whose entries files may read.
 ARRAYS = ("_x", "_u", "_constants")
 
 
 def as_arrays(operations: Sequence[Operation]) -> dict[str, np.ndarray]:
-    """Operations with one result as numbers alone, for files.
+    """Operations with one result as arrays, for files.
 
-    Place of the kind in `KINDS`; arguments, of an entry the place in `ARRAYS` and in the array;
+    Index of the kind in `KINDS`; arguments, for an entry its indices in `ARRAYS` and in the array;
     number.
     """
     kinds, arguments = list(KINDS), np.zeros((len(operations), 3), dtype=np.int64)
     numbers = np.zeros(len(operations))
-    for n, (kind, given, detail) in enumerate(operations):
+    for n, (kind, taken, detail) in enumerate(operations):
         if kind == "number":
             numbers[n] = detail
-        elif kind == "entry":
-            given = ARRAYS.index(detail[0]), detail[1]  # noqa: PLW2901
-        arguments[n, : len(given)] = given
-    found = np.array([kinds.index(operation.kind) for operation in operations], dtype=np.int64)
-    return {"kinds": found, "arguments": arguments, "numbers": numbers}
+        row = (ARRAYS.index(detail[0]), detail[1]) if kind == "entry" else taken
+        arguments[n, : len(row)] = row
+    indices = np.array([kinds.index(operation.kind) for operation in operations], dtype=np.int64)
+    return {"kinds": indices, "arguments": arguments, "numbers": numbers}
 
 
 def of_arrays(
@@ -324,16 +329,16 @@ def of_arrays(
         and ((kinds >= 0) & (kinds < len(KINDS))).all()
         and (arguments >= 0).all()
     ):
-        raise ValueError("operations have arrays that don't fit one another")
-    table, found = [*KINDS.items()], []
-    for place, (number, given) in enumerate(zip(kinds.tolist(), arguments.tolist(), strict=True)):
-        kind, count = table[number]
+        raise ValueError("the arrays of operations don't fit one another")
+    table, operations = [*KINDS.items()], []
+    for n, (index, row) in enumerate(zip(kinds.tolist(), arguments.tolist(), strict=True)):
+        kind, count = table[index]
         detail = None
         if kind == "number":
-            detail = float(numbers[place])
+            detail = float(numbers[n])
         elif kind == "entry":
-            detail = ARRAYS[given[0]], given[1]
-        if max(given[:count], default=-1) >= place:
-            raise ValueError(f"operation {place} takes what is not there yet")
-        found.append(Operation(kind, tuple(given[:count]), detail))
-    return tuple(found)
+            detail = ARRAYS[row[0]], row[1]
+        if max(row[:count], default=-1) >= n:
+            raise ValueError(f"operation {n} takes the value of a later one")
+        operations.append(Operation(kind, tuple(row[:count]), detail))
+    return tuple(operations)

@@ -11,5 +11,5 @@ WIDTH = LANES // 2
 
 
 def padded(count: int) -> int:
-    """Length of a row of so many floats in whole vectors."""
+    """Length of a row of so many floats, padded to a multiple of the vectors' length."""
     return -(-count // WIDTH) * WIDTH

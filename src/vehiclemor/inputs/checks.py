@@ -5,9 +5,9 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation, cached
+from vehiclemor.inputs.maneuver import registered
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.registry import component
 
 
 def checked_maneuver(maneuver: str | Excitation, definition: ModelDefinition) -> Excitation:
@@ -17,7 +17,7 @@ def checked_maneuver(maneuver: str | Excitation, definition: ModelDefinition) ->
     in which the model declares that it means anything.
     """
     if isinstance(maneuver, str):
-        maneuver = component("maneuver", maneuver)
+        maneuver = registered(maneuver)
     if not isinstance(maneuver, Excitation):
         raise InputError(f"{quoted(maneuver)} is not a maneuver, as vm.maneuver(name) gives one")
     return _checked(maneuver, definition)
@@ -80,7 +80,7 @@ def check_resolved(maneuver: Excitation) -> None:
     step = times[1]
     values = maneuver.at(times)
     inside = maneuver.at(times[:-1] + between * step)
-    # What is not finite is found, with its time, by whoever solves it.
+    # A solver names the time of a value that is not finite.
     if not (np.isfinite(values).all() and np.isfinite(inside).all()):
         return
     off = np.abs(inside - (1.0 - between) * values[:-1] - between * values[1:])

@@ -81,9 +81,12 @@ class Maneuver(Excitation):
         """Refuse what is no maneuver, so that its author reads one clear line."""
         for text in ("name", "summary"):
             line_of_text(f"{text} of a maneuver", getattr(self, text))
-        for function in ("signal", "corners", *["member"] * (self.member is not None)):
-            if not callable(getattr(self, function)):
-                raise InputError(f"{self}: {function} is not a function")
+        functions = {"signal": self.signal, "corners": self.corners}
+        if self.member is not None:
+            functions["member"] = self.member
+        for name, function in functions.items():
+            if not callable(function):
+                raise InputError(f"{self}: {name} is not a function")
         if isinstance(self.inputs, list):
             object.__setattr__(self, "inputs", tuple(self.inputs))
         if not (isinstance(self.inputs, tuple) and all(isinstance(i, str) for i in self.inputs)):
@@ -181,6 +184,17 @@ def smooth(frequency: float) -> tuple[float, ...]:
     return ()
 
 
+def registered(name: str) -> Maneuver:
+    """The maneuver of a name; `InputError` if none has it, with a hint if it looks like a file."""
+    try:
+        return component("maneuver", name)
+    except InputError as error:
+        if isinstance(name, str) and "." in name:
+            hint = "a CSV file is read by vm.Signal.from_csv, in a shell by --maneuver FILE.csv"
+            raise InputError(f"{error}; {hint}") from None
+        raise
+
+
 def maneuver(name: str, frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
     """A registered maneuver, see `maneuvers()`, with factors on its frequency and amplitude."""
-    return component("maneuver", name).perturbed(frequency, amplitude)
+    return registered(name).perturbed(frequency, amplitude)

@@ -68,7 +68,7 @@ class Structure:
     # Cq, Cv, Ca (outputs, n) and Cf (outputs, p).
     outputs: tuple[csc_array, csc_array, csc_array, csc_array]
 
-    def held(self, stiffness: np.ndarray) -> csc_array:
+    def with_port_springs(self, stiffness: np.ndarray) -> csc_array:
         """K (n, n) with springs of these stiffnesses (p,) at the ports."""
         return self.stiffness + self.ports @ (stiffness[:, None] * self.ports.T)
 
@@ -139,7 +139,7 @@ class ModelDefinition(ShortRepr):
         State -> magnitude in its unit below which its errors count absolutely, 1 by default.
     validity
         Output or input -> (smallest, largest) value in its unit at which the model means anything.
-        A run that leaves that of an output has diverged, an input beyond its own is refused.
+        A run that leaves that of an output has diverged, an input beyond its range is refused.
     loads
         Outputs that are zero where a wheel has left the road.
     tabled_outputs

@@ -46,9 +46,12 @@ ROUNDED = 0.01
 def declared(model: str) -> dict[str, Any]:
     """Quantities and parameters of a model of this package, from `data/models`."""
     content = toml_content(data_folder() / "models" / f"{model}.toml")
-    parameters = {name: Declared(**entry) for name, entry in content.pop("parameters").items()}
-    tables = {kind: tuple(Quantity(*row) for row in rows) for kind, rows in content.items()}
-    return tables | {"parameters": parameters}
+    tables: dict[str, Any] = {}
+    parameters = content.pop("parameters")
+    for kind, rows in content.items():
+        tables[kind] = tuple(Quantity(*row) for row in rows)
+    tables["parameters"] = {name: Declared(**entry) for name, entry in parameters.items()}
+    return tables
 
 
 def equations_of(package: str) -> Callable[[], Any]:

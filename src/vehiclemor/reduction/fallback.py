@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.array_shapes import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
-from vehiclemor.sizes import require
 
 # What users step and ask is the reduced model.
 STEPPED = ("states", "begin", "step", "rates", "sensitivities", "decode", "trust")
@@ -75,7 +74,7 @@ class FallbackModel(ShortRepr):
         )
 
 
-def with_fallback(reduced: FittedModel, model: DynamicModel, settings: Any) -> FittedModel:
+def with_fallback(reduced: FittedModel, model: Any, settings: Any) -> FittedModel:
     """A reduced model with the fallback that its settings name, if they name one."""
     if not isinstance(settings, FallbackSettings) or settings.fallback == "none":
         return reduced

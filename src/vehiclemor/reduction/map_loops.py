@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vehiclemor.array_shapes import check_shapes, require
 from vehiclemor.codegen.loop_types import (
     Cube,
     Int,
@@ -19,7 +20,6 @@ from vehiclemor.codegen.loop_types import (
     vector,
 )
 from vehiclemor.simulation.newton_loops import CONVERGED
-from vehiclemor.sizes import require, shaped
 
 # Indices of what is reported of a run: its trust indicator, and the first sample at which that is
 # above 1, or the number of samples; how much that is.
@@ -51,8 +51,10 @@ class Cells(NamedTuple):
         """Raise `ValueError` if the loop would read beyond the coefficients."""
         numbers, inputs = self.numbers.tolist(), len(self.numbers)
         require(all(type(number) is int and number > 0 for number in numbers), "numbers")
-        shaped("cells", (self.centres, inputs), (self.scales, inputs))
-        shaped("cells", (self.coefficients, math.prod(numbers), *self.coefficients.shape[1:3]))
+        check_shapes("cells", (self.centres, inputs), (self.scales, inputs))
+        check_shapes(
+            "cells", (self.coefficients, math.prod(numbers), *self.coefficients.shape[1:3])
+        )
         # What is no number would be in a cell anywhere.
         require(bool(np.isfinite([self.centres, self.scales]).all()), "cells")
 

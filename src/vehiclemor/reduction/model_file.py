@@ -17,14 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, flag, quoted
+from vehiclemor.arguments import file_path, flag
+from vehiclemor.array_shapes import require
 from vehiclemor.exceptions import FileError, InputError, VehiclemorError, one_line
 from vehiclemor.files import replaceable
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.netcdf_file import INTEGRITY, is_saved_model, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
-from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.parts import Reader, Writer
+from vehiclemor.reduction.interface import FittedModel, Method
+from vehiclemor.reduction.parts import Parts
 from vehiclemor.reduction.training import training_summary
 from vehiclemor.reduction.trust import BANDS, InputRange
 from vehiclemor.reduction.validation import checked_fit, checked_settings, validated
@@ -33,14 +34,13 @@ from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.sizes import require
 
 # Of the layout of these files.
-SCHEMA = 5
+SCHEMA = 6
 # Texts beside the arrays.
 TEXTS = ("parts", "settings", "training", "parameters")
-# What is taken apart.
-PARTS = ("reduced", "input_range")
+# Parts of a reduced model and their types.
+PARTS = {"reduced": FittedModel, "input_range": InputRange}
 # Bytes of all variables of a file, and characters of a text: the largest of this package's methods
 # have 3 MB and 0.3 million.
 MOST_BYTES, MOST_CHARACTERS = 1 << 28, 2_000_000
@@ -59,9 +59,9 @@ def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
     if not flag("overwrite", overwrite) and os.path.lexists(path):
         raise InputError(f"{path} is there already; overwrite=True replaces a saved model")
     replaceable(path, "saved model", is_saved_model)
-    model, state, writer = rom.model, rom.__getstate__(), Writer(rom.model)
+    model, state, writer = rom.model, rom.__getstate__(), Parts(rom.model)
     try:
-        parts = {name: writer.part(state[name], name) for name in PARTS}
+        parts = {name: writer.write(state[name], name, of) for name, of in PARTS.items()}
     except InputError as error:
         raise InputError(f"{rom.method} of {model.name}: {error}") from None
     if sum(array.nbytes for array in writer.arrays.values()) > MOST_BYTES:
@@ -100,14 +100,11 @@ def read(path: Any) -> dict[str, Any]:
         checked_settings(reduces, model, validated(reduces, model.kind, settings))
         if not _alike(stored.pop("fingerprint"), fingerprint(model)):
             raise FileError(f"the equations of {name} have changed since")
-        reader = Reader(model, stored)
-        made = {name: reader.value(parts[name], name) for name in PARTS}
+        reader = Parts(model, stored)
+        made = {name: reader.read(parts[name], name, of) for name, of in PARTS.items()}
         checked_fit(method, made["reduced"])
-        known = made["input_range"]
-        if not isinstance(known, InputRange):
-            raise TypeError(f"input_range is {quoted(known)}, no InputRange")
         kinds = {"ae": 1, "structural": len(BANDS)}.get(model.kind, 3)
-        require(known.largest.shape == (kinds, len(model.inputs)), "largest")
+        require(made["input_range"].largest.shape == (kinds, len(model.inputs)), "largest")
         if not _alike(stored["response"], response(model, made["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")
         own = {"model": model, "method": method, "settings": settings, "training": tuple(training)}

@@ -1,148 +1,144 @@
-"""A reduced model as plain parts, and made of them again: numbers, texts, arrays by name.
+"""A reduced model as JSON and arrays, and read from them again, by the declared types of fields.
 
-What a method's `fit` gives is a tree of dataclasses and named tuples.  It is written field by
-field; the full-order model and its system are only referred to.  What is read can name the classes
-of this package that check their sizes, see `sizes`, and those of a plug-in that is in use, and
-nothing else.  Operations of kernels are arrays of numbers: no text becomes Python.
+What a method's `fit` gives is a tree of dataclasses and named tuples.  A field is written as its
+declared type says, and read as that; where a type leaves the class open, as of the root, its name
+is written too.  The full-order model and its system are only referred to.  A file can name the
+classes of this package that check their sizes, see `sizes`, and those of a plug-in that is in use,
+and nothing else.  Operations of kernels are arrays of numbers: no text becomes Python.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from types import UnionType
-from typing import Any, ClassVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from vehiclemor.arguments import quoted
+from vehiclemor.array_shapes import require
 from vehiclemor.codegen.operations import Operation, as_arrays, of_arrays
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import GROUPS
 from vehiclemor.simulation.model import Model
-from vehiclemor.sizes import require
 
 # Where the classes are that may be parts of reduced models.
 ROOMS = ("vehiclemor.reduction.", "vehiclemor.simulation.")
-# Parts that a model may have, each counted wherever it is meant: those of this package have 20,000.
-MOST_PARTS = 500_000
 # Types of arrays, and as what they are stored.
 STORED = {"float64": "f8", "int64": "i8", "bool": "i1", "complex128": "f8"}
+SCALARS = (bool, int, float, str, type(None))
+OPERATIONS = tuple[Operation, ...]
+OPERATION_ARRAYS = ("kinds", "arguments", "numbers")
+# Keys that no field has.
+ARRAY, CLASS, REFERENCE = "@array", "@class", "@full"
 
 
-class Writer:
-    """Takes a reduced model of a full-order one apart; `arrays` are by place."""
+class Parts:
+    """Writes and reads the parts of a reduced model; the arrays stand beside them, by path."""
 
-    def __init__(self, model: Model) -> None:
-        self.arrays: dict[str, np.ndarray] = {}
-        self._known: dict[int, tuple[Any, Any]] = {id(model): (model, {"model": ""})}
-        if (system := getattr(model, "system", None)) is not None:
-            self._known[id(system)] = system, {"model": "system"}
+    def __init__(self, model: Model, arrays: Mapping[str, np.ndarray] | None = None) -> None:
+        self.arrays = dict(arrays or {})
+        self._full = {"model": model, "system": getattr(model, "system", None)}
 
-    def part(self, value: Any, place: str) -> Any:
-        """A value as JSON has it, its arrays apart; `InputError` if it can't be written."""
-        if value is None or isinstance(value, bool | int | float | str):
-            return value
+    def write(self, value: Any, path: str, declared: Any = Any) -> Any:
+        """A value as JSON, its arrays aside; `InputError` if it can't be written."""
         if isinstance(value, np.bool_ | np.integer | np.floating):
-            return value.item()
-        if id(value) in self._known:
-            return self._known[id(value)][1]
-        found = self._described(value, place)
-        # Kept with it: the number of an object that is no more may be another's.
-        self._known[id(value)] = value, found if "array" in found else {"same": place}
-        return found
-
-    def _described(self, value: Any, place: str) -> dict[str, Any]:
+            value = value.item()
         kind = type(value)
-        if isinstance(value, np.ndarray) and value.dtype.name in STORED:
-            return self._array(value, place)
-        if names := _fields(kind):
-            name = _name(value, place)
-            fields = {name: self.part(getattr(value, name), f"{place}.{name}") for name in names}
-            return {"class": name, "fields": fields}
-        if kind is tuple and value and isinstance(value[0], Operation):
-            arrays = as_arrays([*value])
-            return {"operations": {n: self._array(a, f"{place}.{n}") for n, a in arrays.items()}}
+        try:
+            choice = _chosen(_choices(declared), kind, path)
+        except ValueError:
+            raise _unwritable(path, value) from None
+        if kind in SCALARS:
+            return value
+        for name, full in self._full.items():
+            if value is full:
+                return {REFERENCE: name}
+        if kind is np.ndarray and value.dtype.name in STORED:
+            return self._write_array(value, path)
+        if choice == OPERATIONS:
+            arrays = as_arrays(value)
+            return {name: self._write_array(arrays[name], f"{path}.{name}") for name in arrays}
+        if types := _fields(kind):
+            named_kind = {} if kind is _record(declared) else {CLASS: _name(value, path)}
+            fields = {name: getattr(value, name) for name in types}
+            return named_kind | self._write_fields(fields, path, types)
         if kind in (tuple, list):
-            items = [self.part(item, f"{place}.{i}") for i, item in enumerate(value)]
-            return {kind.__name__: items}
-        if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
-            return {"mapping": {key: self.part(v, f"{place}.{key}") for key, v in value.items()}}
-        raise _unwritable(place, value)
+            types = _item_types(choice, len(value))
+            items = enumerate(zip(value, types, strict=True))
+            return [self.write(item, f"{path}.{i}", of) for i, (item, of) in items]
+        if kind is dict and all(isinstance(key, str) for key in value):
+            return self._write_fields(value, path, dict.fromkeys(value, _value_type(choice)))
+        raise _unwritable(path, value)
 
-    def _array(self, value: np.ndarray, place: str) -> dict[str, Any]:
+    def _write_fields(
+        self, values: Mapping[str, Any], path: str, types: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        return {n: self.write(value, f"{path}.{n}", types[n]) for n, value in values.items()}
+
+    def _write_array(self, value: np.ndarray, path: str) -> dict[str, Any]:
         # Products of matrices are rounded as their numbers stand in memory.
         turned = value.ndim > 1 and value.flags.f_contiguous and not value.flags.c_contiguous
-        value = value.T if turned else value
-        kind, shape, stored = value.dtype.name, value.shape, np.ascontiguousarray(value)
-        stored = stored.view(float).reshape(*shape, 2) if kind == "complex128" else stored
-        self.arrays[place] = stored.astype(STORED[kind])
-        return {"array": place, "type": kind, "shape": list(shape), "turned": turned}
+        stored: Any = np.array(value.T if turned else value, order="C")
+        if stored.dtype == complex:
+            stored = np.stack([stored.real, stored.imag], axis=-1)
+        self.arrays[path] = stored.astype(STORED[value.dtype.name])
+        return {ARRAY: value.dtype.name, "turned": turned}
 
-
-class Reader:
-    """Makes a reduced model of its parts, and of the full-order model that these refer to."""
-
-    def __init__(self, model: Model, arrays: Mapping[str, np.ndarray]) -> None:
-        self._model, self._arrays = model, arrays
-        # Place -> what is made there, and of how many parts it is.
-        self._made: dict[str, tuple[Any, int]] = {}
-        self._count = 0
-
-    def value(self, part: Any, place: str) -> Any:
-        """What a part stands for; it raises various errors if that is nothing, or does not fit."""
-        before = self._count
-        self._count += 1
+    def read(self, part: Any, path: str, declared: Any = Any) -> Any:
+        """The value of a declared type; various errors if the part stands for none."""
+        choices = _choices(declared)
         if not isinstance(part, dict):
-            return part
-        if "same" in part:
-            made, count = self._made[part["same"]]
-            self._count += count
-            if self._count > MOST_PARTS:
-                raise ValueError(f"{place} has too many parts")
-            return made
-        made = self._of_kind(part, place)
-        self._made[place] = made, self._count - before
-        return made
+            value = self._read_items(part, path, choices) if isinstance(part, list) else part
+        elif REFERENCE in part:
+            value = self._full[part[REFERENCE]]
+        elif ARRAY in part:
+            value = self._read_array(part, path)
+        elif CLASS in part:
+            fields = {name: inner for name, inner in part.items() if name != CLASS}
+            value = self._read_record(named(part[CLASS]), fields, path)
+        elif OPERATIONS in choices:
+            value = of_arrays(*(self._read_array(part[n], f"{path}.{n}") for n in OPERATION_ARRAYS))
+        elif record := _record(declared):
+            value = self._read_record(record, part, path)
+        else:
+            of = _value_type(_chosen(choices, dict, path))
+            value = self._read_fields(part, path, dict.fromkeys(part, of))
+        _chosen(choices, type(value), path)
+        return value
 
-    def _of_kind(self, part: dict[str, Any], place: str) -> Any:
-        match part:
-            case {"array": name}:
-                return self._array(self._arrays[name], part)
-            case {"model": ""}:
-                return self._model
-            case {"model": "system" as name}:
-                return getattr(self._model, name)
-            case {"class": name, "fields": fields}:
-                kind = named(name)
-                made = kind(**{key: self.value(v, f"{place}.{key}") for key, v in fields.items()})
-                _check(made)
-                return made
-            case {"operations": arrays}:
-                return of_arrays(
-                    *(self.value(arrays[n], place) for n in ("kinds", "arguments", "numbers"))
-                )
-            case {"tuple": items}:
-                return tuple(self.value(item, f"{place}.{i}") for i, item in enumerate(items))
-            case {"list": items}:
-                return [self.value(item, f"{place}.{i}") for i, item in enumerate(items)]
-            case {"mapping": items}:
-                return {key: self.value(item, f"{place}.{key}") for key, item in items.items()}
-        raise ValueError(f"{quoted(part)} is no part of a model")
+    def _read_items(self, part: list[Any], path: str, choices: Sequence[Any]) -> Any:
+        kind = list if any(_allows(choice, list) for choice in choices) else tuple
+        types = _item_types(_chosen(choices, kind, path), len(part))
+        items = enumerate(zip(part, types, strict=True))
+        return kind(self.read(item, f"{path}.{i}", of) for i, (item, of) in items)
 
-    def _array(self, stored: np.ndarray, part: dict[str, Any]) -> np.ndarray:
-        stored = np.ascontiguousarray(stored, dtype=STORED[part["type"]]).ravel()
-        complex_pairs = part["type"] == "complex128"
-        found = stored.view(complex) if complex_pairs else stored.astype(part["type"])
-        if not all(type(size) is int and size >= 0 for size in part["shape"]):
-            raise ValueError(f"{quoted(part['shape'])} is no shape")
-        found = found.reshape(part["shape"])
-        return found.T if part["turned"] else found
+    def _read_fields(
+        self, parts: Mapping[str, Any], path: str, types: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        return {n: self.read(part, f"{path}.{n}", types[n]) for n, part in parts.items()}
+
+    def _read_record(self, kind: Any, parts: Mapping[str, Any], path: str) -> Any:
+        record = kind(**self._read_fields(parts, path, _fields(kind)))
+        # A plug-in's class may derive from one of this package.
+        if hasattr(record, "check_sizes"):
+            record.check_sizes()
+        return record
+
+    def _read_array(self, part: Mapping[str, Any], path: str) -> np.ndarray:
+        kind = part[ARRAY]
+        stored = np.array(self.arrays[path], dtype=STORED[kind], order="C")
+        if kind == "complex128":
+            require(stored.shape[-1] == 2, path)
+            stored = stored.view(complex)[..., 0]
+        value = stored.astype(kind, order="C")
+        return value.T if part["turned"] else value
 
 
 def named(name: str) -> Any:
@@ -150,17 +146,17 @@ def named(name: str) -> Any:
 
     `ValueError` if it is anything else.
     """
-    module, _, own = name.partition(":")
+    module, _, attribute = name.partition(":")
     # Of plug-ins only what is in use already: reading a file imports nothing of theirs.
     known = module.partition(".")[0] in _plug_ins()
     if module.startswith(ROOMS):
         with suppress(ImportError):
             import_module(module)
-    found = getattr(sys.modules.get(module), own, None)
-    known = known or (module.startswith(ROOMS) and hasattr(found, "check_sizes"))
-    if not (known and _fields(found) and found.__module__ == module):
+    kind = getattr(sys.modules.get(module), attribute, None)
+    known = known or (module.startswith(ROOMS) and hasattr(kind, "check_sizes"))
+    if not (known and _fields(kind) and kind.__module__ == module):
         raise ValueError(f"there is no {name}")
-    return found
+    return kind
 
 
 @cache
@@ -170,61 +166,74 @@ def _plug_ins() -> set[str]:
     return tops - {"vehiclemor"}
 
 
-def _fields(kind: Any) -> tuple[str, ...]:
-    """Names of the fields of a dataclass or named tuple; none of anything else."""
-    if not isinstance(kind, type):
-        return ()
-    if dataclasses.is_dataclass(kind):
-        return tuple(f.name for f in dataclasses.fields(kind) if f.init)
-    return getattr(kind, "_fields", ()) if issubclass(kind, tuple) else ()
-
-
-def _name(value: Any, place: str) -> str:
-    """`module:name` by which its class is found again."""
+def _name(value: Any, path: str) -> str:
+    """`module:name` by which `named` gives its class."""
     name = f"{type(value).__module__}:{type(value).__qualname__}"
     with suppress(ValueError):
         if named(name) is type(value):
             return name
-    raise _unwritable(place, value)
+    raise _unwritable(path, value)
 
 
-def _unwritable(place: str, value: Any) -> InputError:
-    return InputError(f"it can't be saved: {place} is {quoted(value)}")
-
-
-def _check(part: Any) -> None:
-    """Raise `ValueError` if a part is not what others will take it for."""
-    if type(part).__module__.startswith("vehiclemor."):
-        for name, kind in _declared(type(part)).items():
-            require(_is(getattr(part, name), kind), name)
-    # A plug-in's class may be made of one of ours.
-    if hasattr(part, "check_sizes"):
-        part.check_sizes()
+def _unwritable(path: str, value: Any) -> InputError:
+    return InputError(f"it can't be saved: {path} is {quoted(value)}")
 
 
 @cache
-def _declared(kind: type) -> Mapping[str, Any]:
-    """Fields of a dataclass or a named tuple, with their types."""
-    hints = get_type_hints(kind)
-    return {name: of for name, of in hints.items() if get_origin(of) is not ClassVar}
+def _fields(kind: Any) -> Mapping[str, Any]:
+    """Fields of a dataclass or named tuple with their declared types; none of anything else."""
+    if not isinstance(kind, type):
+        return {}
+    names = getattr(kind, "_fields", ()) if issubclass(kind, tuple) else ()
+    if dataclasses.is_dataclass(kind):
+        names = [field.name for field in dataclasses.fields(kind) if field.init]
+    try:
+        hints = get_type_hints(kind)
+    except NameError:
+        # A plug-in's type that is known to its type checker alone.
+        hints = {}
+    return {name: hints.get(name, Any) for name in names}
 
 
-def _is(value: Any, kind: Any) -> bool:
-    """Whether a value is of a declared type; what is made of others is of it in all its parts."""
-    origin, inner = get_origin(kind), get_args(kind)
-    if origin in (Union, UnionType):
-        return any(_is(value, one) for one in inner)
-    if origin is tuple and inner[-1:] != (...,):
-        fits = isinstance(value, tuple) and len(value) == len(inner)
-        return fits and all(map(_is, value, inner))
-    if origin in (tuple, list):
-        return isinstance(value, origin) and all(_is(part, inner[0]) for part in value)
-    if origin in (dict, Mapping):
-        return isinstance(value, Mapping) and all(_is(v, inner[1]) for v in value.values())
-    if origin is Callable:
-        return False
-    if kind is Any or getattr(kind, "_is_protocol", False):
-        return True
-    # A truth value is a whole number to Python, and that is a float to the type's author.
-    wider = (float, int) if kind is float else kind
-    return isinstance(value, wider) and (kind is bool or not isinstance(value, bool))
+def _choices(declared: Any) -> tuple[Any, ...]:
+    """The types that a declared one allows."""
+    return get_args(declared) if get_origin(declared) in (Union, UnionType) else (declared,)
+
+
+def _record(declared: Any) -> Any:
+    """The class of a declared type that leaves none open; else none."""
+    records = [choice for choice in _choices(declared) if _fields(choice)]
+    return records[0] if len(records) == 1 else None
+
+
+def _allows(choice: Any, kind: type) -> bool:
+    """Whether a value of a class may stand where a type is declared."""
+    origin = get_origin(choice) or choice
+    if origin is Any or not isinstance(origin, type) or getattr(origin, "_is_protocol", False):
+        # It would not say that a list or mapping is to be read as one.
+        return kind not in (list, dict)
+    if origin is float:
+        return kind in (float, int)
+    # A truth value is a whole number to Python, and a list a sequence.
+    return kind is origin or (kind not in (bool, list) and issubclass(kind, origin))
+
+
+def _chosen(choices: Sequence[Any], kind: type, path: str) -> Any:
+    """The type among the declared ones that allows a class; `ValueError` if none does."""
+    for choice in choices:
+        if _allows(choice, kind):
+            return choice
+    raise ValueError(f"{path} is of type {kind.__name__}, which is not declared")
+
+
+def _item_types(choice: Any, count: int) -> Sequence[Any]:
+    """Declared types of so many items of a tuple or list."""
+    types = get_args(choice)
+    if get_origin(choice) is tuple and types[-1:] != (...,):
+        return types
+    return (types[0] if types else Any,) * count
+
+
+def _value_type(choice: Any) -> Any:
+    """Declared type of the values of a mapping."""
+    return (get_args(choice) or (str, Any))[1]

@@ -14,6 +14,7 @@ import numpy as np
 from vehiclemor.arguments import number, real_array
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction import model_file
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank, simulated
 from vehiclemor.reduction.settings import Value
@@ -122,7 +123,7 @@ class ReducedOrderModel(ShortRepr):
         """
         chosen = self.model.definition.maneuver if maneuver is None else maneuver
         if isinstance(chosen, str):
-            chosen = component("maneuver", chosen)
+            chosen = registered(chosen)
         begun = self.model.starts[0] if start is None else start
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)

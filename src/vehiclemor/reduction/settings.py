@@ -24,6 +24,8 @@ class Settings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
     # Former name of a setting -> its name.
     renamed: ClassVar[Mapping[str, str]] = {}
+    # Settings that `fit` only hands on: the reduced model, a dataclass, has fields of these names.
+    integration: ClassVar[tuple[str, ...]] = ()
 
     @field_validator("*", mode="before")
     @classmethod
@@ -78,6 +80,7 @@ Tolerance = Annotated[
 class OnlineSettings(Settings):
     """How a reduced system is integrated."""
 
+    integration = ("solver", "tolerance")
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 1e-3
 

@@ -14,10 +14,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from vehiclemor.array_shapes import check_shapes
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
-from vehiclemor.sizes import shaped
 
 # Edges in Hz of bands in which inputs of structures are known, and time (s) between samples.  A
 # reduced structure holds motion up to a frequency: on a corrugated road hardly anything is slower.
@@ -133,7 +133,7 @@ class InputRange:
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if the magnitudes are no table of floats."""
-        shaped("largest", (self.largest, len(self.largest), *self.largest.shape[1:2]))
+        check_shapes("largest", (self.largest, len(self.largest), *self.largest.shape[1:2]))
 
     @property
     def _sizes(self) -> np.ndarray:

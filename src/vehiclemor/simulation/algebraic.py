@@ -45,7 +45,7 @@ REASONS = {
 }
 
 
-# Times, inputs, and these as loops take them.
+# Times, inputs, and the inputs as an argument of loops.
 Sampled = tuple[np.ndarray, np.ndarray, Ready]
 # A loop with its arguments, its counts, and the word of the address of its table.
 LaneRun = tuple[Prepared, np.ndarray, int]
@@ -116,8 +116,8 @@ class AlgebraicModel(Model):
 
     def joints_at(self, q: Any) -> dict[str, np.ndarray]:
         """Positions (3,) in m of the moving joints, for drawing."""
-        places = self.evaluated("joints", q, np.zeros(len(self.inputs)))
-        return dict(zip(self.definition.joints, places, strict=True))
+        positions = self.evaluated("joints", q, np.zeros(len(self.inputs)))
+        return dict(zip(self.definition.joints, positions, strict=True))
 
     def solve(self, u: Any) -> np.ndarray:
         """Coordinates (n,) at inputs u, on the branch of the design position, see `simulate`."""
@@ -209,9 +209,9 @@ class AlgebraicModel(Model):
         times, inputs, given = sampled
         n = len(self.coordinates)
         if solver == "newton_lanes" and len(times) >= LANES:
-            found = self._solved_in_lanes(sampled, _iteration(tolerance, SHORTEST_STEP))
-            if found is not None:
-                return found
+            trajectory = self._solved_in_lanes(sampled, _iteration(tolerance, SHORTEST_STEP))
+            if trajectory is not None:
+                return trajectory
         path = np.full((len(inputs), n), np.nan)
         solution = newton_loops.Solution(path, new_counts())
         iteration, buffer = _iteration(tolerance, SHORTEST_STEP), self._buffer()
@@ -231,10 +231,10 @@ class AlgebraicModel(Model):
         """Solution with the samples in vector lanes, as many at least; none if it fails."""
         (times, inputs, given), n = sampled, len(self.coordinates)
         kind = given, iteration
-        run = call, counted, place = self._lanes.taken(kind, lambda: self._packed(*kind))
+        run = call, counted, table_word = self._lanes.taken(kind, lambda: self._packed(*kind))
         # One table is written faster than two.
         table = np.empty((len(inputs), n + len(self.outputs)))
-        call.words[place] = address_of_array(table)
+        call.words[table_word] = address_of_array(table)
         status, seconds = timed(call)
         counts = counted.tolist()
         self._lanes.give_back(kind, run)
@@ -250,7 +250,7 @@ class AlgebraicModel(Model):
         n, inputs, m = len(self.coordinates), len(self.inputs), len(self.outputs)
         lane_kernels = self.addresses("newton_step", "outputs", lanes=LANES)
         solution = newton_loops.Solution(np.empty((0, n + m)), new_counts())
-        buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 2))
+        buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 1))
         loop = kinematic_loop("lane_path")
         shared = self._ready_mechanism, samples, lane_kernels, iteration
         call = loop.prepared(*shared, solution, buffer)

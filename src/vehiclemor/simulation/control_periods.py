@@ -5,12 +5,12 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from vehiclemor.array_shapes import check_indices, check_shapes, require
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.integrators.structures import Spans, Subspaces
-from vehiclemor.sizes import require, shaped, within
+from vehiclemor.simulation.loop_arguments import Spans, Subspaces
 
-# Lists of spans that are kept.
+# Lists of spans that are cached.
 MOST_SPANS = 64
 
 
@@ -39,11 +39,11 @@ class ControlPeriods(ShortRepr):
             (self.trial_basis, windows, rows, columns),
             (self.test_basis, windows, rows, columns),
         )
-        shaped("spaces", (self.edges, windows + 1), (self.means, windows, columns), *bases)
+        check_shapes("spaces", (self.edges, windows + 1), (self.means, windows, columns), *bases)
         if form != "full":
             # A coordinate and its rate share a row where coordinates are projected.
             most = rows * (2 if form == "coordinates" else 1)
-            within("ranks", self.ranks.tolist(), min(most, columns) + 1)
+            check_indices("ranks", self.ranks.tolist(), min(most, columns) + 1)
 
     @cached_property
     def subspaces(self) -> Ready:
@@ -55,7 +55,7 @@ class ControlPeriods(ShortRepr):
         return {}
 
     def spans(self, breaks: np.ndarray, end: float, begin: float = 0.0) -> Ready:
-        """As `smooth_spans`, with the window edges; those of whole runs are kept."""
+        """As `smooth_spans`, with the window edges; those of complete runs are cached."""
         if begin:
             return ready(smooth_spans(breaks, self.edges, end, begin))
         key = breaks.tobytes(), end
@@ -88,7 +88,7 @@ def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float
 
 @lru_cache(maxsize=64)
 def whole_space(dim: int) -> ControlPeriods:
-    """The whole space of a system with `dim` states, in one window."""
+    """The full space of a system with `dim` states, in one window."""
     nothing = np.zeros((1, 1, 1))
     return ControlPeriods(
         "full",

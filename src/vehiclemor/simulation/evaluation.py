@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
+from vehiclemor.codegen.derivatives import JacobianProduct, jacobian_product
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.codegen.vector_lanes import LANES
@@ -16,7 +16,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import checked_path
 
-PATH_LOOPS = ("simulation.integrators.structures", "simulation.path_loops")
+PATH_LOOPS = ("simulation.loop_arguments", "simulation.path_loops")
 # Places of the arguments of a kernel.
 STATE, INPUTS, CONSTANTS = range(3)
 PLACES = {"state": STATE, "inputs": INPUTS}
@@ -80,21 +80,23 @@ def path_loops() -> Mapping[str, Loop]:
     return loops(PATH_LOOPS, entries)
 
 
-def partial(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int) -> np.ndarray:
-    """Derivatives (size, n) of a kernel's result by the entries of the argument at a place."""
-    return _sensitivity(kernels, name, arrays, size, place).jacobian(arrays)
+def partial(kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int) -> np.ndarray:
+    """Derivatives (size, n) of a kernel's result by the entries of the argument at a argument."""
+    return _jacobian_product(kernels, name, arrays, size, argument).jacobian(arrays)
 
 
 def directional(
-    kernels: Kernels, name: str, arrays: Arrays, size: int, place: int, directions: np.ndarray
+    kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int, directions: np.ndarray
 ) -> np.ndarray:
     """Derivatives (k, size) of a kernel's result along directions (k, n) of one argument."""
-    return _sensitivity(kernels, name, arrays, size, place).columns(arrays, directions)
+    return _jacobian_product(kernels, name, arrays, size, argument).columns(arrays, directions)
 
 
-def _sensitivity(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int) -> Sensitivity:
+def _jacobian_product(
+    kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int
+) -> JacobianProduct:
     source = kernels.sources[name]
-    return sensitivity(source, source.arguments[place], size, len(arrays[place]))
+    return jacobian_product(source, source.arguments[argument], size, len(arrays[argument]))
 
 
 def parameter_names(by: Any) -> tuple[str, ...]:

@@ -144,19 +144,16 @@ def failure(q):
 
 def stopped(counts, iterations, jacobians, status):
     """Status of a loop that ends; writes its counts."""
-    counts[ITERATIONS], counts[RESIDUALS], counts[LINEAR_SOLVES] = (
-        iterations,
-        iterations,
-        iterations,
-    )
+    counts[ITERATIONS] = iterations
+    counts[RESIDUALS] = iterations
+    counts[LINEAR_SOLVES] = iterations
     counts[JACOBIANS] = jacobians
     return status
 
 
 def newton(q, u, mechanism, iteration, work):
     """Newton's method from q, which it changes: its iterations, negative where it has failed."""
-    n = len(q)
-    constants, step, full = mechanism.constants, work.step, work.full
+    n, constants, step, full = len(q), mechanism.constants, work.step, work.full
     first, second = 0.0, 0.0
     for count in range(1, iteration.limit + 1):
         call_kernel(mechanism.kernels, STEP, q, u, constants, step)
@@ -303,49 +300,46 @@ def scratch(start, inputs, buffer):
     return q, u, previous, target, Work(step, saved, full)
 
 
-def corrected(q, u, mechanism, lane_kernels, iteration, work):
-    """Newton's method in all lanes from q, which it changes: steps, negative where one failed."""
-    n = q.shape[1]
-    step, most = matrix(work, 0, LANES, n), vector(work, n * LANES, n)
-    full = matrix(work, n * (LANES + 1), n, n + 1)
+def same_side(q, u, mechanism, full):
+    """Whether no lane has passed a fold: there the Jacobian's determinant changes its sign."""
+    same = True
+    for lane in range(len(q)):
+        call_kernel(mechanism.kernels, JACOBIAN, q[lane], u[lane], mechanism.constants, full)
+        same &= small_solve(full, q.shape[1]) == mechanism.orientation
+    return same
+
+
+def corrected(positions, u, mechanism, lane_kernels, iteration, work):
+    """Newton's method in all lanes, which changes the positions: steps, negative if one failed."""
+    n, size, constants = len(mechanism.start), len(positions), mechanism.constants
+    q = matrix(positions, 0, LANES, n)
+    step, full = matrix(work, 0, LANES, n), matrix(work, size, n, n + 1)
+    steps = vector(work, 0, size)
     first, second = 0.0, 0.0
     for count in range(1, iteration.limit + 1):
-        call_lanes(lane_kernels, LANE_STEP, q, u, mechanism.constants, step, 0)
-        for i in range(n):
-            most[i] = 0.0
-        for lane in range(LANES):
-            for i in range(n):
-                q[lane, i] -= step[lane, i]
-                change = abs(step[lane, i])
-                # What is no number stays: it is below nothing.
-                most[i] = most[i] if change <= most[i] else change
-        if all_below(most, n, iteration.tolerance):
-            for lane in range(LANES):
-                if second > CERTAIN:
-                    constants = mechanism.constants
-                    call_kernel(mechanism.kernels, JACOBIAN, q[lane], u[lane], constants, full)
-                    if small_solve(full, n) != mechanism.orientation:
-                        return -count
-            return count
+        call_lanes(lane_kernels, LANE_STEP, q, u, constants, step, 0)
+        for i in range(size):
+            positions[i] -= steps[i]
+        if all_below(steps, size, iteration.tolerance):
+            return count if second <= CERTAIN or same_side(q, u, mechanism, full) else -count
         if count <= 2:
-            size = largest_of(most)
-            if not size <= (CORRECTION if count == 1 else CONTRACTION * first):
+            largest = largest_of(steps)
+            if not largest <= (CORRECTION if count == 1 else CONTRACTION * first):
                 return -count
-            first, second = (size, second) if count == 1 else (first, size)
+            first, second = (largest, second) if count == 1 else (first, largest)
     return -iteration.limit
 
 
 def extrapolated(q, first, second, third, known):
-    """Where the next iteration begins in all lanes, from as many positions as are known."""
-    for lane in range(LANES):
-        for i in range(q.shape[1]):
-            third[lane, i] = second[lane, i]
-            second[lane, i] = first[lane, i]
-            first[lane, i] = q[lane, i]
-            if known == 2:
-                q[lane, i] = 2.0 * first[lane, i] - second[lane, i]
-            elif known > 2:
-                q[lane, i] = 3.0 * (first[lane, i] - second[lane, i]) + third[lane, i]
+    """Where the next iteration begins, from as many positions as are known."""
+    for i in range(len(q)):
+        third[i] = second[i]
+        second[i] = first[i]
+        first[i] = q[i]
+        if known == 2:
+            q[i] = 2.0 * first[i] - second[i]
+        elif known > 2:
+            q[i] = 3.0 * (first[i] - second[i]) + third[i]
 
 
 def lane_path(
@@ -364,12 +358,13 @@ def lane_path(
     path, counts = solution.path, solution.counts
     samples, n = len(inputs), len(mechanism.start)
     size, columns = n * LANES, path.shape[1] - n
-    q, first = matrix(buffer, 0, LANES, n), matrix(buffer, size, LANES, n)
-    second, third = matrix(buffer, 2 * size, LANES, n), matrix(buffer, 3 * size, LANES, n)
+    q, positions = matrix(buffer, 0, LANES, n), vector(buffer, 0, size)
+    first, second = vector(buffer, size, size), vector(buffer, 2 * size, size)
+    third = vector(buffer, 3 * size, size)
     u = matrix(buffer, 4 * size, LANES, inputs.shape[1])
     offset = 4 * size + LANES * inputs.shape[1]
     results = matrix(buffer, offset, LANES, columns)
-    work = vector(buffer, offset + LANES * columns, n * (LANES + 1) + n * (n + 1))
+    work = vector(buffer, offset + LANES * columns, size + n * (n + 1))
     length = -(-samples // LANES)
     for lane in range(LANES):
         for i in range(n):
@@ -383,9 +378,9 @@ def lane_path(
                 u[lane, i] = share * share * inputs[sample, i]
         # From there on it is time that goes evenly.
         known = 1 if step == 1 else known
-        extrapolated(q, first, second, third, known)
+        extrapolated(positions, first, second, third, known)
         known += 1
-        count = corrected(q, u, mechanism, lane_kernels, iteration, work)
+        count = corrected(positions, u, mechanism, lane_kernels, iteration, work)
         iterations += abs(count) * LANES
         if count < 0:
             return stopped(counts, iterations, iterations, OFF_BRANCH)

@@ -11,7 +11,7 @@ from vehiclemor.codegen.loop_types import (
     call_lanes,
 )
 from vehiclemor.codegen.vector_lanes import LANES
-from vehiclemor.simulation.integrators.structures import (
+from vehiclemor.simulation.loop_arguments import (
     NODE_1,
     NODE_2,
     NODES,
@@ -43,10 +43,10 @@ def kernel_path(
 def lane_path(
     path: Matrix, inputs: Matrix, kernel: IntVector, constants: Vector, result: Matrix
 ) -> Int:
-    """The same by a kernel that takes `LANES` samples at once, which there must be."""
+    """Results of a kernel that takes `LANES` samples at once, which there must be."""
     last = len(path) - LANES
     for first in range(0, len(path), LANES):
-        # The last may have been computed before.
+        # The last lanes overlap those before.
         call_lanes(kernel, 0, path, inputs, constants, result, min(first, last))
     return 0
 
@@ -54,24 +54,24 @@ def lane_path(
 def watched(
     states: Matrix,
     inputs: Matrix,
-    places: Matrix,
+    node_of_sample: Matrix,
     outputs: Outputs,
     results: Matrix,
     result: IntVector,
 ) -> Int:
     """The first sample at which each of some outputs is outside of its range; else their number.
 
-    States are those at the points of a run (points, n or more), which are the samples where there
-    are no places, see `structures.Output`; results (points, results) of the kernel are scratch
-    space.
+    States are those at the points of a run (points, n or more).  Without `node_of_sample`, see
+    `loop_arguments.Output`, the points are the samples.  Results (points, results) of the kernel
+    are scratch space.
     """
-    samples = len(places) if len(places) else len(states)
+    samples = len(node_of_sample) if len(node_of_sample) else len(states)
     for k in range(len(result)):
         result[k] = samples
     evaluate(states, inputs, outputs, results)
     known, within = -1, False
     for sample in range(samples):
-        row, z = point_of(places, sample)
+        row, z = point_of(node_of_sample, sample)
         if z < 0.0:
             within = False
         elif row != known:
@@ -85,7 +85,7 @@ def watched(
 def chosen(
     states: Matrix,
     inputs: Matrix,
-    places: Matrix,
+    node_of_sample: Matrix,
     outputs: Outputs,
     results: Matrix,
     result: Matrix,
@@ -95,18 +95,18 @@ def chosen(
     samples = result.shape[1]
     for k in range(len(outputs.columns)):
         column, sample = outputs.columns[k], 0
-        table, own = (states, column) if column >= 0 else (results, -1 - column)
+        table, index = (states, column) if column >= 0 else (results, -1 - column)
         while sample < samples:
-            row, z = point_of(places, sample)
+            row, z = point_of(node_of_sample, sample)
             if row < 0 or z < 0.0:
-                result[k, sample] = value_at(table, row, z, own)
+                result[k, sample] = value_at(table, row, z, index)
                 sample += 1
                 continue
-            cubic, end = cubic_of(table, row, own), sample + 1
-            while end < samples and places[end, 0] == places[sample, 0]:
+            cubic, end = cubic_of(table, row, index), sample + 1
+            while end < samples and node_of_sample[end, 0] == node_of_sample[sample, 0]:
                 end += 1
             for i in range(sample, end):
-                result[k, i] = cubic_at(cubic, places[i, 1])
+                result[k, i] = cubic_at(cubic, node_of_sample[i, 1])
             sample = end
     return 0
 
@@ -121,10 +121,10 @@ def evaluate(states, inputs, outputs, results):
         kernel_path(states, inputs, outputs.kernel, outputs.constants, results)
 
 
-def sampled(points: Matrix, places: Matrix, histories: Matrix) -> Int:
+def sampled(points: Matrix, node_of_sample: Matrix, histories: Matrix) -> Int:
     """All columns of a table at the samples, which are not its points."""
     for sample in range(len(histories)):
-        row, z = point_of(places, sample)
+        row, z = point_of(node_of_sample, sample)
         if row < 0 or z < 0.0:
             for i in range(histories.shape[1]):
                 histories[sample, i] = points[row, i] if row >= 0 else math.nan
@@ -143,10 +143,10 @@ def sampled(points: Matrix, places: Matrix, histories: Matrix) -> Int:
     return 0
 
 
-def point_of(places, sample):
+def point_of(node_of_sample, sample):
     """Row of the point of a sample, and the part of its step that has passed, see `Output`."""
-    if len(places):
-        return int(places[sample, 0]), places[sample, 1]
+    if len(node_of_sample):
+        return int(node_of_sample[sample, 0]), node_of_sample[sample, 1]
     return sample, -1.0
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from vehiclemor.arguments import loop_array
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Prepared, Ready, ready
+from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
@@ -17,10 +18,9 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, output_times
 from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.evaluation import address_of, at_samples
-from vehiclemor.simulation.formulations import FORMULATIONS
 from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.step_kernels import Frame, mirror_blocks, signs
-from vehiclemor.simulation.integrators.structures import (
+from vehiclemor.simulation.loop_arguments import (
     NOT_FINITE,
     SINGULAR,
     STEP_TOO_SMALL,
@@ -31,7 +31,7 @@ from vehiclemor.simulation.integrators.structures import (
 )
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import NO_POINTS, DrivenBy, Pool, Run, Solver, Workspace
+from vehiclemor.simulation.workspaces import Pool, Run, RunInputs, Solver, Workspace
 
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
@@ -72,7 +72,7 @@ class System(ShortRepr):
 
     def with_constants(self, constants: np.ndarray) -> System:
         """The system of other constants; operators, packed arguments and workspaces serve both."""
-        # What is made of the Jacobian is made by this one, before it is shared.
+        # All that follows from the Jacobian is computed by this one, before it is shared.
         _ = self.frame, self.frozen_jacobian, self._ready, self._pool
         other = object.__new__(System)
         vars(other).update(vars(self), constants=constants, _address=constants.ctypes.data)
@@ -102,12 +102,12 @@ class System(ShortRepr):
 
     @cached_property
     def _ready(self) -> dict[tuple, Ready]:
-        # What integrators store of the frozen Jacobian is made when it is first used.
+        # Filled when an integrator is first used.
         return {}
 
     @cached_property
     def frame(self) -> Frame:
-        """Coordinates of the operators of whole steps."""
+        """Coordinates of the stored operators."""
         blocks = (tuple(((i, 1.0),) for i in range(len(self.reference))),)
         if len(self.partners):
             sign = signs(self.frozen_jacobian, self.partners)
@@ -119,30 +119,37 @@ class System(ShortRepr):
         return Frame(blocks, columns, tuple(self.rotating.tolist()))
 
     def method(self, solver: str, active: np.ndarray) -> Ready:
-        """What an integrator needs beside its code; kept for further runs."""
+        """What an integrator needs beside its code, cached."""
         key = solver, active.tobytes()
         if key not in self._ready:
             chosen, operators = catalogue.integrator(solver), np.zeros((1, 1, 1))
             if chosen.tables:
                 blocks = self.frame.diagonal(self.frozen_jacobian)
                 operators = self.frame.packed([chosen.tables(block) for block in blocks])
-            method = Method(chosen.tableau, catalogue.STEP_GRID, operators, active)
+            method = Method(chosen.tableau, catalogue.STEP_SIZES, operators, active)
             self._ready[key] = ready(method)
         return self._ready[key]
 
     def called(self, formulation: str, solver: str = "") -> Ready:
-        """The kernels that a run calls, a solver's whole steps too; kept for further runs."""
+        """The kernels that a run calls, a solver's step kernel too, cached."""
         key = formulation, solver
         if key not in self._ready:
-            step = 0
-            if solver and (step_kernel := catalogue.integrator(solver).step_kernel):
-                kernel = step_kernel(self.frame, self.inputs)
+            kernel, step = self._step_kernel(solver) if solver else None, 0
+            if kernel:
                 step = address_of(Kernels([kernel]), kernel.name)
-            names, places = FORMULATIONS[formulation], ("derivative", "second_order", "speeds")
-            found = [address_of(self.kernels, name) if name in names else 0 for name in places]
-            kernels = np.array([*found, step], dtype=np.int64)
+            called = catalogue.FORMULATIONS[formulation]
+            addresses = [
+                address_of(self.kernels, name) if name in called else 0
+                for name in ("derivative", "second_order", "speeds")
+            ]
+            kernels = np.array([*addresses, step], dtype=np.int64)
             self._ready[key] = ready(Equations(kernels, self.constants, self.error_scale))
         return self._ready[key]
+
+    def _step_kernel(self, solver: str) -> Kernel | None:
+        """The step kernel of a solver of the full system, where it has one."""
+        make = catalogue.integrator(solver).step_kernel
+        return make(self.frame, self.inputs) if make else None
 
     def run(
         self,
@@ -150,11 +157,11 @@ class System(ShortRepr):
         state: np.ndarray,
         windows: ControlPeriods,
         solver: Solver,
-        direct_until: float = np.inf,
+        record_all_until: float = np.inf,
     ) -> Run:
         """Integrate from a state (n,) over a maneuver; `InputError` if a value or name is wrong.
 
-        From `direct_until` s on the run may be recorded at points, see `structures.Output`.
+        From `record_all_until` s on the run may be recorded at points, see `loop_arguments.Output`.
         """
         name, tolerance, times, longest, begin = solver
         check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
@@ -162,14 +169,14 @@ class System(ShortRepr):
             check_positive("longest_step", longest)
 
         def make() -> Workspace:
-            return self.workspace(maneuver, windows, solver, direct_until)
+            return self.workspace(maneuver, windows, solver, record_all_until)
 
         if times is not None or begin:
             space, left = make(), None
         else:
-            # Of runs over whole maneuvers with the same output times.
+            # Complete maneuvers with the same output times share a workspace.
             length = maneuver.duration, maneuver.samples
-            kind = length, id(windows), name, tolerance, longest, direct_until
+            kind = length, id(windows), name, tolerance, longest, record_all_until
             space, left = self._pool.taken(kind, make), partial(self._pool.give_back, kind)
             if space.signal is not maneuver.packed_pieces:
                 space.take(self._drive(maneuver, windows, space.output.samples))
@@ -180,7 +187,7 @@ class System(ShortRepr):
         output.counts.fill(0)
         status, seconds = timed(space.call)
         failure = f"{REASONS[status]} at t = {space.buffer[0]:.6g} s" if status else ""
-        return Run(output.samples, output.path, output.counts, seconds, failure, space, left)
+        return Run(output.samples, output.states, output.counts, seconds, failure, space, left)
 
     @cached_property
     def _pool(self) -> Pool[Workspace]:
@@ -191,33 +198,33 @@ class System(ShortRepr):
         maneuver: Excitation,
         windows: ControlPeriods,
         solver: Solver,
-        direct_until: float = np.inf,
+        record_all_until: float = np.inf,
     ) -> Workspace:
         """Arrays of a run over a maneuver, its start still to be written; see `run`."""
         times = output_times(solver.times, maneuver, begin=solver.begin)
         drive = self._drive(maneuver, windows, times, solver.begin)
         path = np.empty((len(times), len(self.error_scale)))
         counts = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
-        given, points = NO_POINTS[0], NO_POINTS[1:]
-        if solver.times is None and not solver.begin:
-            given = drive.inputs.copy()
-            cubic = catalogue.integrator(solver.name).cubic
-            if cubic and len(times) >= LANES and direct_until < times[-1]:
-                points = np.empty(given.shape), np.empty(len(times)), np.empty((len(times), 2))
-        output = Output(times, path, counts, given, *points, direct_until)
+        if solver.times is not None or solver.begin:
+            return self.packed(windows, solver, drive, Output.at_samples(times, path, counts))
+        inputs, cubic = drive.inputs.copy(), catalogue.integrator(solver.name).cubic
+        if cubic and len(times) >= LANES and record_all_until < times[-1]:
+            output = Output.at_points(times, path, counts, inputs, record_all_until)
+        else:
+            output = Output.at_samples(times, path, counts, inputs)
         return self.packed(windows, solver, drive, output)
 
     def _drive(
         self, maneuver: Excitation, windows: ControlPeriods, times: np.ndarray, begin: float = 0.0
-    ) -> DrivenBy:
+    ) -> RunInputs:
         """What of a maneuver goes into a run."""
         signal = maneuver.packed_pieces
         end = float(times[-1]) if len(times) else maneuver.duration
         spans = windows.spans(signal.bundle.edges, end, begin)
-        return DrivenBy(signal, spans, maneuver.recorded_inputs[1])
+        return RunInputs(signal, spans, maneuver.recorded_inputs[1])
 
     def packed(
-        self, windows: ControlPeriods, solver: Solver, drive: DrivenBy, output: Output
+        self, windows: ControlPeriods, solver: Solver, drive: RunInputs, output: Output
     ) -> Workspace:
         """The time loop with all its arguments, see `integrators/loop.integrate`."""
         name, chosen = solver.name, catalogue.integrator(solver.name)
@@ -227,8 +234,8 @@ class System(ShortRepr):
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = windows.formulation
         longest = float(solver.longest_step or np.inf)
-        start = np.empty(n)
-        buffer = np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs))
+        start, step = np.empty(n), self._step_kernel(name) if full else None
+        buffer = np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, step))
         call = catalogue.time_loop(name, formulation).prepared(
             start,
             self.called(formulation, name if full else ""),
@@ -239,7 +246,7 @@ class System(ShortRepr):
             catalogue.control_of(name, float(solver.tolerance), longest),
             output,
             buffer,
-            np.empty(dim + 8, dtype=np.int64),
+            np.empty(dim + catalogue.FLAGS, dtype=np.int64),
         )
         self._set_constants(call)
         return Workspace(call, start, output, buffer, windows, drive.signal)

@@ -14,7 +14,7 @@ import xarray as xr
 
 from vehiclemor.arguments import MOST_JOBS, count
 from vehiclemor.exceptions import FileError, InputError
-from vehiclemor.progress import tell, telling
+from vehiclemor.progress import announced, tell
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
@@ -90,7 +90,7 @@ def _plan(name: str, path: Path, definition: StudyFile, seed: int | None) -> Pla
         return Plan(protocol.study, definition, partial(run_protocol, protocol), keys, LATER)
     large = definition.points >= LARGE
     text = f"{name}: checking {definition.points} grid points"
-    with telling(text) if large else nullcontext():
+    with announced(text) if large else nullcontext():
         grid = expand(name, definition)
     return Plan(name, definition, partial(run_grid, grid), grid.experiments.keys)
 

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
-from vehiclemor.codegen.cache import cache_folder, once
+from vehiclemor.codegen.cache import cache_folder, cached_by_one_thread
 from vehiclemor.exceptions import InputError, MachineError, machine_reason, one_line
 from vehiclemor.progress import tell
 from vehiclemor.provenance import code_digest
@@ -325,7 +325,7 @@ def on_worker(experiments: Sequence[Experiment]) -> Done:
         return done._replace(sent=sent)
 
 
-@once
+@cached_by_one_thread
 def _turn() -> threading.Lock:
     """Runs of one process take turns: the limit of linear algebra is one for all its threads."""
     from threadpoolctl import threadpool_limits

@@ -22,8 +22,8 @@ def eliminate(
     pivots: Pivots,
 ) -> list[list[sp.Expr]]:
     """Solve matrix x = right_side for several right sides by elimination with the given pivots."""
-    a = [[sp.sympify(e) for e in row] for row in matrix]
-    b = [[sp.sympify(e) for e in right_side] for right_side in right_sides]
+    a = [list(map(sp.sympify, row)) for row in matrix]
+    b = [list(map(sp.sympify, right_side)) for right_side in right_sides]
     rows, columns = list(range(len(a))), list(range(len(a)))
     inverses: dict[int, sp.Expr] = {}
     for row, column in pivots:
@@ -66,16 +66,16 @@ def eliminate_symmetric(
     """
     a = {
         (j, k): sp.sympify(matrix[j][k])
-        for place, j in enumerate(order)
-        for k in order[: place + 1]
+        for rank, j in enumerate(order)
+        for k in order[: rank + 1]
         if matrix[j][k] != 0
     }
     b = [sp.sympify(e) for e in right_side]
     factors: dict[int, dict[int, sp.Expr]] = {}
     inverses: dict[int, sp.Expr] = {}
-    for place, pivot in enumerate(order):
+    for rank, pivot in enumerate(order):
         inverse = inverses[pivot] = tape.let(1 / a[pivot, pivot])
-        below = [j for j in order[place + 1 :] if (j, pivot) in a]
+        below = [j for j in order[rank + 1 :] if (j, pivot) in a]
         factors[pivot] = {j: tape.let(a[j, pivot] * inverse) for j in below}
         for index, j in enumerate(below):
             for k in below[: index + 1]:

@@ -24,8 +24,8 @@ class Vector:
     def __iter__(self) -> Iterator[sp.Expr]:
         return iter((self.x, self.y, self.z))
 
-    def __getitem__(self, place: int) -> sp.Expr:
-        return (self.x, self.y, self.z)[place]
+    def __getitem__(self, index: int) -> sp.Expr:
+        return (self.x, self.y, self.z)[index]
 
     def __add__(self, other: Vector) -> Vector:
         return Vector(self.x + other.x, self.y + other.y, self.z + other.z)

@@ -86,13 +86,13 @@ class MovingFrame:
             bias = g.named(tape, self.angular_velocity.cross(self.velocity))
         return Motion(self.velocity, dict(enumerate(UNIT)), bias)
 
-    def point(self, tape: Tape, place: Vector, relative: Motion | None = None) -> Motion:
-        """Motion of a point at a place in the frame, and of its motion relative to the frame."""
+    def point(self, tape: Tape, position: Vector, relative: Motion | None = None) -> Motion:
+        """Motion of a point at a position in the frame, with its motion relative to the frame."""
         origin, turn = self.origin(tape), self.angular_velocity
-        velocity = self.velocity + turn.cross(place)
+        velocity = self.velocity + turn.cross(position)
         columns = dict(origin.columns)
-        columns |= {3 + i: UNIT[i].cross(place) for i in range(3)}
-        lever = g.named(tape, turn.cross(place))
+        columns |= {3 + i: UNIT[i].cross(position) for i in range(3)}
+        lever = g.named(tape, turn.cross(position))
         bias = origin.bias + turn.cross(lever)
         if relative is not None:
             velocity = velocity + relative.value
@@ -101,7 +101,7 @@ class MovingFrame:
             bias = bias + coriolis + relative.bias
         return Motion(g.named(tape, velocity), columns, g.named(tape, bias))
 
-    def turning(self, tape: Tape, relative: Motion) -> Motion:
+    def angular_velocity_of(self, tape: Tape, relative: Motion) -> Motion:
         """Angular velocity of a body that turns relative to the frame; biases are accelerations."""
         turn = self.angular_velocity
         columns = {3 + i: UNIT[i] for i in range(3)} | dict(relative.columns)
@@ -213,12 +213,10 @@ def kane(
         if body.rotor is not None:
             turning = turning - _add_rotor(tape, body.rotor, body.rotation, mass, force)
         loads = [(velocities, free), (turns, g.named(tape, turning))]
-        # Columns beside their images: mass times velocity, inertia times angular velocity.
-        images = [
-            (velocities, {k: column * body.mass for k, column in velocities.items()}),
-            (turns, {k: product(body.inertia, column) for k, column in turns.items()}),
-        ]
-        for columns, weighted in images:
+        # Columns of the momenta: mass times velocity, inertia times angular velocity.
+        momenta = {k: column * body.mass for k, column in velocities.items()}
+        spins = {k: product(body.inertia, column) for k, column in turns.items()}
+        for columns, weighted in [(velocities, momenta), (turns, spins)]:
             for k, image in weighted.items():
                 for j, other in columns.items():
                     if j >= k:

@@ -136,15 +136,15 @@ def _check_names(symbols: Sequence[sp.Symbol]) -> None:
 
 def _sympified(name: str, expressions: Sequence[object], shape: tuple[int, ...]) -> list[sp.Expr]:
     """Results of a function as expressions; plain numbers become SymPy's."""
-    found = [sp.sympify(expression) for expression in expressions]
-    if len(found) != math.prod(shape):
-        raise ValueError(f"{name} has {len(found)} results, its shape {shape} another number")
-    for expression in found:
+    results = [sp.sympify(expression) for expression in expressions]
+    if len(results) != math.prod(shape):
+        raise ValueError(f"{name} has {len(results)} results, its shape {shape} another number")
+    for expression in results:
         if not isinstance(expression, sp.Expr) or expression.has(
             sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I
         ):
             raise ValueError(f"{name}: {expression} is no real number")
-    return cast("list[sp.Expr]", found)
+    return cast("list[sp.Expr]", results)
 
 
 def _share(

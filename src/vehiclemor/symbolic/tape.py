@@ -61,9 +61,8 @@ class Tape:
             if row:
                 derivatives[symbol] = row
         rows = [self._chain_rule(sp.sympify(e), derivatives) for e in expressions]
-        return [
-            [row.get(column, sp.Integer(0)) for column in range(len(variables))] for row in rows
-        ]
+        columns = range(len(variables))
+        return [[row.get(column, sp.Integer(0)) for column in columns] for row in rows]
 
     def _chain_rule(
         self, expression: sp.Expr, derivatives: dict[sp.Symbol, dict[int, sp.Expr]]
@@ -89,7 +88,7 @@ def dependencies(
 ) -> list[sp.Symbol]:
     """Symbols that the expressions depend on, each after those it depends on itself."""
     order: dict[sp.Symbol, None] = {}
-    # A stack of its own: chains of definitions are longer than Python's recursion goes.
+    # Without recursion: chains of definitions may be longer than Python allows.
     pending: list[tuple[sp.Symbol, bool]] = []
     for expression in expressions:
         wanted = free_symbols(sp.sympify(expression))

@@ -5,7 +5,7 @@ import pytest
 
 from tests.oracles import complex_step
 from tests.unit.kernels import batch, kernel, sincos
-from vehiclemor.codegen.derivatives import FEW, derivative, sensitivity
+from vehiclemor.codegen.derivatives import FEW, derivative, jacobian_product
 from vehiclemor.codegen.operations import function
 from vehiclemor.codegen.vector_lanes import DIRECTIONS
 
@@ -52,18 +52,18 @@ WEIGHTS = np.linspace(-1.0, 1.3, 21)
 def test_every_function_has_its_derivative(argument, place):
     arrays = (X, U, WEIGHTS)
     expected = complex_step.jacobian(EVERYTHING, arrays, place)
-    found = sensitivity(EVERYTHING, argument, 7, len(arrays[place])).jacobian(arrays)
+    found = jacobian_product(EVERYTHING, argument, 7, len(arrays[place])).jacobian(arrays)
     np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-15)
 
 
 def test_functions_in_batches_too():
     expected = complex_step.jacobian(BATCHES, (X,), 0)
-    found = sensitivity(BATCHES, "_x", 2, 2).jacobian((X,))
+    found = jacobian_product(BATCHES, "_x", 2, 2).jacobian((X,))
     np.testing.assert_allclose(found, expected, rtol=1e-13)
 
 
 def test_many_directions_are_each_what_one_is():
-    found = sensitivity(EVERYTHING, "_x", 7, 2)
+    found = jacobian_product(EVERYTHING, "_x", 7, 2)
     directions = np.random.default_rng(1).normal(size=(DIRECTIONS + FEW + 1, 2))
     together = found.columns((X, U, WEIGHTS), directions)
     one_by_one = [found.columns((X, U, WEIGHTS), row[None])[0] for row in directions]
@@ -82,7 +82,7 @@ def test_what_does_not_depend_on_the_argument_leaves_no_operation():
         (*EVERYTHING.arguments[:-1], "_seed_u", "_result"),
         7,
     )
-    assert sensitivity(BATCHES, "_x", 2, 2).acting.tolist() == [0, 1]
+    assert jacobian_product(BATCHES, "_x", 2, 2).acting.tolist() == [0, 1]
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_kinks(norm, at, slopes):
     def k(x, result):
         result[0] = norm(x)
 
-    found = sensitivity(kernel(k), "_x", 1, 2).jacobian((np.array(at),))
+    found = jacobian_product(kernel(k), "_x", 1, 2).jacobian((np.array(at),))
     np.testing.assert_allclose(found, [slopes], rtol=1e-15)
 
 

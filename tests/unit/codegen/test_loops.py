@@ -172,7 +172,7 @@ def test_kernels_take_whole_arrays_alone(call):
 def test_another_source_entry_or_compiler_is_another_file(monkeypatch):
     names = []
 
-    def fetched(name, _):
+    def from_cache(name, _):
         names.append(name)
         raise InterruptedError
 
@@ -180,11 +180,11 @@ def test_another_source_entry_or_compiler_is_another_file(monkeypatch):
         with pytest.raises(InterruptedError):
             module.loops.__wrapped__(modules, entries)
 
-    monkeypatch.setattr(module, "fetched", fetched)
+    monkeypatch.setattr(module, "from_cache", from_cache)
     ask()
     ask()
     ask(entries=("lane_path",))
-    ask(modules=("simulation.integrators.structures", "simulation.path_loops"))
+    ask(modules=("simulation.loop_arguments", "simulation.path_loops"))
     for name in ("source_digest", "compiler_identity"):
         monkeypatch.setattr(module, name, lambda *_: "another")
         ask()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.oracles import complex_step
-from vehiclemor.codegen.derivatives import Sensitivity
+from vehiclemor.codegen.derivatives import JacobianProduct
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -32,7 +32,7 @@ def test_parameters_are_those_of_models_made_anew(runs, name, parameters, monkey
     model, run = runs[name]
     if name == "high_fidelity_vehicle":
         # The 14-DOF vehicle's derivatives are compiled.
-        monkeypatch.setattr(Sensitivity, "_products", complex_step.products)
+        monkeypatch.setattr(JacobianProduct, "_products", complex_step.products)
     sample = np.abs(run.inputs[:, 0]).argmax()
     x, u = run.states[sample], run.inputs[sample]
     # Both models on either side of each number, which both functions are taken of.

@@ -111,7 +111,7 @@ def test_each_step_is_the_textbooks_with_all_matrices_dense(chain):
         (q, v), a = at_the_end(a_next), a_next
         force = law(rest + b.T @ q, b.T @ v, u) - held
     state = np.zeros((3, model.size))
-    assert model.system.march(state, inputs, h, 1)[3] == 0
+    assert model.system.integrate(state, inputs, h, 1)[3] == 0
     for found, expected in zip(state, (q, v, a), strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=2e-8 * np.abs(expected).max())
 

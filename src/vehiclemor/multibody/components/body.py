@@ -32,7 +32,7 @@ def parameters(
 
 
 def outputs(q: Sequence[sp.Symbol], nu: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """Outputs of the chassis: place, yaw, pitch, roll, three velocities and the yaw rate."""
+    """Outputs of the chassis: position, yaw, pitch, roll, three velocities and the yaw rate."""
     return [q[0], q[1], q[3], q[4], q[5], nu[0], nu[1], nu[2], nu[5]]
 
 
@@ -125,23 +125,23 @@ def in_coordinates(
         velocity_bias = g.named(tape, [-component for component in swept])
     bias = [*velocity_bias, *angle_bias(tape, chassis, turning)]
     n = len(mass)
-    free = [
-        tape.let(force[j] - sp.Add(*[mass[j][k] * bias[k] for k in range(6)])) for j in range(n)
-    ]
+    free = []
+    for j in range(n):
+        inertial = sp.Add(*[mass[j][k] * bias[k] for k in range(6)])
+        free.append(tape.let(force[j] - inertial))
 
     def turned(column: Sequence[sp.Expr]) -> list[sp.Expr]:
         """P^T times a vector of length n."""
-        first = [sp.Add(*[linear[k][i] * column[k] for k in range(3)]) for i in range(3)]
-        second = [sp.Add(*[angular[k][i] * column[3 + k] for k in range(3)]) for i in range(3)]
-        return [*(tape.let(e) for e in [*first, *second]), *column[6:]]
+        blocks = [(linear, column[:3]), (angular, column[3:6])]
+        sums = [sp.Add(*[p[k][i] * v[k] for k in range(3)]) for p, v in blocks for i in range(3)]
+        return [*map(tape.let, sums), *column[6:]]
 
-    rows_times_p = [
-        turned([mass[j][k] for k in range(n)]) for j in range(n)
-    ]  # M P: P^T acts on rows, M is symmetric
-    columns = [turned([rows_times_p[j][k] for j in range(n)]) for k in range(n)]
+    # M P: P^T acts on rows, M is symmetric.
+    rows_times_p = [turned(row) for row in mass]
+    columns = [turned(column) for column in zip(*rows_times_p, strict=True)]
     # The translational block is the total mass in any axes.
     for i in range(3):
         for j in range(3):
             columns[i][j] = mass[i][j]
-    right = turned(free)
-    return [e for j in range(n) for e in [*(columns[k][j] for k in range(n)), right[j]]]
+    augmented = zip(*columns, turned(free), strict=True)
+    return [entry for row in augmented for entry in row]

@@ -30,10 +30,10 @@ class Arm:
         between = g.named(tape, self.front - self.rear)
         return g.named(tape, between * (1 / g.length(tape, between)))
 
-    def lever(self, tape: Tape, place: g.Vector) -> g.Vector:
+    def lever(self, tape: Tape, point: g.Vector) -> g.Vector:
         """From the rear pivot to where a point has moved, given its design position."""
         axis = self.axis(tape)
-        design = g.named(tape, place - self.rear)
+        design = g.named(tape, point - self.rear)
         return g.rotate_about_axis(tape, design, axis, self.angle)
 
 
@@ -52,18 +52,18 @@ class Linkage:
     # Unit vector along the tie rod: outwards on the left side, inwards on the right.
     rod_direction: g.Vector
 
-    def carrier_lever(self, tape: Tape, place: g.Vector) -> g.Vector:
+    def carrier_lever(self, tape: Tape, point: g.Vector) -> g.Vector:
         """From the upper ball joint to a point of the carrier, given its design position."""
-        design = g.named(tape, place - self.design_ball_joint)
+        design = g.named(tape, point - self.design_ball_joint)
         return g.rotate(tape, self.carrier, design)
 
-    def on_carrier(self, tape: Tape, place: g.Vector) -> g.Vector:
+    def on_carrier(self, tape: Tape, point: g.Vector) -> g.Vector:
         """Where a point of the carrier has moved, given its design position."""
-        return g.named(tape, self.upper_ball_joint + self.carrier_lever(tape, place))
+        return g.named(tape, self.upper_ball_joint + self.carrier_lever(tape, point))
 
-    def on_lower_arm(self, tape: Tape, place: g.Vector) -> g.Vector:
+    def on_lower_arm(self, tape: Tape, point: g.Vector) -> g.Vector:
         """Where a point of the lower arm has moved, given its design position."""
-        return g.named(tape, self.lower.rear + self.lower.lever(tape, place))
+        return g.named(tape, self.lower.rear + self.lower.lever(tape, point))
 
     def gaps(self, tape: Tape, points: Mapping[str, g.Vector]) -> list[sp.Expr]:
         """The closures (6): lower ball joint, then outer tie-rod joint."""
@@ -148,8 +148,8 @@ def closures(
     gaps = linkage.gaps(tape, points)
     ball, outer = points["lower_ball_joint"], points["tie_rod_outer"]
 
-    def on_carrier(place: g.Vector) -> Motion:
-        lever = linkage.carrier_lever(tape, place)
+    def on_carrier(point: g.Vector) -> Motion:
+        lever = linkage.carrier_lever(tape, point)
         return carried(tape, motions.ball_joint, motions.carrier, lever)
 
     rod = g.named(tape, linkage.rod)
@@ -157,7 +157,8 @@ def closures(
         (on_carrier(ball), carried(tape, STILL, motions.lower, linkage.lower.lever(tape, ball))),
         (on_carrier(outer), carried(tape, motions.rack_end, motions.rod, rod)),
     )
-    return [tape.let(gap) for gap in gaps], [relative(tape, a, b) for a, b in pairs]
+    named_gaps = [tape.let(gap) for gap in gaps]
+    return named_gaps, [relative(tape, a, b) for a, b in pairs]
 
 
 def relative(tape: Tape, a: Motion, b: Motion) -> Motion:

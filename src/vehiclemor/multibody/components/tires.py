@@ -148,7 +148,7 @@ def fiala(
 ) -> TireForces:
     """Forces of the Fiala model; zero where the load is zero.
 
-    Each force grows with its own slip until the contact slides; the slips act on each other through
+    Each force grows with its slip until the contact slides; the slips act on each other through
     the friction coefficient alone.
     """
     let = tape.let
@@ -187,7 +187,7 @@ def upright_wheel(
     chassis: Attitude,
     height: sp.Expr,  # Height of the chassis origin above the road.
     # Wheel centre and spin axis in the chassis frame.
-    place: Vector,
+    hub: Vector,
     axle: Vector,
     # Velocity of the wheel centre and complete angular velocity of the wheel.
     velocity: Vector,
@@ -199,7 +199,7 @@ def upright_wheel(
     The vertical load has no arm.
     """
     let, up = tape.let, chassis.road_normal
-    above = let(height + let(up @ place))
+    above = let(height + let(up @ hub))
     along = g.named(tape, axle.cross(up))
     inverse = let(1 / g.length(tape, along))
     heading = g.named(tape, along * inverse)

@@ -20,10 +20,10 @@ def derive() -> Program:
     tape = Tape()
     q = sp.symbols([c.name for c in DECLARED["coordinates"]], real=True)
     u = sp.symbols([i.name for i in DECLARED["inputs"]], real=True)
-    points = {
-        name: g.vector(sp.symbols([f"{name}_{axis}" for axis in "xyz"], real=True))
-        for name in DECLARED["parameters"]
-    }
+    points = {}
+    for name in DECLARED["parameters"]:
+        components = sp.symbols([f"{name}_{axis}" for axis in "xyz"], real=True)
+        points[name] = g.vector(components)
     corner = linkage.assembled(tape, q[:7], q[7], points)
     closures = corner.gaps(tape, points)
     wheel_centre, axle = (
@@ -40,12 +40,15 @@ def derive() -> Program:
     ]
     outputs = [centre[0], centre[1], q[1], sp.atan2(-axle[0], axle[1]), sp.asin(axle[2]), q[7]]
     (step,) = eliminate(tape, jacobian, [residual], PIVOTS)
-    augmented = [e for row, phi in zip(jacobian, residual, strict=True) for e in [*row, phi]]
+    augmented = []
+    for row, phi in zip(jacobian, residual, strict=True):
+        augmented += [*row, phi]
+    symbols = [component for point in points.values() for component in point]
     n = len(DECLARED["coordinates"])
     return assemble(
         tape,
         {"q": q, "u": u},
-        cast("list[sp.Symbol]", [component for point in points.values() for component in point]),
+        cast("list[sp.Symbol]", symbols),
         {
             "residual": (residual, (n,)),
             "residual_jacobian": (augmented, (n, n + 1)),

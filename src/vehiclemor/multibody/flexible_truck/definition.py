@@ -91,7 +91,7 @@ def structure(values: Mapping[str, Any]) -> Structure:
 
 @lru_cache(maxsize=8)
 def _unladen(given: tuple[tuple[str, Any], ...]) -> tuple[Structure, csc_array, np.ndarray]:
-    """A truck without payload, the mass of a kilogram of payload, and a heave (n,) of the whole."""
+    """A truck without payload, the mass of a kilogram of payload, and a heave (n,) of all."""
     from scipy.sparse import block_diag, csc_array, eye_array
 
     v = dict(given)
@@ -111,9 +111,9 @@ def _unladen(given: tuple[tuple[str, Any], ...]) -> tuple[Structure, csc_array, 
         """Matrix (n, n) of masses or springs by the motions (k, N) they take part in."""
         return csc_array(spread.T @ csc_array((rows.T * weights) @ rows) @ spread)
 
-    def points(masses: np.ndarray, places: np.ndarray) -> csc_array:
+    def points(masses: np.ndarray, positions: np.ndarray) -> csc_array:
         """Matrix (n, n) of point masses."""
-        return weighted(np.concatenate(moving.body(places)), np.repeat(masses, 3))
+        return weighted(np.concatenate(moving.body(positions)), np.repeat(masses, 3))
 
     moving = Motions(ladder)
     centre = np.array([-v["sprung_distance"], 0.0, v["sprung_height"]])
@@ -150,9 +150,9 @@ def _unladen(given: tuple[tuple[str, Any], ...]) -> tuple[Structure, csc_array, 
         outputs=_outputs(on_nodes(heights), on_nodes(angles), ports, frame.strains),
     )
     front, rear = v["platform_front"], v["platform_rear"]
-    shares, places = block(np.array([rear - front, v["platform_width"], 0.0]) / 2.0)
+    shares, positions = block(np.array([rear - front, v["platform_width"], 0.0]) / 2.0)
     middle = [-(front + rear) / 2.0, 0.0, v["platform_height"]]
-    return truck, points(shares, places + middle), upward
+    return truck, points(shares, positions + middle), upward
 
 
 def _cab(moving: Motions, v: Mapping[str, Any]) -> tuple[np.ndarray, list[float]]:
@@ -167,7 +167,7 @@ def _cab(moving: Motions, v: Mapping[str, Any]) -> tuple[np.ndarray, list[float]
 
 
 def _rest(body: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Point masses (points,) in kg and their places: a block with a body's inertia (6, 6)."""
+    """Point masses (points,) in kg and their positions: a block with a body's inertia (6, 6)."""
     mass, first = body[0, 0], np.array([body[1, 5], body[2, 3], body[0, 4]])
     second = np.eye(3) * np.trace(body[3:, 3:]) / 2.0 - body[3:, 3:]
     squares, axes = np.linalg.eigh(mass * second - np.outer(first, first))
@@ -176,20 +176,20 @@ def _rest(body: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]
             "the sprung mass beside frame and cab can't be spread along the frame: its mass, "
             "centre and moments of inertia need negative masses or distances"
         )
-    shares, places = block(np.sqrt(3.0 * squares) / mass)
-    return mass * shares, centre + first / mass + places @ axes.T
+    shares, positions = block(np.sqrt(3.0 * squares) / mass)
+    return mass * shares, centre + first / mass + positions @ axes.T
 
 
 def _ports(moving: Motions, v: Mapping[str, Any]) -> list[np.ndarray]:
     """Deflections (12, N) of the ports: compressions of springs and dampers, wheels' heights."""
     kinds = [(kind, end, side) for kind in ("spring", "damper") for end in ENDS for side in SIDES]
-    places = [(end, side * v[f"{end}_{kind}_offset"]) for kind, end, side in kinds]
-    pressed = [moving.axle(end, y) - moving.rail(f"{end} axle", y) for end, y in places]
+    ports = [(end, side * v[f"{end}_{kind}_offset"]) for kind, end, side in kinds]
+    pressed = [moving.axle(end, y) - moving.rail(f"{end} axle", y) for end, y in ports]
     return pressed + [moving.axle(e, side * v["wheel_offset"]) for e in ENDS for side in SIDES]
 
 
 def _heights(moving: Motions, v: Mapping[str, Any]) -> list[np.ndarray]:
-    """Heights (5, N) of the driver's place and of the platform's corners."""
+    """Heights (5, N) of the driver's seat and of the platform's corners."""
     (x, y, _), half, level = v["driver"], v["platform_width"] / 2.0, v["platform_height"]
     corners = [(-v[f"platform_{end}"], side * half, level) for end in ENDS for side in SIDES]
     return [moving.in_cab(x - v["cab_place"], y), *moving.body(np.array(corners))[:, 2]]
@@ -219,7 +219,7 @@ def _outputs(
 
 
 class Motions:
-    """Motion of places of the truck as rows over s (N,), which both meshes have.
+    """Motion of points of the truck as rows over s (N,), which both meshes have.
 
     s are three displacements and three rotations of the rails at every station, left and right,
     then heave, pitch and roll of the cab, then heave and roll of the front and of the rear axle.
@@ -261,7 +261,7 @@ class Motions:
         heave, pitch, roll = self.cab
         return heave + y * roll - x * pitch
 
-    def body(self, places: np.ndarray) -> np.ndarray:
+    def body(self, positions: np.ndarray) -> np.ndarray:
         """Displacements (points, 3, N) of points (points, 3) of what rests on the frame.
 
         Bodies and platform are rigid in their plane: along, across and in pitch and yaw they follow
@@ -269,10 +269,10 @@ class Motions:
         """
         from scipy.interpolate import make_interp_spline
 
-        x, y, z = places.T[:, :, None]
+        x, y, z = positions.T[:, :, None]
         stations = self.ladder.stations[::-1]
         share, up = (self.ahead - x) / (self.ahead - self.behind), z - self.ladder.height
-        rails = make_interp_spline(stations, self.middles[::-1, 2:], k=1)(places[:, 0])
+        rails = make_interp_spline(stations, self.middles[::-1, 2:], k=1)(positions[:, 0])
         along = (self.front[0] + self.rear[0]) / 2.0 + up * self.pitch - y * self.yaw
         ends = self.front[1] - up * self.front[3], self.rear[1] - up * self.rear[3]
         across = (1.0 - share) * ends[0] + share * ends[1]
@@ -280,7 +280,7 @@ class Motions:
 
 
 def block(half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shares (points,) and places (points, 3) of points that have a homogeneous block's moments.
+    """Shares (points,) and positions (points, 3) of points that have a homogeneous block's moments.
 
     The block has its sides along the axes; `half` (3,) are half its lengths in m.
     """

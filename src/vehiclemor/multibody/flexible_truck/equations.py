@@ -51,12 +51,12 @@ def _spring(tape: Tape, p: Parameters, end: str, w: sp.Symbol) -> sp.Expr:
 
 def _stop(tape: Tape, p: Parameters, excess: sp.Expr) -> sp.Expr:
     """Force of a stop: linear between the table's points, and beyond."""
-    force = slope = place = reached = sp.Integer(0)
+    force = slope = last = reached = sp.Integer(0)
     for point in STOP_TABLE:
         here, level = sp.Rational(point, 1000), p[f"stop_force_{point}_mm"]
-        steeper = tape.let((level - reached) / (here - place) - slope)
-        force += steeper * _step(tape, excess > place) * (excess - place)
-        slope, place, reached = tape.let(slope + steeper), here, level
+        steeper = tape.let((level - reached) / (here - last) - slope)
+        force += steeper * _step(tape, excess > last) * (excess - last)
+        slope, last, reached = tape.let(slope + steeper), here, level
     return tape.let(force)
 
 

@@ -58,11 +58,11 @@ class Layout:
     """Geometry and material of the ladder: two rails, a cross member in every plane but one."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
-        places = planes(values)
-        parts = np.ceil(-np.diff(list(places.values())) / BAY - 1e-9).astype(int)
+        positions = planes(values)
+        parts = np.ceil(-np.diff(list(positions.values())) / BAY - 1e-9).astype(int)
         # x in m, from front to rear, and numbers of those of axles, cab mounts, gearbox and ends.
-        self.stations = divided(list(places.values()), parts)
-        self.planes = dict(zip(places, [0, *np.cumsum(parts).tolist()], strict=True))
+        self.stations = divided(list(positions.values()), parts)
+        self.planes = dict(zip(positions, [0, *np.cumsum(parts).tolist()], strict=True))
         # Numbers of the stations with a cross member.
         self.crossings = [n for name, n in self.planes.items() if name != "front cab mounts"]
         front, gearbox, rear = (self.planes[n] for n in ("front axle", "gearbox", "rear axle"))
@@ -86,12 +86,12 @@ class Frame:
     # (n, n), of the frame alone, free.
     mass: csc_array
     stiffness: csc_array
-    nodes: np.ndarray  # Places (nodes, 3) in m.
+    nodes: np.ndarray  # Positions (nodes, 3) in m.
     # (stations * 2 * 6, n): three displacements and three rotations of the rails at every station,
     # left and right, at the middle of the web.
     sections: csc_array
-    # (20, n): axial strains at the corners of web and flange, by place, left and right, upper and
-    # lower; from the displacements along x at the ends of the elements around the place.
+    # (20, n): axial strains at the corners of web and flange, by bay, left and right, upper and
+    # lower; from the displacements along x at the ends of the elements in the bay's middle.
     strains: csc_array
 
 
@@ -117,21 +117,26 @@ def divided(corners: Sequence[float] | np.ndarray, parts: np.ndarray) -> np.ndar
     return np.interp(np.arange(numbers[-1] + 1), numbers, corners)
 
 
+def line_of_points(*coordinates: Any) -> np.ndarray:
+    """Points (points, dimensions) along one axis: its coordinates are an array, others numbers."""
+    return np.stack(np.broadcast_arrays(*coordinates), axis=-1)
+
+
 def joined(grids: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Nodes (nodes, 3) of some grids (..., 3), and their numbers (...): equal places are one."""
-    places = np.concatenate([grid.reshape(-1, 3) for grid in grids])
-    keys = np.round(places / SAME).astype(np.int64)
+    """Nodes (nodes, 3) of some grids (..., 3), and their numbers (...): equal points are joined."""
+    points = np.concatenate([grid.reshape(-1, 3) for grid in grids])
+    keys = np.round(points / SAME).astype(np.int64)
     _, first, numbers = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     ends = np.cumsum([grid.size // 3 for grid in grids])[:-1]
     pieces = np.split(numbers.ravel(), ends)
-    return places[first], [n.reshape(g.shape[:-1]) for n, g in zip(pieces, grids, strict=True)]
+    return points[first], [n.reshape(g.shape[:-1]) for n, g in zip(pieces, grids, strict=True)]
 
 
 def levers(arms: np.ndarray) -> np.ndarray:
     """Motion (points, 6, 6) at the ends of rigid arms (points, 3) by that at their beginning."""
-    found = np.tile(np.eye(6), (len(arms), 1, 1))
-    found[:, :3, 3:] = np.cross(np.eye(3), arms[:, None]).swapaxes(1, 2)
-    return found
+    motions = np.tile(np.eye(6), (len(arms), 1, 1))
+    motions[:, :3, 3:] = np.cross(np.eye(3), arms[:, None]).swapaxes(1, 2)
+    return motions
 
 
 def strains(lines: np.ndarray, corners: csc_array, bays: list[tuple[float, float]]) -> csc_array:
@@ -168,29 +173,30 @@ def beam_matrices(
         (0, modulus * section.area, density * section.area),
         (3, shear_modulus * section.torsion, density * polar),
     ):
-        own = (slice(None), *np.ix_([row, row + 6], [row, row + 6]))
-        stiffness[own] = rigidity / length * [[1, -1], [-1, 1]]
-        mass[own] = inertia * length / 6.0 * [[2, 1], [1, 2]]
+        block = (slice(None), *np.ix_([row, row + 6], [row, row + 6]))
+        stiffness[block] = rigidity / length * [[1, -1], [-1, 1]]
+        mass[block] = inertia * length / 6.0 * [[2, 1], [1, 2]]
     # A slope about y lowers the far end.
     for rows, second_moment, shear_area, sign in (
         ([2, 4, 8, 10], section.upright, section.shear_areas[0], -1.0),
         ([1, 5, 7, 11], section.sideways, section.shear_areas[1], 1.0),
     ):
-        own = (slice(None), *np.ix_(rows, rows))
+        block = (slice(None), *np.ix_(rows, rows))
         rigidity = modulus * second_moment
         shear = 12.0 * rigidity / (shear_modulus * shear_area * length**2)
         slopes = np.where([False, True, False, True], sign * length, 1.0)
         scale = slopes * slopes.swapaxes(1, 2)
-        stiffness[own] = rigidity / (length**3 * (1.0 + shear)) * scale * (BENDING + shear * SHEAR)
-        mass[own] = density * section.area * length / 420.0 * scale * INERTIA
+        bending = BENDING + shear * SHEAR
+        stiffness[block] = rigidity / (length**3 * (1.0 + shear)) * scale * bending
+        mass[block] = density * section.area * length / 420.0 * scale * INERTIA
     return stiffness, mass
 
 
 def at_nodes(axial: float, across: float) -> np.ndarray:
     """Motion (12, 12) of a beam's line by that of its nodes.
 
-    `axial` and `across` are the places y in m, relative to the nodes, of the points whose
-    displacement is along the beam, and across it.
+    `axial` and `across` are y in m, relative to the nodes, of the points whose displacement is
+    along the beam, and across it.
     """
     end, shear = levers(np.array([[0.0, axial, 0.0], [0.0, across, 0.0]]))
     end[2] = shear[2]
@@ -209,13 +215,13 @@ def frame_of_beams(layout: Layout, elements_per_bay: int) -> Frame:
     lines = divided(stations, np.full(len(stations) - 1, k))
     widths = divided(layout.sides[::-1], np.array([k]))
     # Rails run forward, cross members to the left.
-    grids = [np.array([(x, y, height) for x in lines[::-1]]) for y in layout.sides]
-    grids += [np.array([(stations[n], y, height) for y in widths]) for n in layout.crossings]
+    grids = [line_of_points(lines[::-1], y, height) for y in layout.sides]
+    grids += [line_of_points(stations[n], widths, height) for n in layout.crossings]
     nodes, numbers = joined(grids)
     coordinates = eye_array(6 * len(nodes)).tocsr()
     stiffness, mass, ends = [], [], []
-    for line, (places, own) in enumerate(zip(grids, numbers, strict=True)):
-        lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    for line, (points, line_nodes) in enumerate(zip(grids, numbers, strict=True)):
+        lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
         section, bent, moved = layout.cross, ALONG_Y, ALONG_Y
         if line < 2:
             # Flanges point inward.
@@ -225,9 +231,9 @@ def frame_of_beams(layout: Layout, elements_per_bay: int) -> Frame:
         elastic, inertia = beam_matrices(lengths, section, layout.material)
         stiffness += list(bent.T @ elastic @ bent)
         mass += list(moved.T @ inertia @ moved)
-        ends += list(pairwise(own))
+        ends += list(pairwise(line_nodes))
     chosen = coordinates[np.add.outer(6 * np.ravel(ends), np.arange(6)).ravel()]
-    webs = np.stack([own[::-1] for own in numbers[:2]], axis=1)
+    webs = np.stack([rail_nodes[::-1] for rail_nodes in numbers[:2]], axis=1)
     along = 6 * np.repeat(webs, 2)
     up = diags_array(np.tile([0.5, -0.5], webs.size) * rail.height)
     return Frame(
@@ -265,13 +271,14 @@ def shell_matrices(
         ) from error
     modulus, poisson_ratio, density = material
     data, probe, flat = Quad4Data(), Quad4Probe(), np.ascontiguousarray(nodes).ravel()
-    count = sum((len(own) - 1) * (own.shape[1] - 1) for own, _ in plates)
+    count = sum((len(grid) - 1) * (grid.shape[1] - 1) for grid, _ in plates)
     sizes = data.KC0_SPARSE_SIZE, data.M_SPARSE_SIZE
     entries = [(np.zeros(n, INT), np.zeros(n, INT), np.zeros(n)) for n in np.multiply(sizes, count)]
     number = 0
-    for own, thickness in plates:
+    for grid, thickness in plates:
         plate = isotropic_plate(thickness=thickness, E=modulus, nu=poisson_ratio, rho=density)
-        corners = 6 * np.stack([own[:-1, :-1], own[1:, :-1], own[1:, 1:], own[:-1, 1:]], axis=-1)
+        around = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+        corners = 6 * np.stack(around, axis=-1)
         for four in corners.reshape(-1, 4).tolist():
             element = Quad4(probe)
             element.c1, element.c2, element.c3, element.c4 = four
@@ -301,24 +308,28 @@ def frame_of_shells(layout: Layout, size: float) -> Frame:
 
     def drawn(lines: np.ndarray, section: np.ndarray) -> np.ndarray:
         """Nodes (lines, points, 3) of a section (points, 2) drawn along x."""
-        return np.array([[(x, y, z + layout.height) for y, z in section] for x in lines])
+        nodes = np.empty((len(lines), len(section), 3))
+        nodes[:, :, 0] = lines[:, None]
+        nodes[:, :, 1:] = section + np.array([0.0, layout.height])
+        return nodes
 
     rail, cross, up = layout.rail, layout.cross, layout.rail.height / 2.0
-    # Places x (stations, 2) of the cross members' webs, twice the same where there is none.
+    # x (stations, 2) of the cross members' webs, twice the same where there is none.
     webs = np.stack([layout.stations, layout.stations], axis=1)
     webs[layout.crossings] += np.array([0.5, -0.5]) * cross.width
     lines = meshed(np.unique(webs)[::-1].tolist())
     outer, tip = layout.sides[0], layout.sides[0] - rail.width
     inward, upward, between = meshed([outer, tip]), meshed([-up, up]), meshed([tip, -tip])
-    whole = np.concatenate([inward[:-1], between, -inward[-2::-1]])
-    flanges = [[(y, z) for y in inward[1:]] for z in (-up, up)]
-    section = np.array([*flanges[0][::-1], *((outer, z) for z in upward), *flanges[1]])
+    across = np.concatenate([inward[:-1], between, -inward[-2::-1]])
+    lower = line_of_points(inward[:0:-1], -up)
+    upper = line_of_points(inward[1:], up)
+    section = np.concatenate([lower, line_of_points(outer, upward), upper])
     grids = [drawn(lines, section * [sign, 1.0]) for sign in (1.0, -1.0)]
     for front, rear in webs[layout.crossings]:
-        pair = [drawn(whole, np.array([(x, z) for z in upward])) for x in (front, rear)]
+        pair = [drawn(across, line_of_points(x, upward)) for x in (front, rear)]
         grids += [web[..., [1, 0, 2]] for web in pair]
         inner = lines[(lines < front + SAME) & (lines > rear - SAME)]
-        grids += [drawn(inner, np.array([(y, z) for y in between])) for z in (up, -up)]
+        grids += [drawn(inner, line_of_points(between, z)) for z in (up, -up)]
     nodes, numbers = joined(grids)
     thickness = [rail.thickness] * 2 + [cross.thickness] * (len(grids) - 2)
     mass, stiffness = shell_matrices(
@@ -333,13 +344,14 @@ def frame_of_shells(layout: Layout, size: float) -> Frame:
     sections = []
     for x, pair in zip(layout.stations, webs, strict=True):
         near = np.abs(lines[:, None] - pair).argmin(axis=0)
-        for own, y in zip(numbers, layout.sides, strict=False):
-            ring = own[near].ravel()
+        for grid, y in zip(numbers, layout.sides, strict=False):
+            ring = grid[near].ravel()
             rigid = levers(nodes[ring] - [x, y, layout.height])[:, :3].reshape(-1, 6)
             moved = coordinates[np.add.outer(6 * ring, np.arange(3)).ravel()]
             sections.append(csc_array(np.linalg.pinv(roots * rigid) * roots.T) @ moved)
     # Upper corner, then the lower one.
-    corners = np.stack([own[:, [-len(inward), len(inward) - 1]] for own in numbers[:2]], axis=1)
+    columns = [-len(inward), len(inward) - 1]
+    corners = np.stack([grid[:, columns] for grid in numbers[:2]], axis=1)
     return Frame(
         mass,
         stiffness,

@@ -59,8 +59,9 @@ class Vehicle:
 
     def motions(self, tape: Tape, rates: Sequence[Rate], k: int) -> links.LinkageMotions:
         """Motions of the front left (0) or right (1) corner for rates of all coordinates."""
-        q, own = [self.q[j] for j in CORNER[k]], [rates[j] for j in CORNER[k]]
-        return links.linkage_motions(tape, self.linkages[k], q, own, self.rack[1:])
+        q = [self.q[j] for j in CORNER[k]]
+        corner_rates = [rates[j] for j in CORNER[k]]
+        return links.linkage_motions(tape, self.linkages[k], q, corner_rates, self.rack[1:])
 
 
 def vehicle(tape: Tape) -> tuple[Vehicle, list[sp.Symbol]]:
@@ -75,11 +76,12 @@ def vehicle(tape: Tape) -> tuple[Vehicle, list[sp.Symbol]]:
         acceleration=g.named(tape, attitude.road_normal * p["gravity"]),
     )
     points = _design_points(tape, p)
-    linkages = tuple(
-        links.assembled(tape, [q[j] for j in CORNER[k]], rack[0], points[k], SIDES[k])
-        for k in range(2)
-    )
-    return Vehicle(attitude, frame, points, linkages, q, rates, rack, p), list(p.values())
+    linkages = []
+    for k in range(2):
+        angles = [q[j] for j in CORNER[k]]
+        linkages.append(links.assembled(tape, angles, rack[0], points[k], SIDES[k]))
+    vehicle = Vehicle(attitude, frame, points, tuple(linkages), q, rates, rack, p)
+    return vehicle, list(p.values())
 
 
 def _design_points(tape: Tape, p: Parameters) -> tuple[dict[str, Vector], ...]:
@@ -128,7 +130,7 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
         design = _arm_tensor(tape, v, k, part, name)
         tensor = m.turned_tensor(tape, design, part.axis(tape), part.angle)
         centre = frame.point(tape, centre_now, carried(tape, STILL, turn, lever))
-        rotation = m.with_inertia(tape, tensor, frame.turning(tape, turn))
+        rotation = m.with_inertia(tape, tensor, frame.angular_velocity_of(tape, turn))
         return Body(p[f"{name}_arm_mass"], centre, m.ZERO, rotation, tensor)
 
     along_rod, transverse = p["tie_rod_axial_inertia"], p["tie_rod_transverse_inertia"]
@@ -142,7 +144,7 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
             carried(tape, motions.rack_end, motions.rod, half),
         ),
         m.ZERO,
-        m.with_inertia(tape, tensor, frame.turning(tape, motions.rod)),
+        m.with_inertia(tape, tensor, frame.angular_velocity_of(tape, motions.rod)),
         tensor,
     )
     mass, centre, tensor = _with_wheel(tape, v, k, "carrier", diagonal(p, "carrier_inertia"))
@@ -201,18 +203,18 @@ def _wheeled_body(tape: Tape, v: Vehicle, k: int, part: _WheelCarrier) -> tuple[
     """A carrier or arm together with its wheel, and the wheel on the road."""
     frame, axle, spin = v.frame, part.axle, SPINS[k]
     levers = (part.to_centre, part.to_wheel)
-    places = [g.named(tape, part.base + lever) for lever in levers]
+    positions = [g.named(tape, part.base + lever) for lever in levers]
     centre, wheel = (
         frame.point(tape, point, carried(tape, part.motion, part.turn, lever))
-        for point, lever in zip(places, levers, strict=True)
+        for point, lever in zip(positions, levers, strict=True)
     )
-    turning = frame.turning(tape, part.turn)
-    height = tape.let(v.q[2] + tape.let(v.attitude.road_normal @ places[1]))
+    turning = frame.angular_velocity_of(tape, part.turn)
+    height = tape.let(v.q[2] + tape.let(v.attitude.road_normal @ positions[1]))
     on_road = tilted_wheel(
         tape, v.attitude.road_normal, height, axle, wheel.value, turning.value, v.rates[spin], v.p
     )
     force, moment = on_road.force, on_road.moment
-    arm = g.named(tape, places[1] - places[0])
+    arm = g.named(tape, positions[1] - positions[0])
     inertia = v.p[f"{ENDS[k]}_wheel_spin_inertia"]
     rotor = Rotor(spin, v.rates[spin], axle, inertia, tape.let(moment @ axle), turning.bias)
     body = Body(
@@ -257,10 +259,11 @@ def _with_wheel(
         m.point_mass_tensor(mass, g.named(tape, centre - both)),
         m.point_mass_tensor(wheel, g.named(tape, wheel_centre - both)),
     )
-    rows = [
-        g.named(tape, [sp.Add(*[part[i][j] for part in parts]) for j in range(3)]) for i in range(3)
-    ]
-    return total, both, (rows[0], rows[1], rows[2])
+
+    def row(i: int) -> Vector:
+        return g.named(tape, [sp.Add(*[part[i][j] for part in parts]) for j in range(3)])
+
+    return total, both, (row(0), row(1), row(2))
 
 
 def diagonal(p: Parameters, name: str) -> Tensor:
@@ -270,7 +273,7 @@ def diagonal(p: Parameters, name: str) -> Tensor:
 
 
 def _arm_tensor(tape: Tape, v: Vehicle, k: int, arm: links.Arm, name: str) -> Tensor:
-    """Tensor of a control arm at the design position, from that in its own axes."""
+    """Tensor of a control arm at the design position, from that in the arm's axes."""
     axis = arm.axis(tape)
     lever = g.named(tape, v.points[k][f"{name}_ball_joint"] - arm.rear)
     # Upwards on both sides; the second axis then is the third times the first.

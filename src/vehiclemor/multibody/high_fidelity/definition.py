@@ -50,8 +50,8 @@ def check(p: Mapping[str, Any]) -> None:
             raise GeometryError(
                 f"{name} lies {p[name][1]:g} m beside the midplane: both sides are mirror images"
             )
-    for name, place in zip(("front", "rear"), wheels, strict=True):
-        if place[1] <= 0.0:
+    for name, centre in zip(("front", "rear"), wheels, strict=True):
+        if centre[1] <= 0.0:
             raise GeometryError(f"the left {name} wheel lies on the right side of the vehicle")
     if p["smallest_friction"] > p["largest_friction"]:
         raise GeometryError("smallest_friction is above largest_friction: friction falls with slip")
@@ -97,7 +97,7 @@ def wheel_places(p: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _mass_and_centre(p: Mapping[str, Any]) -> tuple[float, float]:
-    """Mass of the vehicle in kg and place of its centre of mass along the chassis in m."""
+    """Mass of the vehicle in kg and x of its centre of mass in the chassis in m."""
     front = p["front_frame_origin"][0] - p["chassis_centre"][0]
     rear = p["rear_wheel_centre"][0] - p["chassis_centre"][0]
     tie_rod = (p["tie_rod_inner"][0] + p["tie_rod_outer"][0]) / 2.0
@@ -112,7 +112,7 @@ def _mass_and_centre(p: Mapping[str, Any]) -> tuple[float, float]:
         (2 * p["rear_wheel_mass"], rear),
     ]
     mass = sum(part for part, _ in parts)
-    return mass, sum(part * place for part, place in parts) / mass
+    return mass, sum(part * x for part, x in parts) / mass
 
 
 def design_state(p: Mapping[str, Any], height: float, pitch: float) -> np.ndarray:
@@ -171,7 +171,7 @@ def solve_equilibrium(p: Mapping[str, Any], derivative: Derivative) -> dict[str,
     return dict(zip(names, map(float, unknown), strict=True))
 
 
-# Parameters, and what `solve_equilibrium` has found.
+# Parameters, and those that `solve_equilibrium` solves for.
 def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Initial states (52,) by name: straight running, and the same dropped onto the road."""
     equilibrium = design_state(p, p["height"], p["pitch"])

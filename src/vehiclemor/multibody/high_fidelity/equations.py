@@ -48,21 +48,19 @@ def derive() -> Program:
     closed = _corners(tape, vehicle, bound)
     solved = eliminate_symmetric(tape, *_kane(tape, vehicle, closed), ORDER)
     accelerations = _chassis_accelerations(tape, vehicle, solved)
-    accelerations += [
-        tape.let(rate.bias + sp.Add(*[factor * solved[j] for j, factor in rate.columns.items()]))
-        for rate in bound[6:]
-    ]
+    for rate in bound[6:]:
+        change = sp.Add(*[factor * solved[j] for j, factor in rate.columns.items()])
+        accelerations.append(tape.let(rate.bias + change))
 
     mass, force = _kane(tape, vehicle, _corners(tape, vehicle, free))
     open_form = body.in_coordinates(
         tape, vehicle.attitude, speeds, mass, force, velocity_bias=mechanics.ZERO
     )
-    rows = [open_form[j * (n + 1) : (j + 1) * (n + 1)] for j in range(n)]
-    second_order = [
-        e
-        for row in rows
-        for e in [*row[:n], tape.let(sp.Add(*[row[k] * accelerations[k] for k in range(n)]))]
-    ]
+    second_order = []
+    for j in range(n):
+        mass_row = open_form[j * (n + 1) : (j + 1) * (n + 1) - 1]
+        products = [m * a for m, a in zip(mass_row, accelerations, strict=True)]
+        second_order += [*mass_row, tape.let(sp.Add(*products))]
     descriptor = [*open_form]
     for row, right in zip(_rows(motions, range(n)), gamma, strict=True):
         descriptor += [*row, right]
@@ -119,8 +117,8 @@ def _bound_rates(
         follow, bias = eliminate(
             tape, _rows(pair, dependent), [driving, gamma[6 * k : 6 * k + 6]], PIVOTS
         )
-        for place, j in enumerate(dependent):
-            bound[j] = Rate(free[j].value, {lower: follow[place]}, bias[place])
+        for row, j in enumerate(dependent):
+            bound[j] = Rate(free[j].value, {lower: follow[row]}, bias[row])
     return bound
 
 

@@ -99,7 +99,7 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> Corner:
     end, side = (0, "front") if front else (1, "rear")
     travel, rate, spin = v.q[6 + wheel], v.nu[6 + wheel], v.nu[10 + wheel]
     track = p[f"{side}_track"]
-    place = g.vector(
+    hub = g.vector(
         (
             d.sprung_distance[0] if front else -d.sprung_distance[1],
             tape.let(track / 2 if wheel % 2 == 0 else -track / 2),
@@ -109,12 +109,12 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> Corner:
     steer = (tape.let(sp.sin(v.delta)), tape.let(sp.cos(v.delta)))
     axle = g.vector((-steer[0], steer[1], 0) if front else (0, 1, 0))
     upwards = mechanics.along(mechanics.free_rate(6 + wheel, rate), mechanics.UNIT[2])
-    centre = frame.point(tape, place, upwards)
+    centre = frame.point(tape, hub, upwards)
     about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
     rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
-    on_road = upright_wheel(tape, v.attitude, v.q[2], place, axle, centre.value, rotation.value, p)
+    on_road = upright_wheel(tape, v.attitude, v.q[2], hub, axle, centre.value, rotation.value, p)
     mass = p["unsprung_mass"]
-    whole = g.named(tape, on_road.force + v.weight * mass)
+    applied = g.named(tape, on_road.force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate
-    rigid = mechanics.Body(mass, centre, whole, rotation, about, on_road.moment)
+    rigid = mechanics.Body(mass, centre, applied, rotation, about, on_road.moment)
     return Corner((rigid,), -tape.let(spring), on_road)

@@ -4,8 +4,8 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
+from vehiclemor.array_shapes import check_shapes, require
 from vehiclemor.codegen.loop_types import Float, Int, IntMatrix, IntVector, Matrix, Vector, vector
-from vehiclemor.sizes import require, shaped
 
 # Beyond this magnitude of a standardised coordinate a run has diverged.
 LARGEST = 1e3
@@ -38,11 +38,11 @@ class Equations(NamedTuple):
         terms, layers, kernels = self.terms, self.widths.tolist(), len(self.centres)
         require(terms.ndim == 2 and terms.shape[1] > 0, "terms")
         require(bool(((terms >= 0) & (terms <= arguments)).all()), "terms")
-        shaped("coefficients", (self.coefficients, len(terms), m))
-        shaped("kernels", (self.centres, kernels, arguments), (self.heights, kernels, m))
+        check_shapes("coefficients", (self.coefficients, len(terms), m))
+        check_shapes("kernels", (self.centres, kernels, arguments), (self.heights, kernels, m))
         if layers:
             require(min(layers) > 0 and (layers[0], layers[-1]) == (arguments, m), "widths")
-            shaped("weights", (self.weights, sum((a + 1) * b for a, b in pairwise(layers))))
+            check_shapes("weights", (self.weights, sum((a + 1) * b for a, b in pairwise(layers))))
 
 
 def evaluate(equations: Equations, v: Vector, buffer: Vector, result: Vector) -> None:
@@ -126,21 +126,21 @@ def march(
     step: Float,  # In s.
     # Whether results are changes of the coordinates in a step (heading and place follow by the
     # trapezoidal rule); else they are rates, for the classical Runge-Kutta method.
-    mapped: Int,
+    discrete_time: Int,
     inputs: Matrix,  # Of all half steps (2 steps + 1, inputs).
     path: Matrix,  # Coordinates, and heading and place if the equations have them (steps + 1, m).
     buffer: Vector,
 ) -> Int:
     """A run from the first row of the path; the number of rows that it has reached."""
     size, k = path.shape[1], coordinates
-    width = 1 + k + (1 + mapped) * inputs.shape[1]
+    width = 1 + k + (1 + discrete_time) * inputs.shape[1]
     stages = vector(buffer, 0, 4 * size)
     state, v = vector(buffer, 4 * size, size), vector(buffer, 5 * size, width)
     work = vector(buffer, 5 * size + width, buffer.shape[0] - 5 * size - width)
     v[0] = 1.0
     for row in range(path.shape[0]):
         last = row == path.shape[0] - 1
-        if mapped:
+        if discrete_time:
             for i in range(inputs.shape[1]):
                 v[1 + k + i] = inputs[2 * row, i]
                 v[1 + k + inputs.shape[1] + i] = inputs[2 * row + (0 if last else 2), i]

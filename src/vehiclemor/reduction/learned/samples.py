@@ -1,6 +1,6 @@
 """Samples of training runs, as general learners take them: states, rates, inputs, what follows.
 
-Of a vehicle the states are its shape, and heading and place follow by quadratures (see
+Of a vehicle the states are its shape, and heading and position follow by quadratures (see
 `vehicle.shape`); of a structure coordinates and rates about the static state; of a mechanism there
 are none, since its coordinates follow from the inputs.  States are taken relative to the model's
 first start, and turned into their principal components, each standardised.
@@ -9,6 +9,7 @@ first start, and turned into their principal components, each standardised.
 import time
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -18,33 +19,33 @@ from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
 from vehiclemor.simulation.model import Model
 
-# Samples that a fit sees at most, evenly taken.
+# Most samples of a fit, equidistant.
 MOST_SAMPLES = 30_000
 # Components below this part of the first one are rounding, and a first one below it, in SI units.
 ROUNDING = 1e-9
 # Rates of states in SI units below which the start is at rest.
 STILL = 1e-6
-# Fewer samples tell nothing.
+# Fewer samples are refused.
 FEWEST = 10
 
 
 def online_inputs(model: Model, inputs: np.ndarray) -> np.ndarray:
     """Inputs (samples, inputs), and behind them the parameters that change from run to run."""
     values = model.parameters.values()
-    given = [float(np.asarray(values[name])) for name in model.definition.online]
-    return np.hstack([inputs, np.tile(given, (len(inputs), 1))]) if given else inputs
+    online = [float(np.asarray(values[name])) for name in model.definition.online]
+    return np.hstack([inputs, np.tile(online, (len(inputs), 1))]) if online else inputs
 
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """States of a model as a learner sees them."""
+    """States of a model as deviations from its first start."""
 
-    model: Any  # The full one.
+    model: Any  # The full model.
     shape: VehicleShape | None  # Of a vehicle.
 
     @classmethod
     def of_model(cls, model: Any) -> "States":
-        """Those of a model of any kind."""
+        """The states of a model of any kind."""
         steered = model.kind in ("ode", "dae") and not no_steered_vehicle(model)
         return cls(model, VehicleShape(model) if steered else None)
 
@@ -53,7 +54,7 @@ class States:
 
     @property
     def planar(self) -> int:
-        """Number of quadratures: heading and place of a vehicle."""
+        """Number of quadratures: heading and position of a vehicle."""
         return 3 if self.shape else 0
 
     def of(self, states: np.ndarray) -> np.ndarray:
@@ -63,13 +64,13 @@ class States:
         return states - self.model.start()
 
     def back(self, deviations: np.ndarray, planar: np.ndarray) -> np.ndarray:
-        """Full states of deviations, and of heading and place (samples, 3) of a vehicle."""
+        """Full states of deviations, and of heading and position (samples, 3) of a vehicle."""
         if self.shape:
             return self.shape.states(deviations + self.shape.reference, planar[:, [1, 2, 0]])
         return deviations + self.model.start()
 
-    def begun(self, state: np.ndarray) -> np.ndarray:
-        """Heading and place of a state, none if the model has none."""
+    def planar_of(self, state: np.ndarray) -> np.ndarray:
+        """Heading and position of a state, nothing if the model has neither."""
         if not self.shape:
             return np.zeros(0)
         x, y, heading = self.model.planar
@@ -78,9 +79,9 @@ class States:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of training runs, evenly taken, each with the one that follows it."""
+    """Equidistant samples of training runs, each with the one that follows it."""
 
-    states: States  # What the columns of `deviations` are.
+    states: States  # Meaning of the columns of `deviations`.
     spacing: float  # Time in s to the sample that follows.
     # (samples, inputs).
     inputs: np.ndarray
@@ -134,8 +135,8 @@ def _gathered(model: Any, runs: tuple[Any, ...], steps: int, skipped: float) -> 
     count = sum((maneuver.samples - 1) * steps for maneuver in maneuvers)
     if count < FEWEST:
         raise InputError(f"learned models need at least {FEWEST} samples of training, not {count}")
-    taken = steps, -(-count // MOST_SAMPLES), skipped
-    parts = [_of_run(states, run, *taken) for run in training]
+    every = ceil(count / MOST_SAMPLES)
+    parts = [_of_run(states, run, steps, every, skipped) for run in training]
     *histories, evaluations = zip(*parts, strict=True)
     arrays = [np.concatenate(history) for history in histories]
     seconds = time.process_time() - began
@@ -147,36 +148,43 @@ def _of_run(
 ) -> tuple[Any, ...]:
     """Histories of every so many samples of a run, as in `Samples`; evaluations of its equations.
 
-    What follows is found in the same run; the last sample has none.
+    Each sample is followed by another one of the same run, so that the last one is left out.
     """
     model: Any = run.model
     maneuver = run.maneuver.subdivided(steps)
     last = maneuver.samples - 1
     first = int(min(skipped / maneuver.duration, 0.5) * last)
-    taken = np.arange(first, last, every)
+    rows = np.arange(first, last, every)
     if model.kind == "structural":
-        found = model.run(maneuver, recorded=True)
+        full = model.run(maneuver, recorded=True)
         # Runs record coordinates alone.
-        speeds = np.gradient(found.coordinates, found.times, axis=0, edge_order=2)
-        deviations, inputs = np.hstack([found.coordinates, speeds]), found.inputs
-        rates = np.gradient(deviations, found.times, axis=0, edge_order=2)[taken]
-        motion, outputs = rates[:, :0], found.outputs[taken]
+        speeds = np.gradient(full.coordinates, full.times, axis=0, edge_order=2)
+        deviations = np.hstack([full.coordinates, speeds])
+        rates = np.gradient(deviations, full.times, axis=0, edge_order=2)[rows]
+        motion, outputs = rates[:, :0], full.outputs[rows]
     else:
-        found = replace(run, maneuver=maneuver).recorded()
-        now, inputs = found.states[taken], found.inputs
-        motion = outputs = now[:, :0]
+        full = replace(run, maneuver=maneuver).recorded()
+        motion = outputs = full.states[rows, :0]
         if model.kind == "ae":
-            deviations, rates = found.coordinates, np.zeros_like(now)
+            deviations, rates = full.coordinates, np.zeros_like(full.states[rows])
         elif states.shape:
-            shape, deviations = states.shape, states.of(found.states)
-            rates, motion = shape.motion(deviations[taken] + shape.reference, inputs[taken])
+            shape, deviations = states.shape, states.of(full.states)
+            rates, motion = shape.motion(deviations[rows] + shape.reference, full.inputs[rows])
             motion = motion - [0.0, shape.speed, 0.0]
         else:
-            deviations = states.of(found.states)
-            rates = model.rhs_at(now, inputs[taken])
-    u, evaluations = online_inputs(model, inputs), found.counts[model.evaluations] + len(taken)
-    pair = deviations[taken], deviations[taken + 1]
-    return u[taken], u[taken + 1], *pair, rates, motion, outputs, evaluations
+            deviations = states.of(full.states)
+            rates = model.rhs_at(full.states[rows], full.inputs[rows])
+    inputs = online_inputs(model, full.inputs)
+    return (
+        inputs[rows],
+        inputs[rows + 1],
+        deviations[rows],
+        deviations[rows + 1],
+        rates,
+        motion,
+        outputs,
+        full.counts[model.evaluations] + len(rows),
+    )
 
 
 def components(samples: Samples, rank: int) -> tuple[np.ndarray, np.ndarray]:

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.reduction.learned.learned_method import learned_method
 from vehiclemor.reduction.learned.learned_model import (
     LearnedModel,
     LearnedSettings,
-    Learning,
+    TrainingData,
     columns,
     monomials,
     polynomials,
 )
-from vehiclemor.reduction.learned.learner import learner
 
 
 class DynamicModeSettings(LearnedSettings):
@@ -28,14 +28,14 @@ class DynamicModeSettings(LearnedSettings):
     ridge: float = Field(1e-8, ge=0.0, description="weight of the matrices' size in the fit")
 
 
-def linear_step(learning: Learning, settings: DynamicModeSettings) -> LearnedModel:
+def linear_step(data: TrainingData, settings: DynamicModeSettings) -> LearnedModel:
     """One linear step of all observables by scikit-learn."""
     from sklearn.linear_model import Ridge
 
-    s, r = learning.samples, len(learning.forward)
+    s, r = data.samples, len(data.forward)
     observables = monomials(r, settings.degree, s.constant)
-    values, following = (columns(observables, z) for z in learning.coordinates)
-    arguments = np.hstack([values, learning.inputs])
+    values, following = (columns(observables, z) for z in data.coordinates)
+    arguments = np.hstack([values, data.inputs])
     results = np.hstack([following - values, s.motion])
     # Monomials are rare where they are large: each counts alike.
     scale = np.sqrt((arguments**2).mean(axis=0))
@@ -44,10 +44,10 @@ def linear_step(learning: Learning, settings: DynamicModeSettings) -> LearnedMod
     linear.fit(arguments / scale, results)
     terms = monomials(len(scale), 1, constant=False)
     equations = polynomials(terms, (linear.coef_ / scale).T, len(scale))
-    return learning.model(equations, observables)
+    return data.model(equations, observables)
 
 
-METHOD = learner(
+METHOD = learned_method(
     "dynamic_mode_decomposition",
     "one linear step of components and their monomials (DMDc, EDMDc), by scikit-learn",
     "10.1016/j.automatica.2018.03.046",

@@ -40,6 +40,7 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 class AlgebraicSettings(Settings):
     """How algebraic equations are solved."""
 
+    integration = ("solver", "tolerance")
     solver: Literal["newton", "newton_lanes"] = Field(
         "newton",
         description="newton: fresh Jacobians; newton_lanes: with predictor, eight samples at once",
@@ -61,6 +62,7 @@ class DynamicSettings(OnlineSettings):
 class FullStructureSettings(StructuralSettings):
     """How structures are integrated."""
 
+    integration = ("solver", "tolerance")
     solver: Literal["generalised_alpha"] = Field(
         SOLVER, description="of order 2, one step size a run, damped at infinity"
     )
@@ -114,7 +116,7 @@ class FullOrder:
                 raise
             return error.trajectory
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray:
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """The states themselves: the full space holds them."""
         return states
 
@@ -163,14 +165,17 @@ class FullOrderStructure(StructuralRuns, FullOrder):
     @property
     def order(self) -> int:
         """Number of coordinates."""
-        return self.solved[0].size
+        return self.remade.size
 
     @cached_property
+    def remade(self) -> Any:
+        """The model with the parameters that differ."""
+        return reparametrised(self.model, self.parameters) if self.parameters else self.model
+
+    @property
     def solved(self) -> tuple[StructuralModel, None]:
-        """The model with the parameters that differ, in its own coordinates."""
-        if not self.parameters:
-            return self.model, None
-        return reparametrised(self.model, self.parameters), None
+        """The model with these parameters, in its coordinates."""
+        return self.remade, None
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """The states themselves; another mesh has others."""

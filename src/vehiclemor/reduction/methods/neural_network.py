@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
-from vehiclemor.reduction.learned.learner import EVERY, learner
+from vehiclemor.reduction.learned.learned_method import EVERY, learned_method
+from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, TrainingData
 
 # By which weights begin.
 SEED = 0
@@ -26,13 +26,13 @@ class NeuralNetworkSettings(LearnedSettings):
     epochs: int = Field(60, ge=1, le=2000, description="passes over the samples, at most")
 
 
-def with_network(learning: Learning, settings: NeuralNetworkSettings) -> LearnedModel:
+def with_network(data: TrainingData, settings: NeuralNetworkSettings) -> LearnedModel:
     """A linear step, and the network of scikit-learn on what it leaves."""
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.neural_network import MLPRegressor
 
-    (arguments, _), (equations, left) = learning.regression, learning.linear
-    scale = learning.residual_scale
+    (arguments, _), (equations, left) = data.regression, data.linear
+    scale = data.residual_scale
     network: Any = MLPRegressor(
         hidden_layer_sizes=(settings.width,) * settings.layers,
         activation="tanh",
@@ -48,10 +48,10 @@ def with_network(learning: Learning, settings: NeuralNetworkSettings) -> Learned
     weights[-1], offsets[-1] = weights[-1] * scale, offsets[-1] * scale
     flat = [part.ravel() for pair in zip(weights, offsets, strict=True) for part in pair]
     widths = np.array([len(weights[0]), *map(len, offsets)], dtype=np.int64)
-    return learning.model(equations._replace(widths=widths, weights=np.concatenate(flat)))
+    return data.model(equations._replace(widths=widths, weights=np.concatenate(flat)))
 
 
-METHOD = learner(
+METHOD = learned_method(
     "neural_network",
     "one linear step and a multilayer perceptron on what it leaves, by scikit-learn",
     "10.1109/72.80202",

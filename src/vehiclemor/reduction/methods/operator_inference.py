@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
-from vehiclemor.reduction.learned.learner import learner
+from vehiclemor.reduction.learned.learned_method import learned_method
+from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, TrainingData
 
 FORMS = {"linear": "AB", "bilinear": "ABN", "quadratic": "AHBN"}
 
@@ -24,12 +24,12 @@ class OperatorInferenceSettings(LearnedSettings):
     ridge: float = Field(1e-6, ge=0.0, description="weight of the operators' size in the fit")
 
 
-def operators(learning: Learning, settings: OperatorInferenceSettings) -> LearnedModel:
+def operators(data: TrainingData, settings: OperatorInferenceSettings) -> LearnedModel:
     """Operators of the rates by opinf."""
     import opinf
 
-    (arguments, results), r = learning.regression, len(learning.forward)
-    form = "c" * learning.samples.constant + FORMS[settings.form]
+    (arguments, results), r = data.regression, len(data.forward)
+    form = "c" * data.samples.constant + FORMS[settings.form]
     solver = opinf.lstsq.L2Solver(settings.ridge)
     library: Any = opinf.models.ContinuousModel(form, solver=solver)
     z, inputs = arguments[:, :r].T, arguments[:, r:].T
@@ -43,15 +43,15 @@ def operators(learning: Learning, settings: OperatorInferenceSettings) -> Learne
     }
     entries = [np.reshape(operator.entries, (r, -1)).T for operator in library.operators]
     listed = [term for name in form for term in terms[name]]
-    return learning.model(learning.with_motion(listed, np.vstack(entries)))
+    return data.model(data.with_motion(listed, np.vstack(entries)))
 
 
-METHOD = learner(
+METHOD = learned_method(
     "operator_inference",
     "linear or quadratic rates of principal components, fitted by opinf",
     "10.1016/j.cma.2016.03.025",
     operators,
     OperatorInferenceSettings,
     "opinf",
-    mapped=False,
+    discrete_time=False,
 )

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from pydantic import Field
 
-from vehiclemor.codegen.derivatives import Sensitivity, sensitivity
+from vehiclemor.array_shapes import check_distinct_indices, check_indices, check_shapes, require
+from vehiclemor.codegen.derivatives import JacobianProduct, jacobian_product
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
 from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value
@@ -38,7 +39,6 @@ from vehiclemor.simulation.newton_loops import Samples
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Pool
-from vehiclemor.sizes import apart, require, shaped, within
 
 # Above this degree, powers lose digits to rounding.
 HIGHEST_DEGREE = 20
@@ -108,14 +108,14 @@ class PathMapModel(ReducedMechanism):
         """Raise `ValueError` if the loop would read beyond inputs, cells or columns."""
         inputs, cells = len(self.model.inputs), self.cells
         require(len(cells.numbers) == inputs, "cells")
-        shaped("ranges", (self.ranges, inputs, 2))
+        check_shapes("ranges", (self.ranges, inputs, 2))
         require(bool(np.isfinite(self.ranges).all()), "ranges")
-        apart("moving", self.moving, inputs)
+        check_distinct_indices("moving", self.moving, inputs)
         require(0 <= self.degree <= HIGHEST_DEGREE, "degree")
         require(
             len(self.columns) == len(self.model.coordinates) + len(self.model.outputs), "columns"
         )
-        within("columns", self.columns, len(self.columns))
+        check_indices("columns", self.columns, len(self.columns))
         terms = math.comb(len(self.moving) + self.degree, self.degree)
         width = padded(max(self.columns) + 1)
         require(cells.coefficients.shape[1:] == (terms, width), "coefficients")
@@ -154,9 +154,9 @@ class PathMapModel(ReducedMechanism):
         return self._evaluated(np.array([time]), inputs, ready(Samples(inputs)))
 
     @cached_property
-    def _sensitivity(self) -> Sensitivity:
+    def _jacobian(self) -> JacobianProduct:
         kernel = self._kernel
-        return sensitivity(kernel, kernel.arguments[0], len(self.columns), len(self.ranges))
+        return jacobian_product(kernel, kernel.arguments[0], len(self.columns), len(self.ranges))
 
     def slopes(self, state: np.ndarray, inputs: np.ndarray, by: By, of: str) -> np.ndarray:
         """Derivatives of coordinates, or of the model's outputs there, by the inputs."""
@@ -167,7 +167,7 @@ class PathMapModel(ReducedMechanism):
         indices = np.clip(within, 0.0, cells.tops).astype(int)
         cell = np.ravel_multi_index(tuple(indices), tuple(cells.numbers))
         arrays = 2.0 * (within - indices) - 1.0, cells.coefficients[cell].ravel()
-        table = self._sensitivity.jacobian(arrays) * (2.0 * cells.halves * cells.scales)
+        table = self._jacobian.jacobian(arrays) * (2.0 * cells.halves * cells.scales)
         moved = table[: len(self.model.coordinates)]
         if of == "coordinates":
             return moved

@@ -10,6 +10,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from vehiclemor.array_shapes import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
@@ -18,7 +19,6 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.sizes import require
 
 
 @dataclass(frozen=True)

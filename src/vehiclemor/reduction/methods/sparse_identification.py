@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
-from vehiclemor.reduction.learned.learner import learner
+from vehiclemor.reduction.learned.learned_method import learned_method
+from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, TrainingData
 
 
 class SparseIdentificationSettings(LearnedSettings):
@@ -21,12 +21,12 @@ class SparseIdentificationSettings(LearnedSettings):
     ridge: float = Field(1e-6, ge=0.0, description="weight of the coefficients' size in the fit")
 
 
-def sparse_terms(learning: Learning, settings: SparseIdentificationSettings) -> LearnedModel:
+def sparse_terms(data: TrainingData, settings: SparseIdentificationSettings) -> LearnedModel:
     """Terms of the rates by PySINDy."""
     import pysindy
 
-    arguments, results = learning.regression
-    r, samples = len(learning.forward), learning.samples
+    arguments, results = data.regression
+    r, samples = len(data.forward), data.samples
     library: Any = pysindy.SINDy(
         optimizer=pysindy.STLSQ(threshold=settings.threshold, alpha=settings.ridge),
         feature_library=pysindy.PolynomialLibrary(settings.degree, include_bias=samples.constant),
@@ -35,15 +35,15 @@ def sparse_terms(learning: Learning, settings: SparseIdentificationSettings) -> 
     library.fit(z, t=samples.spacing, x_dot=results[:, :r], u=inputs)
     powers = np.asarray(library.feature_library.powers_)
     terms = [tuple(np.repeat(np.arange(1, len(row) + 1), row).tolist()) for row in powers]
-    return learning.model(learning.with_motion(terms, library.coefficients().T))
+    return data.model(data.with_motion(terms, library.coefficients().T))
 
 
-METHOD = learner(
+METHOD = learned_method(
     "sparse_identification",
     "sparse polynomial rates of principal components (SINDYc), fitted by PySINDy",
     "10.1016/j.ifacol.2016.10.249",
     sparse_terms,
     SparseIdentificationSettings,
     "pysindy",
-    mapped=False,
+    discrete_time=False,
 )

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.array_shapes import check_shapes, require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows
@@ -31,7 +32,6 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.newton_loops import SAMPLE, Iteration, Solution
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.sizes import require, shaped
 
 ITERATION_LIMIT = 50
 
@@ -60,6 +60,7 @@ class AlgebraicPodSettings(Settings):
     reversed_coordinates: str = Field(
         "", description="galerkin: coordinates counted the other way round, separated by commas"
     )
+    integration = ("tolerance",)
     tolerance: StepTolerance = 1e-12
     rounding_seed: int = Field(
         0, ge=0, description="seed of a relative noise of 2^-52 on the snapshots; 0: none"
@@ -84,7 +85,7 @@ class AlgebraicProjection(ReducedMechanism):
     def check_sizes(self) -> None:
         """Raise `ValueError` if there is no basis of the model's coordinates for each window."""
         n, windows = len(self.model.coordinates), len(self.bases)
-        shaped("edges", (self.edges, windows + 1))
+        check_shapes("edges", (self.edges, windows + 1))
         require(all(len(basis.mean) == n for basis in self.bases), "bases")
 
     @property

@@ -70,7 +70,9 @@ def balanced_structure(
     ports, dampers = structure.ports.toarray(), structure.dampers.toarray()
     stiffness, rates = port_rates(model)
     damping = structure.damping_time * elastic + dampers @ dampers.T + (ports * rates) @ ports.T
-    faded_stiffness = structure.held(stiffness).toarray() + fading * damping + fading**2 * mass
+    faded_stiffness = (
+        structure.with_port_springs(stiffness).toarray() + fading * damping + fading**2 * mass
+    )
     faded_damping = damping + 2.0 * fading * mass
     full = SecondOrderModel.from_matrices(mass, faded_damping, faded_stiffness, ports, ports.T)
     with log_levels({"pymor": "ERROR"}):

@@ -11,10 +11,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.array_shapes import check_shapes, require
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.sizes import require, shaped
 
 MOST_SNAPSHOTS = 100_000
 Rank = Annotated[
@@ -52,7 +52,7 @@ class Basis(ShortRepr):
     def check_sizes(self) -> None:
         """Raise `ValueError` if the columns are not as long as the mean, or are more."""
         n = len(self.mean)
-        shaped("basis", (self.mean, n), (self.vectors, n, self.rank))
+        check_shapes("basis", (self.mean, n), (self.vectors, n, self.rank))
         require(self.rank <= n, "rank")
 
     @property

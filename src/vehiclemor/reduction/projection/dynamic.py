@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.array_shapes import require
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
@@ -35,7 +36,6 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
 from vehiclemor.simulation.workspaces import Solver
-from vehiclemor.sizes import require
 
 # A state whose range is below this share of the largest one is noise, not motion.
 SMALLEST_RANGE = 1e-6
@@ -49,6 +49,7 @@ class DynamicPodSettings(Settings):
     the projected equations keep the model's energy.
     """
 
+    integration = ("solver", "tolerance")
     solver: ProjectedSolver = "dopri5"
     tolerance: Tolerance = 1e-6
     rank: Rank = 3
@@ -147,7 +148,7 @@ class DynamicProjection(ReducedSystem):
                 spaces = replace(spaces, means=np.tile(state, (len(spaces.means), 1)))
             how = Solver(self.solver, self.tolerance, times[first:end], begin=left)
             run = self.system.run(maneuver, state, spaces, how)
-            states[first:end], failure = run.whole, run.failure
+            states[first:end], failure = run.recorded_states, run.failure
             counts, seconds, first = counts + run.counts, seconds + run.seconds, end
         found = model.trajectory(times, maneuver.at(times), states, counts, seconds, failure)
         return found if outputs is None else found.chosen(outputs)

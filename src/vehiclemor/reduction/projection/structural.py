@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import Field, field_validator
 
+from vehiclemor.array_shapes import require
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import Structure
@@ -35,7 +36,6 @@ from vehiclemor.simulation.structures.model import (
 )
 from vehiclemor.simulation.structures.system import StructuralSystem, factored
 from vehiclemor.simulation.trajectory import Start, Trajectory
-from vehiclemor.sizes import require
 
 # Modes that are looked for at first.
 FIRST_MODES = 16
@@ -47,6 +47,7 @@ RESULTS = {"rhs": "rhs", "outputs": "outputs"}
 class StructuralSettings(Settings):
     """What all reductions of structures share."""
 
+    integration = ("tolerance",)
     tolerance: float = Field(
         USUAL,
         gt=0.0,
@@ -218,7 +219,7 @@ class SteppedStructure(ReducedStructure):
         moved = np.array([state[:r], state[r:], self.rates(state, inputs)[r:]])
         # Rounded, so that a loop whose times are rounded factors once.
         h = float(f"{dt / count:.12g}")
-        reason = self._first.march(moved, path, h, count, radius=1.0)[3]
+        reason = self._first.integrate(moved, path, h, count, radius=1.0)[3]
         if reason:
             raise ConvergenceError(f"{self.model.name}: {REASONS[reason]}, from t = {time:g} s on")
         return np.concatenate(moved[:2])
@@ -312,7 +313,7 @@ def free_modes(model: StructuralModel, highest: float) -> np.ndarray:
     """
     structure: Any = model.system.structure
     stiffness, _ = port_rates(model)
-    held = structure.held(stiffness)
+    held = structure.with_port_springs(stiffness)
     # Shifted, so that motion that hardly anything holds does no harm.
     shift = 1.0
     solve = factored(held + shift * structure.mass, "MMD_AT_PLUS_A").solve

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vehiclemor.array_shapes import check_shapes, require
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.operations import Kernel
@@ -33,7 +34,6 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.evaluation import INPUTS, PATH_LOOPS, STATE, address_of, partial
 from vehiclemor.simulation.trajectory import Trust
 from vehiclemor.simulation.workspaces import Run
-from vehiclemor.sizes import require, shaped
 
 # Part of a transient below which it needs no samples of its own.
 NEGLIGIBLE = 1e-4
@@ -113,10 +113,10 @@ class TrainingReach:
     def check_sizes(self) -> None:
         """Raise `ValueError` if the amplitudes or the starts don't fit one another."""
         modes, n, starts = len(self.decaying), len(self.left), len(self.begun)
-        shaped("lasted", (self.lasted, len(self.lasted), LEVELS))
-        shaped("steered", (self.decaying, modes), (self.steered, modes))
-        shaped("starts", (self.left, n), (self.starts, starts, n), (self.begun, starts))
-        shaped("reach", (self.inputs, 3, *self.inputs.shape[1:2]))
+        check_shapes("lasted", (self.lasted, len(self.lasted), LEVELS))
+        check_shapes("steered", (self.decaying, modes), (self.steered, modes))
+        check_shapes("starts", (self.left, n), (self.starts, starts, n), (self.begun, starts))
+        check_shapes("reach", (self.inputs, 3, *self.inputs.shape[1:2]))
 
     def driven(self, maneuver: Excitation) -> tuple[float, float]:
         """How far a maneuver's inputs go, 1 at the edge, and when (s) they pass it."""
@@ -269,11 +269,11 @@ class Decoding(ShortRepr):
 
         Of `start` see `decoding_loops.Known`.
         """
-        held = run.kept.get("decoded")
+        held = run.cached_loops.get("decoded")
         if held is None or held.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
-            held = self.space((times, run.whole, inputs), excited.copy(), run.rows)
-            run.kept["decoded"] = held
+            held = self.space((times, run.recorded_states, inputs), excited.copy(), run.rows)
+            run.cached_loops["decoded"] = held
         held.excited[:] = excited
         held.start[:] = start
         return self._lifted(held, run.rows)

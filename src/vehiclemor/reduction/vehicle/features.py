@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vehiclemor.array_shapes import check_distinct_indices, require
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.operations import (
     COMPARISONS,
@@ -33,7 +34,6 @@ from vehiclemor.codegen.operations import (
 from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.simulation.evaluation import at_samples
 from vehiclemor.simulation.system import System
-from vehiclemor.sizes import apart, require
 
 # After the reduced coordinates z come heading and place.
 PLANAR = 3
@@ -96,8 +96,8 @@ def needed_parameters(features: Features) -> int:
     total = len(operations) + CALL * calls
     require(len(features.groups) <= columns, "groups")
     for terms, targets in features.blocks:
-        apart("groups", terms, len(features.terms))
-        apart("groups", targets, columns)
+        check_distinct_indices("groups", terms, len(features.terms))
+        check_distinct_indices("groups", targets, columns)
         require(bool(terms and targets), "groups")
         total += len(terms) * padded(len(targets))
     require(total <= MOST_SIZE, "features")

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vehiclemor.array_shapes import check_shapes, require
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost
@@ -32,7 +33,6 @@ from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
-from vehiclemor.sizes import require, shaped
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
@@ -88,13 +88,13 @@ class ReducedVehicle(ReducedSystem):
         own, decoded, reach = self.features, self.decoded_features or self.features, self.reach
         k, n, inputs = own.states, len(self.shape.kept), len(self.model.inputs)
         require((own.inputs, decoded.inputs, decoded.states) == (inputs, inputs, k), "features")
-        shaped("parameters", (self.parameters, len(self.parameters)))
+        check_shapes("parameters", (self.parameters, len(self.parameters)))
         needed = max(needed_parameters(own), needed_parameters(decoded))
         require(len(self.parameters) >= needed, "parameters")
-        shaped("coefficients", (self.coefficients, len(own.terms), k + PLANAR))
-        shaped("decoding", (self.decoding, len(decoded.terms), n))
-        shaped("encoding", (self.encoding, k, n), (self.feedthrough, k, inputs))
-        shaped("error_scale", (self.error_scale, k + PLANAR))
+        check_shapes("coefficients", (self.coefficients, len(own.terms), k + PLANAR))
+        check_shapes("decoding", (self.decoding, len(decoded.terms), n))
+        check_shapes("encoding", (self.encoding, k, n), (self.feedthrough, k, inputs))
+        check_shapes("error_scale", (self.error_scale, k + PLANAR))
         modes = len(self.transient.rates)
         require(not modes or self.transient.left.shape[1:] == (n,), "transient")
         require(modes <= n, "modes")
@@ -191,7 +191,7 @@ class ReducedVehicle(ReducedSystem):
         known = self.known(start, inputs[0])
         run = self.run(maneuver, known.encoded, direct_until=known.until)
         states, trust = self.decoder.of_run(run, inputs, known.excited, (*known.told, *driven))
-        if not len(run.places) or run.places[0, 1] < 0.0:
+        if not len(run.point_of_sample) or run.point_of_sample[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state
         found = self.model.recorded(maneuver, run, inputs, states, trust, outputs)

@@ -2,9 +2,9 @@
 
 from vehiclemor.codegen.loop_types import call_kernel
 from vehiclemor.inputs.polynomial_loops import input_at
-from vehiclemor.simulation.integrators.structures import DERIVATIVE
+from vehiclemor.simulation.loop_arguments import DERIVATIVE
 
-# One place in each integrator calls it for all stages of a step.
+# Each integrator calls it once for all stages of a step.
 INLINED = ("rhs", "reconstruct")
 
 

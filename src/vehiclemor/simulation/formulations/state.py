@@ -5,7 +5,7 @@ The rows of the trial basis are V^T, those of the test basis W.
 
 from vehiclemor.codegen.loop_types import call_kernel
 from vehiclemor.inputs.polynomial_loops import input_at
-from vehiclemor.simulation.integrators.structures import DERIVATIVE
+from vehiclemor.simulation.loop_arguments import DERIVATIVE
 
 INLINED = ("rhs", "reconstruct", "origin", "add_motion")
 

@@ -16,9 +16,9 @@ for that the difference to the quadrature of order 3 through D at the step befor
 end (in the first step of a span, of order 2 through now and its end).  Linear motion has no error
 at the end of a step, however long, but the cubic between has: its defect half-way is added.
 
-Steps are those of a grid; where a break point asks for another step h the functions of the nearest
-one serve, exact for A = J grid[index] / h.  A whole step is one kernel, see
-`step_kernels.exponential_step`.
+Step sizes are those that operators are stored for; where a break point asks for another step h
+those of the nearest one serve, exact for A = J step_sizes[index] / h.  A step is one kernel,
+see `step_kernels.exponential_step`.
 
 Matrix functions: phi_0(z) = exp(z), phi_k(z) = (phi_{k-1}(z) - 1/(k-1)!) / z.  Taylor series at a
 small argument, then doubling (N. Higham, Functions of Matrices, SIAM 2008, section 10.7):
@@ -30,17 +30,27 @@ so that defective matrices, those of stabilised constraints, are no exception.
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.loop_types import call_kernel, matrix, vector
+from vehiclemor.codegen.loop_types import IntVector, Matrix, Vector, call_kernel, matrix, vector
 from vehiclemor.inputs.polynomial_loops import input_at
-from vehiclemor.simulation.formulations.full import rhs
-from vehiclemor.simulation.integrators.shared import index_below, nearest_index
-from vehiclemor.simulation.integrators.structures import RHS_CALLS, STEP_KERNEL, Work
+from vehiclemor.simulation.integrators.contract import rhs
+from vehiclemor.simulation.integrators.shared import POWERS
+from vehiclemor.simulation.loop_arguments import RHS_CALLS, STEP_KERNEL
 
-# Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("accept", "longest_step", "step", "quadrature_weights", "keep_past")
+# Called once in the time loop: bundles of arrays cost more to pass than they take inside.
+INLINED = (
+    *("accept", "longest_step", "step", "quadrature_weights", "keep_past"),
+    *("index_below", "nearest_index"),
+)
+# Vectors and numbers of the kernel's first argument; inputs at two stages follow.
+ARGUMENTS = ("y", "f", "y_past", "f_past")
+NUMBERS = ("h", "stretch", "at_past", "at_half", "at_end", "defect")
+STAGE_INPUTS = 2
+# Scratch space beside the kernel's arguments: a vector and the powers of a cubic; one number.
+ROWS, MEMORY = 1 + POWERS, 1
 # Share of the difference D5 - D4 that is the error, as in RK4(3)T: 1/10 to the weight 1/6.
 ERROR_SHARE = 0.6
 # Norm of the matrix below which the series is used, and its terms: rounding is larger.
@@ -52,38 +62,92 @@ JACOBIAN, HALF_FIRST, HALF_SECOND, FIRST, SECOND, MIDDLE, LAST = range(TABLES)
 AT_ZERO = (0.0, 1.0 / 2.0, 1.0 / 2.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 6.0)
 
 
-def work_space(buffer, first, integers, dim, inputs):
-    """Scratch space from place `first` of the buffer on; what the step needs besides is last."""
-    given = vector(buffer, first, 4 * dim + 6 + 2 * inputs)
-    place = first + len(given)
-    rows = matrix(buffer, place, 4, dim)
-    memory = vector(buffer, place + 4 * dim, 4)
+class Work(NamedTuple):
+    """Scratch space: `contract.WORK`, coefficients of the cubic, and what the step kernel takes.
+
+    Past are state and right-hand side a step before, one behind the other; their step size, 0 if
+    there was none; the kernel's numbers and inputs, parts of its arguments; its result; the number
+    of the last step in the list of step sizes.
+    """
+
+    y: Vector
+    f: Vector
+    new: Vector
+    f_new: Vector
+    error: Vector
+    middle: Vector
+    curve: Matrix
+    past: Vector
+    past_step: Vector
+    numbers: Vector
+    inputs: Vector
+    arguments: Vector
+    result: Vector
+    step_index: IntVector
+
+
+def work_space(buffer, first, integers, dim, inputs, method):
+    """See `contract.work_space`; the kernel works behind its result, so this is last."""
+    numbers_at = len(ARGUMENTS) * dim
+    inputs_at = numbers_at + len(NUMBERS)
+    arguments = vector(buffer, first, inputs_at + STAGE_INPUTS * inputs)
+    rows_at = first + len(arguments)
+    memory_at = rows_at + ROWS * dim
     stride = (dim + 3) // 4 * 4
-    result = vector(buffer, place + 4 * dim + 4, 3 * stride)
-    end, rates, error = result[:dim], result[stride : stride + dim], result[2 * stride :]
-    states = given[:dim], given[dim : 2 * dim], end, rates, error[:dim], rows[0]
-    values, whole = given[4 * dim + 6 :], (integers, integers)
-    return Work(*states, rows, rows[1:], rows, rows, *whole, memory, given, values, result)
+    result = vector(buffer, memory_at + MEMORY, 3 * stride)
+    return Work(
+        y=arguments[:dim],
+        f=arguments[dim : 2 * dim],
+        new=result[:dim],
+        f_new=result[stride : stride + dim],
+        error=result[2 * stride : 2 * stride + dim],
+        middle=vector(buffer, rows_at, dim),
+        curve=matrix(buffer, rows_at + dim, POWERS, dim),
+        past=arguments[2 * dim : numbers_at],
+        past_step=vector(buffer, memory_at, MEMORY),
+        numbers=arguments[numbers_at:inputs_at],
+        inputs=arguments[inputs_at:],
+        arguments=arguments,
+        result=result,
+        step_index=integers,
+    )
 
 
 def begin(problem, t, method, work):
     """Right-hand side at the beginning of a span; there is no step before."""
     rhs(problem, t, work.y, work.f)
-    work.places[0], work.memory[0] = len(method.grid) // 2, 0.0
+    work.step_index[0], work.past_step[0] = len(method.step_sizes) // 2, 0.0
     keep_past(work)
 
 
 def keep_past(work):
     """Copy state and right-hand side to where the kernel looks for those of the step before."""
-    dim = len(work.y)
-    for i in range(2 * dim):
-        work.given[2 * dim + i] = work.given[i]
+    for i in range(len(work.past)):
+        work.past[i] = work.arguments[i]
 
 
 def longest_step(h, method, control, work):
-    """The longest step of the grid that is not above h."""
-    work.places[0] = index_below(method.grid, work.places[0], h)
-    return min(h, method.grid[work.places[0]])
+    """The longest stored step size that is not above h."""
+    work.step_index[0] = index_below(method.step_sizes, work.step_index[0], h)
+    return min(h, method.step_sizes[work.step_index[0]])
+
+
+def index_below(step_sizes, index, h):
+    """Number of the longest stored step size that is not above h; the search begins at `index`."""
+    while index > 0 and step_sizes[index] > 1.0001 * h:
+        index -= 1
+    while index < len(step_sizes) - 1 and step_sizes[index + 1] <= 1.0001 * h:
+        index += 1
+    return index
+
+
+def nearest_index(step_sizes, index, h):
+    """Number of the stored step size that is nearest to h; the search begins at `index`."""
+    while index > 0 and step_sizes[index - 1] * step_sizes[index] > h * h:
+        index -= 1
+    while index < len(step_sizes) - 1 and step_sizes[index + 1] * step_sizes[index] < h * h:
+        index += 1
+    return index
 
 
 def quadrature_weights(past, h):
@@ -96,21 +160,21 @@ def quadrature_weights(past, h):
 
 def step(problem, t, h, method, work, counts):
     """Try a step; it is always possible."""
-    given, values, u = work.given, work.values, problem.u
-    index = nearest_index(method.grid, work.places[0], h)
-    work.places[0] = index
-    first = 4 * len(work.y)
-    given[first], given[first + 1] = h, method.grid[index] / h
-    at_past, at_half, at_end = quadrature_weights(work.memory[0], h)
-    given[first + 2], given[first + 3], given[first + 4] = at_past, at_half, at_end
-    # The shortest step of the grid is as good as a point in time.
-    given[first + 5] = h if h > 1.0001 * method.grid[0] else 0.0
-    for stage in range(2):
+    numbers, u, step_sizes = work.numbers, problem.u, method.step_sizes
+    index = nearest_index(step_sizes, work.step_index[0], h)
+    work.step_index[0] = index
+    numbers[0], numbers[1] = h, step_sizes[index] / h
+    numbers[2], numbers[3], numbers[4] = quadrature_weights(work.past_step[0], h)
+    # The shortest stored step is as good as a point in time.
+    numbers[5] = h if h > 1.0001 * step_sizes[0] else 0.0
+    for stage in range(STAGE_INPUTS):
         input_at(problem, t + 0.5 * (stage + 1) * h, u)
         for i in range(len(u)):
-            values[stage * len(u) + i] = u[i]
+            work.inputs[stage * len(u) + i] = u[i]
     equations, tables = problem.equations, method.operators[index]
-    call_kernel(equations.kernels, STEP_KERNEL, given, tables, equations.constants, work.result)
+    call_kernel(
+        equations.kernels, STEP_KERNEL, work.arguments, tables, equations.constants, work.result
+    )
     counts[RHS_CALLS] += 4
     return True
 
@@ -118,7 +182,7 @@ def step(problem, t, h, method, work, counts):
 def accept(problem, t, h, method, work, counts):
     """Keep the beginning of the step for the next one's estimate of the error."""
     keep_past(work)
-    work.memory[0] = h
+    work.past_step[0] = h
 
 
 def phi_functions(matrix: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -151,24 +215,26 @@ def _doubled(functions: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     )
 
 
-def exponential_tables(jacobian: np.ndarray, grid: Sequence[float] | np.ndarray) -> np.ndarray:
+def exponential_tables(
+    jacobian: np.ndarray, step_sizes: Sequence[float] | np.ndarray
+) -> np.ndarray:
     """Tables (step sizes, 7, n, n) of the loops, each matrix transposed.
 
     J; phi_1(z/2) / 2 and phi_2(z/2); phi_1, 2 phi_2, 2 phi_2 - 4 phi_3, 4 phi_3 - phi_2 of
-    z = h J.  Step sizes grow by a root of 2: each octave of the grid doubles the one before.
+    z = h J.  Step sizes grow by a root of 2: each octave doubles the one before.
     """
-    steps = np.asarray(grid)
+    steps = np.asarray(step_sizes)
     octave = int((steps < 1.99 * steps[0]).sum())
     tables = np.empty((len(steps), TABLES, *jacobian.shape))
     half = phi_functions(0.5 * steps[:octave, None, None] * jacobian)
     for begin in range(0, len(steps), octave):
-        whole = _doubled(half)
-        _, first, second, third = whole
+        full = _doubled(half)
+        _, first, second, third = full
         columns = (
             *(np.broadcast_to(jacobian, first.shape), half[1] / 2.0, half[2]),
             *(first, 2.0 * second, 2.0 * second - 4.0 * third, 4.0 * third - second),
         )
         part = tables[begin : begin + octave]
         part[:] = np.stack(columns, axis=1)[: len(part)].swapaxes(2, 3)
-        half = whole
+        half = full
     return tables

@@ -1,25 +1,25 @@
 """The one time loop: spans and windows, samples, limits, step sizes.
 
-An integrator gives `work_space`, `begin`, `longest_step`, `step`, `accept`, `prepare_curve` and
-`interpolate`, a formulation `rhs`, `reconstruct`, `project` and `error_norm`: they are compiled
-together.
+It calls functions of an integrator and of a formulation, see `contract`, and is compiled with them.
 """
 
 import math
 
 from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
 from vehiclemor.inputs.polynomial_loops import Pieces, input_at
-from vehiclemor.simulation.formulations.full import error_norm, project, reconstruct
-from vehiclemor.simulation.integrators.dopri5 import (
+from vehiclemor.simulation.integrators.contract import (
     accept,
     begin,
+    error_norm,
     interpolate,
+    longest_step,
     prepare_curve,
+    project,
+    reconstruct,
     step,
     work_space,
 )
-from vehiclemor.simulation.integrators.shared import longest_step
-from vehiclemor.simulation.integrators.structures import (
+from vehiclemor.simulation.loop_arguments import (
     FINISHED,
     NODE_1,
     NODE_2,
@@ -64,7 +64,8 @@ def integrate(
         x[i] = start[i]
     second = vector(buffer, scratch_end(n, inputs) - 2, 2)
     second[0], second[1] = spans.edges[0], 0.0
-    samples, path, counts = output.samples, output.path, output.counts
+    samples, counts = output.samples, output.counts
+    output.rows[0] = 0
     sample, window, segment, h = 0, -1, -1, control.first
     dim = subspaces.ranks[0]
     t = spans.edges[0]
@@ -76,11 +77,11 @@ def integrate(
             equations, signal, subspaces, spans.segments[span], window, (n, inputs), buffer
         )
         first = scratch_end(n, inputs)
-        work = work_space(buffer, first, integers, dim, inputs)
+        work = work_space(buffer, first, integers, dim, inputs, method)
         if entered:
             project(problem, t, x, work.y, counts)
             while sample < len(samples) and samples[sample] <= t + 1e-12 * (1.0 + abs(t)):
-                reconstruct(problem, work.y, path[next_point(output, sample)])
+                reconstruct(problem, work.y, output.states[output.rows[0]])
                 record_sample(output, sample)
                 sample += 1
         if segment >= 0 and spans.segments[span] != segment:
@@ -100,7 +101,7 @@ def integrate(
 
 
 def scratch_end(n, inputs):
-    """First place of the buffer that `on_span` leaves to the integrator."""
+    """First number of the buffer that `on_span` leaves to the integrator."""
     half = n // 2
     return 3 * n + inputs + 2 * half * (half + 1) + 2
 
@@ -111,18 +112,18 @@ def on_span(equations, signal, subspaces, segment, window, sizes, buffer):
     half = n // 2
     first = 3 * n + inputs
     return Problem(
-        segment,
-        signal,
-        equations,
-        subspaces.means[window],
-        subspaces.trial[window],
-        subspaces.test[window],
-        vector(buffer, n, n),
-        vector(buffer, 3 * n, inputs),
-        vector(buffer, 2 * n, n),
-        matrix(buffer, first, half, half + 1),
-        matrix(buffer, first + half * (half + 1), half, half + 1),
-        vector(buffer, scratch_end(n, inputs) - 2, 2),
+        segment=segment,
+        signal=signal,
+        equations=equations,
+        mean=subspaces.means[window],
+        trial=subspaces.trial[window],
+        test=subspaces.test[window],
+        x=vector(buffer, n, n),
+        u=vector(buffer, 3 * n, inputs),
+        dx=vector(buffer, 2 * n, n),
+        second_order=matrix(buffer, first, half, half + 1),
+        small=matrix(buffer, first + half * (half + 1), half, half + 1),
+        second=vector(buffer, scratch_end(n, inputs) - 2, 2),
     )
 
 
@@ -175,7 +176,7 @@ def over_span(problem, times, h, method, control, work, output, sample):
             continue
         counts[STEPS] += 1
         accept(problem, t, h, method, work, counts)
-        sample = record_samples(problem, (t, h, end), work, output, sample)
+        sample = record_samples(problem, (t, h, end), method, work, output, sample)
         # Proportional and integral control: Hairer, Wanner, Solving ODEs II (1996), section IV.2.
         error = max(error, 1e-10)
         factor = control.safety * error**-control.exponent * before**control.memory_exponent
@@ -190,10 +191,10 @@ def over_span(problem, times, h, method, control, work, output, sample):
             y[i] = work.new[i]
         for i in range(len(f)):
             f[i] = work.f_new[i]
-        whole = t + 1.0001 * h <= end
+        uncut = t + 1.0001 * h <= end
         t += h
         # A step that was cut at the end of the span says nothing against longer ones.
-        tried = h * factor if whole else max(tried, h * factor)
+        tried = h * factor if uncut else max(tried, h * factor)
     return FINISHED, t, tried, sample
 
 
@@ -205,15 +206,7 @@ def calls_of_this_second(problem, t, counts):
     return counts[RHS_CALLS] - second[1]
 
 
-def next_point(output, sample):
-    """Row of the next point: the sample's own, or behind the point of the sample before it."""
-    if not len(output.places) or sample == 0:
-        return sample
-    row, part = int(output.places[sample - 1, 0]), output.places[sample - 1, 1]
-    return row + (1 if part < 0.0 else NODES)
-
-
-def record_samples(problem, step, work, output, sample):
+def record_samples(problem, step, method, work, output, sample):
     """Samples within a step (time and length in s, end of its span); returns what comes next."""
     t, h, end = step
     samples, first = output.samples, sample
@@ -222,51 +215,54 @@ def record_samples(problem, step, work, output, sample):
         sample += 1
     if sample == first:
         return sample
-    prepare_curve(h, work)
-    own = first
-    if len(output.places) and sample - first > NODES + 1 and t >= output.direct_until:
+    prepare_curve(h, method, work)
+    alone = first
+    if len(output.point_of_sample) and sample - first > NODES + 1 and t >= output.record_all_until:
         # At the end of a span inputs may jump.
         at_end = samples[sample - 1] >= end - 1e-9 * (1.0 + abs(end))
-        own = sample - 1 if at_end else sample
-        record_step(problem, (t, h), first, own, work, output)
-    for k in range(own, sample):
+        alone = sample - 1 if at_end else sample
+        record_nodes(problem, (t, h), first, alone, work, output)
+    for k in range(alone, sample):
         interpolate((samples[k] - t) / h, h, work)
-        reconstruct(problem, work.middle, output.path[next_point(output, k)])
+        reconstruct(problem, work.middle, output.states[output.rows[0]])
         record_sample(output, k)
     return sample
 
 
 def record_sample(output, sample):
-    """A sample that is a point itself."""
-    if not len(output.places):
+    """Count the row of a sample that is a point itself."""
+    row = output.rows[0]
+    output.rows[0] = row + 1
+    if not len(output.point_of_sample):
         return
-    row = next_point(output, sample)
-    output.places[sample, 0], output.places[sample, 1] = row, -1.0
+    output.point_of_sample[sample, 0], output.point_of_sample[sample, 1] = row, -1.0
     output.point_times[row] = output.samples[sample]
-    for j in range(output.given.shape[1]):
-        output.inputs[row, j] = output.given[sample, j]
+    for j in range(output.sample_inputs.shape[1]):
+        output.point_inputs[row, j] = output.sample_inputs[sample, j]
 
 
-def record_step(problem, step, first, following, work, output):
-    """Points of a step (time and length in s) for the samples from one to before another."""
+def record_nodes(problem, step, first, following, work, output):
+    """Nodes of a step (time and length in s) for the samples from one to before another."""
     t, h = step
-    row = next_point(output, first)
+    row = output.rows[0]
+    output.rows[0] = row + NODES
     for node in range(NODES):
         part = NODE_1 if node in (0, 3) else NODE_2
         part = part if node < 2 else 1.0 - part
         interpolate(part, h, work)
-        reconstruct(problem, work.middle, output.path[row + node])
+        reconstruct(problem, work.middle, output.states[row + node])
         output.point_times[row + node] = t + part * h
-        input_at(problem, t + part * h, output.inputs[row + node])
+        input_at(problem, t + part * h, output.point_inputs[row + node])
     for k in range(first, following):
-        output.places[k, 0], output.places[k, 1] = row, max((output.samples[k] - t) / h, 0.0)
+        output.point_of_sample[k, 0] = row
+        output.point_of_sample[k, 1] = max((output.samples[k] - t) / h, 0.0)
 
 
 def leave_out(output, sample):
     """What has not been reached: no row, or not a number."""
     for left in range(sample, len(output.samples)):
-        if len(output.places):
-            output.places[left, 0], output.places[left, 1] = -1.0, -1.0
+        if len(output.point_of_sample):
+            output.point_of_sample[left, 0], output.point_of_sample[left, 1] = -1.0, -1.0
         else:
-            for i in range(output.path.shape[1]):
-                output.path[left, i] = math.nan
+            for i in range(output.states.shape[1]):
+                output.states[left, i] = math.nan

@@ -8,24 +8,28 @@ IV.7 and VI.4, in transformed stages (no product with the Jacobian):
 Rows of the tableau: a (6), c (6), then alpha, d, m and e; gamma is 1/4.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from vehiclemor.codegen.loop_types import matrix, vector
-from vehiclemor.simulation.formulations.full import rhs
+from vehiclemor.codegen.loop_types import IntVector, Matrix, Vector, matrix
+from vehiclemor.simulation.integrators.contract import rhs
 from vehiclemor.simulation.integrators.dense_solves import factorise, substitute
-from vehiclemor.simulation.integrators.structures import (
+from vehiclemor.simulation.integrators.shared import POWERS
+from vehiclemor.simulation.loop_arguments import (
     FACTORISATIONS,
     JACOBIANS,
     LINEAR_SOLVES,
     RHS_CALLS,
-    Work,
-    rows_of,
 )
 
 GAMMA = 0.25
 S = 6
 ALPHA, D, M, E = 12, 13, 14, 15
-# Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
+# Scratch space: vectors, then stages and powers of the cubic; matrices; one integer.
+VECTORS = ("y", "f", "new", "f_new", "error", "middle", "image", "f_t", "b")
+ROWS, SQUARES, FLAGS = len(VECTORS) + S + POWERS, 2, 1
+# Called once in the time loop: bundles of arrays cost more to pass than they take inside.
 INLINED = ("accept", "step")
 
 
@@ -58,28 +62,65 @@ def tableau() -> np.ndarray:
     return np.vstack([a, c, alpha, d, m, e])
 
 
-def work_space(buffer, first, integers, dim, inputs):
-    """Scratch space from place `first` of the buffer on."""
-    ends = matrix(buffer, first, 6, dim)
-    stages = matrix(buffer, first + 6 * dim, S + 3, dim)
-    curve = matrix(buffer, first + (S + 9) * dim, 3, dim)
-    place = first + (S + 12) * dim
-    squares = matrix(buffer, place, dim, dim), matrix(buffer, place + dim * dim, dim, dim)
-    none = vector(buffer, first, 0)
-    whole = integers[4 : 4 + dim], integers[:4]
-    return Work(*rows_of(ends), stages, curve, *squares, *whole, none, none, none, none)
+class Work(NamedTuple):
+    """Scratch space: `contract.WORK`, coefficients of the cubic, and what a step needs.
+
+    Right-hand side at a shifted state, time derivative, right side of a linear system; stages by
+    row; Jacobian, factors and pivots of the matrix; whether the Jacobian is fresh.
+    """
+
+    y: Vector
+    f: Vector
+    new: Vector
+    f_new: Vector
+    error: Vector
+    middle: Vector
+    image: Vector
+    f_t: Vector
+    b: Vector
+    stages: Matrix
+    curve: Matrix
+    jacobian: Matrix
+    factors: Matrix
+    pivots: IntVector
+    fresh: IntVector
+
+
+def work_space(buffer, first, integers, dim, inputs, method):
+    """See `contract.work_space`."""
+    rows = matrix(buffer, first, len(VECTORS), dim)
+    stages_at = first + len(VECTORS) * dim
+    curve_at = stages_at + S * dim
+    squares_at = curve_at + POWERS * dim
+    return Work(
+        y=rows[0],
+        f=rows[1],
+        new=rows[2],
+        f_new=rows[3],
+        error=rows[4],
+        middle=rows[5],
+        image=rows[6],
+        f_t=rows[7],
+        b=rows[8],
+        stages=matrix(buffer, stages_at, S, dim),
+        curve=matrix(buffer, curve_at, POWERS, dim),
+        jacobian=matrix(buffer, squares_at, dim, dim),
+        factors=matrix(buffer, squares_at + dim * dim, dim, dim),
+        pivots=integers[FLAGS : FLAGS + dim],
+        fresh=integers[:FLAGS],
+    )
 
 
 def begin(problem, t, method, work):
     """Right-hand side at the beginning of a span; no Jacobian is known yet."""
     rhs(problem, t, work.y, work.f)
-    work.places[0] = 0
+    work.fresh[0] = 0
 
 
 def difference_jacobian(problem, t, method, work, counts):
     """Jacobian by forward differences, inactive columns zero; time derivative after the stages."""
     y, f, jacobian, shifted = work.y, work.f, work.jacobian, work.middle
-    image, f_t = work.stages[S], work.stages[S + 1]
+    image, f_t = work.image, work.f_t
     dim = len(y)
     for i in range(dim):
         for j in range(dim):
@@ -106,17 +147,17 @@ def difference_jacobian(problem, t, method, work, counts):
 def step(problem, t, h, method, work, counts):
     """Try a step; False if its matrix is singular."""
     tableau, y, f, stages, mid = method.tableau, work.y, work.f, work.stages, work.middle
-    f_t, b, matrix_of = work.stages[S + 1], work.stages[S + 2], work.factors
+    f_t, b, factors = work.f_t, work.b, work.factors
     dim = len(y)
-    if work.places[0] == 0:
+    if work.fresh[0] == 0:
         difference_jacobian(problem, t, method, work, counts)
-        work.places[0] = 1
+        work.fresh[0] = 1
     for i in range(dim):
         for j in range(dim):
-            matrix_of[i, j] = -work.jacobian[i, j]
-        matrix_of[i, i] += 1.0 / (GAMMA * h)
+            factors[i, j] = -work.jacobian[i, j]
+        factors[i, i] += 1.0 / (GAMMA * h)
     counts[FACTORISATIONS] += 1
-    if not factorise(matrix_of, work.pivots):
+    if not factorise(factors, work.pivots):
         return False
     for stage in range(S):
         if stage == 0:
@@ -141,7 +182,7 @@ def step(problem, t, h, method, work, counts):
             for i in range(dim):
                 b[i] += tableau[D, stage] * h * f_t[i]
         counts[LINEAR_SOLVES] += 1
-        substitute(matrix_of, work.pivots, b)
+        substitute(factors, work.pivots, b)
         for i in range(dim):
             stages[stage, i] = b[i]
     for i in range(dim):
@@ -158,4 +199,4 @@ def accept(problem, t, h, method, work, counts):
     """Right-hand side at the end of the step; the Jacobian is no longer fresh."""
     rhs(problem, t + h, work.new, work.f_new)
     counts[RHS_CALLS] += 1
-    work.places[0] = 0
+    work.fresh[0] = 0

@@ -1,10 +1,11 @@
-"""What integrators have in common, and functions of those that don't define them otherwise.
+"""Functions of integrators that don't define them otherwise.
 
-Steps of any size; a cubic by values and slopes at the ends of a step, dense output of order 3; step
-sizes for which operators are stored.
+Steps of any size; dense output of order 3, the cubic through states and slopes at both ends.
 """
 
-INLINED = ("longest_step", "prepare_curve", "interpolate", "index_below", "nearest_index")
+# Powers of the part of a step that has passed, in the cubic.
+POWERS = 3
+INLINED = ("longest_step", "prepare_curve", "interpolate")
 
 
 def longest_step(h, method, control, work):
@@ -12,7 +13,7 @@ def longest_step(h, method, control, work):
     return h
 
 
-def prepare_curve(h, work):
+def prepare_curve(h, method, work):
     """Coefficients of the cubic in the part of the step that has passed."""
     y, new, f, f_new, curve = work.y, work.new, work.f, work.f_new, work.curve
     for i in range(len(y)):
@@ -22,26 +23,8 @@ def prepare_curve(h, work):
         curve[2, i] = before + after - 2.0 * rise
 
 
-def interpolate(z, h, work):
-    """State at the part z of the step that has passed, into `middle`."""
+def interpolate(part, h, work):
+    """State where a part of the step has passed, into `middle`."""
     y, curve = work.y, work.curve
     for i in range(len(y)):
-        work.middle[i] = y[i] + z * (curve[0, i] + z * (curve[1, i] + z * curve[2, i]))
-
-
-def index_below(grid, index, h):
-    """Number of the longest step of the grid that is not above h, from the last one on."""
-    while index > 0 and grid[index] > 1.0001 * h:
-        index -= 1
-    while index < len(grid) - 1 and grid[index + 1] <= 1.0001 * h:
-        index += 1
-    return index
-
-
-def nearest_index(grid, index, h):
-    """Number of the step of the grid that is nearest to h, from the last one on."""
-    while index > 0 and grid[index - 1] * grid[index] > h * h:
-        index -= 1
-    while index < len(grid) - 1 and grid[index + 1] * grid[index] < h * h:
-        index += 1
-    return index
+        work.middle[i] = y[i] + part * (curve[0, i] + part * (curve[1, i] + part * curve[2, i]))

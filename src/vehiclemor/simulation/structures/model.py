@@ -44,14 +44,14 @@ REASONS = {
     compiled.NOT_FINITE: "a coordinate is not finite",
     compiled.NO_CONVERGENCE: "no convergence of the port forces",
 }
-# Runs whose step sizes are kept.
+# Runs whose step sizes are cached.
 MOST_RUNS = 512
 # Time (s) between output times beyond which errors are estimated between them.
 LONGEST_SPACING = 0.02
 # Part of the largest range of an output of the same unit that is rounding; and of the largest
 # entry of a matrix by which it may differ from its transpose.
 ROUNDING, SYMMETRIC = 1e-6, 1e-9
-# Changes of port forces (N) at which a static state counts as found.
+# Changes of port forces (N) below which the iteration for the static state ends.
 STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 100
 
 
@@ -68,17 +68,17 @@ class Periods:
     passed: tuple[np.ndarray, ...] = ()
     _steps: dict[Any, tuple[int, str]] = field(default_factory=dict)
 
-    def march(
+    def integrate(
         self,
         maneuver: Excitation,
         accuracy: tuple[float, float],
         alike: np.ndarray,
         recorded: bool,
     ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray, int], str]:
-        """A run from the static state, see `StructuralSystem.march`, and what to know of its steps.
+        """A run from the static state, see `StructuralSystem.integrate`, and a remark on its steps.
 
-        The accuracy is a tolerance and a step size in s, which takes its place unless it is 0;
-        `alike` are numbers (outputs,) of their units.
+        The accuracy is a tolerance and a step size in s; unless it is 0, the step size counts and
+        the tolerance does not.  `alike` are numbers (outputs,) of their units.
         """
         tolerance, step = accuracy
         if step:
@@ -110,7 +110,7 @@ class Periods:
             if k:
                 state = state @ self.passed[k - 1].T
             part = inputs[first * every : end * every + 1]
-            parts.append(system.march(state, part, spacing / every, every, recorded))
+            parts.append(system.integrate(state, part, spacing / every, every, recorded))
             first = end
             if parts[-1][3]:
                 break
@@ -134,18 +134,18 @@ class Periods:
         """
         spacing = spacing_of(maneuver)
         if spacing > LONGEST_SPACING:
-            # Few output times would show nothing of what lies between them.
+            # A few output times don't show the motion between them.
             inner = int(np.ceil(spacing / LONGEST_SPACING))
             every, remark = self.steps(maneuver.subdivided(inner), tolerance, alike)
             return inner * every, remark
         every = max(round(spacing / FIRST_STEP), 1)
         least, most = (max(round(spacing / h), 1) for h in (LONGEST_STEP, SHORTEST_STEP))
         samples = min(round(TRIED / spacing) + 1, maneuver.samples)
-        begin = liveliest(maneuver, samples)
+        begin = window_of_largest_input_change(maneuver, samples)
         coarse = self.steps_of(maneuver, every, samples, begin=begin)[0]
         while True:
             fine = self.steps_of(maneuver, 2 * every, samples, begin=begin)[0]
-            # What they differ by is three quarters of the coarse one's error.
+            # Their difference is three quarters of the coarse one's error.
             error = 4.0 / 3.0 * relative_error(coarse, fine, alike)
             if not error > tolerance or every >= most:
                 break
@@ -153,11 +153,11 @@ class Periods:
         # Errors grow with the square of the step.
         while every > least and not every % 2 and 5.0 * error < tolerance:
             every, error = every // 2, 4.0 * error
-        missed = f"an error of {error:.1e} of an output's range"
-        return (
-            every,
-            f"steps of {spacing / every:.3g} s leave {missed}" if error > tolerance else "",
-        )
+        remark = ""
+        if error > tolerance:
+            left = f"an error of {error:.1e} of an output's range"
+            remark = f"steps of {spacing / every:.3g} s leave {left}"
+        return every, remark
 
 
 def spacing_of(maneuver: Excitation) -> float:
@@ -174,12 +174,13 @@ def inputs_at_steps(maneuver: Excitation, every: int) -> np.ndarray:
     return inputs
 
 
-def liveliest(maneuver: Excitation, samples: int) -> int:
+def window_of_largest_input_change(maneuver: Excitation, samples: int) -> int:
     """First of so many samples in which the inputs of a maneuver change most."""
     changes = np.diff(inputs_at_steps(maneuver, 1), axis=0) ** 2
-    whole = changes.sum(axis=0)
-    changed = (changes[:, whole > 0.0] / whole[whole > 0.0]).sum(axis=1)
-    sums = np.append(0.0, np.cumsum(changed))
+    totals = changes.sum(axis=0)
+    changing = totals > 0.0
+    shares = (changes[:, changing] / totals[changing]).sum(axis=1)
+    sums = np.append(0.0, np.cumsum(shares))
     return int(np.argmax(sums[samples - 1 :] - sums[: len(sums) - samples + 1]))
 
 
@@ -198,21 +199,22 @@ def relative_error(one: np.ndarray, other: np.ndarray, alike: np.ndarray | None 
 
 
 def wrong_matrices(structure: Structure, ports: int, outputs: int) -> str:
-    """What is wrong with the matrices of a structure; empty if nothing is."""
+    """Why the matrices of a structure are wrong; empty if they are right."""
     n = structure.size
     shapes = {"mass": (n, n), "stiffness": (n, n), "ports": (n, ports)}
     shapes |= {"dampers": (n, structure.dampers.shape[1])}
-    found: dict[str, Any] = {name: getattr(structure, name) for name in shapes}
+    matrices: dict[str, Any] = {name: getattr(structure, name) for name in shapes}
     named = ("outputs of q", "of q'", "of q''", "of the port forces")
-    found |= dict(zip(named, structure.outputs, strict=True))
+    matrices |= dict(zip(named, structure.outputs, strict=True))
     shapes |= dict(zip(named, [(outputs, n)] * 3 + [(outputs, ports)], strict=True))
-    for name, matrix in found.items():
+    for name, matrix in matrices.items():
         if matrix.shape != shapes[name]:
             return f"{name} has shape {matrix.shape}, not {shapes[name]}"
         if not np.isfinite(matrix.tocsc().data).all():
             return f"{name} has an entry that is not finite"
     for name in ("mass", "stiffness"):
-        if abs(found[name] - found[name].T).max() > SYMMETRIC * abs(found[name]).max():
+        matrix = matrices[name]
+        if abs(matrix - matrix.T).max() > SYMMETRIC * abs(matrix).max():
             return f"{name} is not symmetric"
     return ""
 
@@ -255,9 +257,9 @@ class StructuralModel(Model):
         """
         p, nothing = structure.ports.shape[1], np.zeros(len(self.inputs))
         law = PortLaw(self.equations.kernels, self.constants, np.zeros((2, p)))
-        # Ports that carry nothing at first are held by what the others have.
+        # Springs at all ports hold those that carry nothing at first.
         stiffness = np.full(p, 1e5)
-        factor = factored(structure.held(stiffness), "MMD_AT_PLUS_A")
+        factor = factored(structure.with_port_springs(stiffness), "MMD_AT_PLUS_A")
         ports = structure.ports.toarray()
         compliance = ports.T @ factor.solve(ports)
         free = ports.T @ factor.solve(structure.load)
@@ -288,10 +290,10 @@ class StructuralModel(Model):
         tolerance = TIGHT if tolerance is None else tolerance
         within("tolerance", number("tolerance", tolerance), TOLERANCES)
         self.start(start)
-        found = self.run(maneuver, None, tolerance, outputs)
-        if found.status != "ok":
-            raise ConvergenceError(f"{self.name}: {found.message}", found)
-        return found if times is None else found.chosen(times=times)
+        run = self.run(maneuver, None, tolerance, outputs)
+        if run.status != "ok":
+            raise ConvergenceError(f"{self.name}: {run.message}", run)
+        return run if times is None else run.chosen(times=times)
 
     def run(
         self,
@@ -304,14 +306,14 @@ class StructuralModel(Model):
     ) -> Trajectory:
         """A run of the full structure, or of reduced ones by period; it records a divergence.
 
-        Where it is to be recorded, the trajectory has all n coordinates.  A step in s takes the
-        place of the tolerance.
+        If recorded, the trajectory has all n coordinates.  With a step in s, the tolerance does not
+        count.
         """
         maneuver = checked_maneuver(maneuver, self.definition)
         names = None if outputs is None else output_names(outputs)
         periods = periods or self._whole
-        ((histories, states, found, reason), remark), seconds = timed(
-            lambda: periods.march(maneuver, (tolerance, step), self._alike, recorded)
+        ((histories, states, counts, reason), remark), seconds = timed(
+            lambda: periods.integrate(maneuver, (tolerance, step), self._alike, recorded)
         )
         times, inputs = maneuver.recorded_inputs
         failure = ""
@@ -336,7 +338,7 @@ class StructuralModel(Model):
             coordinates=states if recorded else inputs[:, :0],
             speeds=inputs[:, :0],
             outputs=histories,
-            counts=dict(zip(STRUCTURAL_COUNTS, found.tolist(), strict=True)),
+            counts=dict(zip(STRUCTURAL_COUNTS, counts.tolist(), strict=True)),
             seconds=seconds,
             status="diverged" if failure else "ok",
             message=failure,

@@ -9,7 +9,7 @@ class Columns(NamedTuple):
     """A sparse matrix by columns, each in pieces of consecutive rows.
 
     First piece of each column and, last, their number (columns + 1,); first row of each piece, then
-    the place of its first value (2 (pieces + 1),); entries, piece by piece.
+    the index of its first value (2 (pieces + 1),); entries, piece by piece.
     """
 
     pieces: IntVector
@@ -21,14 +21,15 @@ class Blocks(NamedTuple):
     """A lower triangular matrix in blocks of neighbouring columns with the same rows below them.
 
     First column of each block and, last, their number (blocks + 1,); rows below the blocks, and
-    where those of each begin; columns of the blocks, triangle and rows below, and where they begin.
+    the first index of each block's; columns of the blocks, triangle and rows below, and the first
+    index of each block's.
     """
 
     columns: IntVector
     rows: IntVector
-    row_places: IntVector
+    row_offsets: IntVector
     values: Vector
-    places: IntVector
+    offsets: IntVector
 
 
 def add_product(a, x, y):
@@ -67,38 +68,38 @@ def solve(low, pivots, x, gathered):
     """Solve L D L' x = b in place; `pivots` are inverse, `gathered` (n,) is scratch space."""
     blocks = len(low.columns) - 1
     for number in range(blocks):
-        block, rows, own = part(low, number, x)
-        width, below = len(own), gathered[: len(rows)]
+        block, rows, x_block = part(low, number, x)
+        width, below = len(x_block), gathered[: len(rows)]
         for k in range(width - 1):
-            column, factor = block[k], own[k]
+            column, factor = block[k], x_block[k]
             for i in range(k + 1, width):
-                own[i] -= column[i] * factor
+                x_block[i] -= column[i] * factor
         for i in range(len(rows)):
             below[i] = 0.0
-        add_columns(block, width, own, below)
+        add_columns(block, width, x_block, below)
         for i in range(len(rows)):
             x[rows[i]] -= below[i]
     for i in range(len(x)):
         x[i] *= pivots[i]
     for number in range(blocks - 1, -1, -1):
-        block, rows, own = part(low, number, x)
-        width, below = len(own), gathered[: len(rows)]
+        block, rows, x_block = part(low, number, x)
+        width, below = len(x_block), gathered[: len(rows)]
         for i in range(len(rows)):
             below[i] = x[rows[i]]
-        subtract_products(block, width, below, own)
+        subtract_products(block, width, below, x_block)
         for k in range(width - 1, -1, -1):
-            column, total = block[k], own[k]
+            column, total = block[k], x_block[k]
             for i in range(k + 1, width):
-                total -= column[i] * own[i]
-            own[k] = total
+                total -= column[i] * x_block[i]
+            x_block[k] = total
 
 
 def part(low, number, x):
     """Columns of a block, rows below it, and its entries of x."""
     first, end = low.columns[number], low.columns[number + 1]
-    rows = low.rows[low.row_places[number] : low.row_places[number + 1]]
-    width, place = end - first, low.places[number]
-    return matrix(low.values, place, width, width + len(rows)), rows, x[first:end]
+    rows = low.rows[low.row_offsets[number] : low.row_offsets[number + 1]]
+    width, offset = end - first, low.offsets[number]
+    return matrix(low.values, offset, width, width + len(rows)), rows, x[first:end]
 
 
 def add_columns(block, skipped, x, total):
@@ -118,18 +119,18 @@ def add_columns(block, skipped, x, total):
         k += 1
 
 
-def subtract_products(block, skipped, given, x):
+def subtract_products(block, skipped, below, x):
     """Subtract products of such columns with a vector from entries of x, four at a time."""
-    width, height, k = len(block), len(given), 0
+    width, height, k = len(block), len(below), 0
     while k + 3 < width:
         a, b, c, d = block[k], block[k + 1], block[k + 2], block[k + 3]
         a, b, c, d = a[skipped:], b[skipped:], c[skipped:], d[skipped:]
         f = g = p = q = 0.0
         for i in range(height):
-            f += a[i] * given[i]
-            g += b[i] * given[i]
-            p += c[i] * given[i]
-            q += d[i] * given[i]
+            f += a[i] * below[i]
+            g += b[i] * below[i]
+            p += c[i] * below[i]
+            q += d[i] * below[i]
         x[k] -= f
         x[k + 1] -= g
         x[k + 2] -= p
@@ -138,9 +139,9 @@ def subtract_products(block, skipped, given, x):
     while k < width:
         a, f, g = block[k][skipped:], 0.0, 0.0
         for i in range(height // 2):
-            f += a[2 * i] * given[2 * i]
-            g += a[2 * i + 1] * given[2 * i + 1]
+            f += a[2 * i] * below[2 * i]
+            g += a[2 * i + 1] * below[2 * i + 1]
         if height % 2:
-            f += a[height - 1] * given[height - 1]
+            f += a[height - 1] * below[height - 1]
         x[k] -= f + g
         k += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -15,7 +16,7 @@ from vehiclemor.multibody.definition import Structure
 from vehiclemor.simulation.evaluation import address_of
 from vehiclemor.simulation.structures import time_loops as compiled
 from vehiclemor.simulation.structures.sparse_loops import Blocks, Columns
-from vehiclemor.simulation.structures.time_loops import Marching, Weights
+from vehiclemor.simulation.structures.time_loops import StepMatrices, Weights
 
 STRUCTURAL_LOOPS = (
     "simulation.integrators.dense_solves",
@@ -80,10 +81,10 @@ class PortLaw:
     def at(self, deflections: np.ndarray, rates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Forces (p,) beyond the static ones and derivatives by deflections and rates, (p, 3)."""
         x = np.concatenate([self.static[0] + deflections, rates])
-        found = np.empty((len(deflections), 3))
-        self.kernels.call("port_forces", x, np.ascontiguousarray(inputs), self.constants, found)
-        found[:, 0] -= self.static[1]
-        return found
+        forces = np.empty((len(deflections), 3))
+        self.kernels.call("port_forces", x, np.ascontiguousarray(inputs), self.constants, forces)
+        forces[:, 0] -= self.static[1]
+        return forces
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,24 +96,24 @@ class StructuralSystem:
 
     structure: Structure
     law: PortLaw
-    _marching: dict[tuple[float, float], Ready] = field(default_factory=dict)
+    _step_matrices: dict[tuple[float, float], Ready] = field(default_factory=dict)
 
     @cached_property
     def order(self) -> np.ndarray:
         """Order (n,) of the coordinates in which factors of the matrices stay sparse."""
         return ordering(self.structure.mass + self.structure.stiffness)
 
-    def marching(self, h: float, radius: float = DAMPED) -> Ready:
+    def step_matrices(self, h: float, radius: float = DAMPED) -> Ready:
         """The structure with a step size in s; its matrix is factored once."""
-        found = self._marching.get((h, radius))
-        if found is None:
-            # A step whose error is estimated needs two.
-            if len(self._marching) > 3:
-                self._marching.pop(next(iter(self._marching)), None)
-            found = self._marching[h, radius] = ready(self._prepared(h, radius))
-        return found
+        matrices = self._step_matrices.get((h, radius))
+        if matrices is None:
+            # The estimate of an error needs two step sizes.
+            if len(self._step_matrices) > 3:
+                self._step_matrices.pop(next(iter(self._step_matrices)), None)
+            matrices = self._step_matrices[h, radius] = ready(self._prepared(h, radius))
+        return matrices
 
-    def _prepared(self, h: float, radius: float) -> Marching:
+    def _prepared(self, h: float, radius: float) -> StepMatrices:
         from scipy.sparse import hstack
 
         s, order = self.structure, self.order
@@ -123,19 +124,20 @@ class StructuralSystem:
         response = factor.solve(beside.toarray())
         coupled = beside.T @ response
         damped = coupled[p:, p:]
-        taken = of_damping * np.linalg.inv(np.eye(len(damped)) + of_damping * damped)
-        response[:, :p] -= response[:, p:] @ (taken @ coupled[p:, :p])
-        compliance = weights.after * (coupled[:p, :p] - coupled[:p, p:] @ taken @ coupled[p:, :p])
+        damping = of_damping * np.linalg.inv(np.eye(len(damped)) + of_damping * damped)
+        by_dampers = coupled[:p, p:] @ damping @ coupled[p:, :p]
+        response[:, :p] -= response[:, p:] @ (damping @ coupled[p:, :p])
+        compliance = weights.after * (coupled[:p, :p] - by_dampers)
         cq, cv, ca, cf = s.outputs
-        return Marching(
+        return StepMatrices(
             mass=columns_of(mass),
             factor=blocks_of(factor.L),
             ports=columns_of(beside),
             pivots=1.0 / factor.U.diagonal(),
             response=np.ascontiguousarray(response.T),
             compliance=np.ascontiguousarray(0.5 * (compliance + compliance.T)),
-            kept=np.eye(len(damped)) - taken @ damped,
-            taken=taken,
+            undamped=np.eye(len(damped)) - damping @ damped,
+            damping=damping,
             weights=weights,
             law=np.array([address_of(self.law.kernels, "port_forces")], dtype=np.int64),
             constants=self.law.constants,
@@ -146,7 +148,7 @@ class StructuralSystem:
             forces=columns_of(cf.T),
         )
 
-    def march(
+    def integrate(
         self,
         state: np.ndarray,
         inputs: np.ndarray,
@@ -170,8 +172,8 @@ class StructuralSystem:
         counts, order = np.zeros(3, dtype=np.int64), self.order
         moved = np.ascontiguousarray(state[:, order])
         arguments = moved, inputs, every, histories, states, buffer, counts
-        loop = loops(STRUCTURAL_LOOPS, ("march",))["march"]
-        reason = loop(self.marching(h, radius), *arguments)
+        loop = loops(STRUCTURAL_LOOPS, ("integrate",))["integrate"]
+        reason = loop(self.step_matrices(h, radius), *arguments)
         state[:, order] = moved
         if recorded:
             states[:, order] = states.copy()
@@ -187,9 +189,9 @@ def columns_of(matrix: Any) -> Columns:
     begins = np.ones(len(rows), dtype=bool)
     begins[1:] = np.diff(rows) != 1
     begins[matrix.indptr[:-1][np.diff(matrix.indptr) > 0]] = True
-    places = np.flatnonzero(begins)
-    pieces = np.searchsorted(places, matrix.indptr).astype(np.int64)
-    table = np.column_stack([np.append(rows[places], 0), np.append(places, len(rows))])
+    first = np.flatnonzero(begins)
+    pieces = np.searchsorted(first, matrix.indptr).astype(np.int64)
+    table = np.column_stack([np.append(rows[first], 0), np.append(first, len(rows))])
     return Columns(pieces, table.ravel().astype(np.int64), values)
 
 
@@ -226,14 +228,14 @@ def blocks_of(low: Any) -> Blocks:
     for j in range(1, n + 1):
         together = wanted[:0]
         if j < n:
-            own = rows[first[j] + 1 : first[j + 1]]
-            together = np.union1d(wanted[wanted > j], own)
+            below_diagonal = rows[first[j] + 1 : first[j + 1]]
+            together = np.union1d(wanted[wanted > j], below_diagonal)
             width = j + 1 - begin
             stored = width * (width + 1) // 2 + width * len(together)
             if stored <= WASTE * (first[j + 1] - first[begin]) and width <= WIDEST:
                 wanted = together
                 continue
-            together = own
+            together = below_diagonal
         columns.append(j)
         below.append(wanted)
         begin, wanted = j, together
@@ -247,8 +249,15 @@ def blocks_of(low: Any) -> Blocks:
             far = width + np.searchsorted(others, rows[here])
             block[k, np.where(inside < width, inside, far)] = low.data[here]
         parts.append(block.ravel())
-    places, row_places = (
-        np.cumsum([0, *map(len, part)]).astype(np.int64) for part in (parts, below)
+    return Blocks(
+        columns=np.array(columns, dtype=np.int64),
+        rows=np.concatenate(below),
+        row_offsets=_offsets(below),
+        values=np.concatenate(parts),
+        offsets=_offsets(parts),
     )
-    numbers = np.array(columns, dtype=np.int64)
-    return Blocks(numbers, np.concatenate(below), row_places, np.concatenate(parts), places)
+
+
+def _offsets(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """First index of each of some arrays that stand one behind the other, and their length."""
+    return np.cumsum([0, *map(len, parts)]).astype(np.int64)

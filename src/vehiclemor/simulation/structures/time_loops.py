@@ -83,7 +83,7 @@ class Weights(NamedTuple):
     lag: Float
 
 
-class Marching(NamedTuple):
+class StepMatrices(NamedTuple):
     """A structure with one step size.
 
     M, L of R = L D L' without its diagonal, B and W side by side, rows in the order of L; D (n,)
@@ -99,8 +99,8 @@ class Marching(NamedTuple):
     pivots: Vector
     response: Matrix
     compliance: Matrix
-    kept: Matrix
-    taken: Matrix
+    undamped: Matrix
+    damping: Matrix
     weights: Weights
     law: IntVector
     constants: Vector
@@ -206,16 +206,16 @@ def advance(system, state, ports, work, inputs, buffers, counts):
         solved[i] = 0.0
     add_product(system.mass, mixed, solved)
     solve(system.factor, system.pivots, solved, work[4])
-    for k in range(len(system.taken)):
+    for k in range(len(system.damping)):
         scratch[k] = column_product(system.ports, p + k, damped)
-        scratch[len(system.taken) + k] = column_product(system.ports, p + k, solved)
+        scratch[len(system.damping) + k] = column_product(system.ports, p + k, solved)
     for i in range(n):
         solved[i] += beside[i]
-    for k in range(len(system.taken)):
+    for k in range(len(system.damping)):
         factor = 0.0
-        for j in range(len(system.taken)):
-            factor += system.kept[k, j] * scratch[j]
-            factor -= system.taken[k, j] * scratch[len(system.taken) + j]
+        for j in range(len(system.damping)):
+            factor += system.undamped[k, j] * scratch[j]
+            factor -= system.damping[k, j] * scratch[len(system.damping) + j]
         add_row(system.response[p + k], factor, solved)
     for i in range(p):
         ports[FREE, i] = column_product(system.ports, i, solved)
@@ -261,8 +261,8 @@ def next_rate(w, change, rate, acceleration):
     return w.slope * change + w.rate_rate * rate + w.rate_acceleration * acceleration
 
 
-def march(
-    system: Marching,
+def integrate(
+    system: StepMatrices,
     state: Matrix,
     inputs: Matrix,
     every: Int,
@@ -277,7 +277,7 @@ def march(
     `states` has rows.  Gives one of the reasons above; samples that are not reached stay as they
     are.
     """
-    n, p, dampers = state.shape[1], len(system.compliance), len(system.taken)
+    n, p, dampers = state.shape[1], len(system.compliance), len(system.damping)
     work = matrix(buffer, 0, WORK_ROWS, n)
     ports = matrix(buffer, WORK_ROWS * n, PORT_ROWS, p)
     first = WORK_ROWS * n + PORT_ROWS * p

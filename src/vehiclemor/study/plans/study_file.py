@@ -26,7 +26,7 @@ from vehiclemor.study.plans.study_runs import (
 )
 from vehiclemor.toml_files import FileSchema, Line
 
-# Of the test sets of every study that gives none.
+# Of the test sets of every study without a seed.
 SEED, MOST_SEED = 20261122, 2**63 - 1
 # Sets of scenarios that a protocol lists, and those that it samples.
 SETS = ("training", "validation", "test", "outside")

@@ -10,7 +10,7 @@ import vehiclemor as vm
 from tests.reducing import training_runs
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change
-from vehiclemor.reduction.learned.learned_model import Learning, columns, monomials
+from vehiclemor.reduction.learned.learned_model import TrainingData, columns, monomials
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import FINISHED
@@ -27,8 +27,10 @@ def learned(name, model, runs, **settings):
     """What a method fits to runs, and what it has seen."""
     method = component("method", name)
     chosen = method.settings[model.kind](**settings)
-    mapped = name not in ("operator_inference", "sparse_identification")
-    return method.fit(model, runs, chosen), Learning.of(model, runs, chosen, mapped, "numpy")
+    discrete_time = name not in ("operator_inference", "sparse_identification")
+    return method.fit(model, runs, chosen), TrainingData.of(
+        model, runs, chosen, discrete_time, "numpy"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -62,9 +64,9 @@ def test_the_loop_evaluates_what_the_libraries_have_fitted(car, runs):
     from sklearn.neural_network import MLPRegressor
 
     few = {"rank": 4, "steps": 1}
-    reduced, learning = learned("neural_network", car, runs, epochs=20, **few)
-    linear, left = learning.linear
-    (x, expected), scale = learning.regression, left.std(axis=0)
+    reduced, data = learned("neural_network", car, runs, epochs=20, **few)
+    linear, left = data.linear
+    (x, expected), scale = data.regression, left.std(axis=0)
     network = MLPRegressor(
         hidden_layer_sizes=(32, 32), activation="tanh", alpha=1e-5, max_iter=20, random_state=0
     )
@@ -73,7 +75,7 @@ def test_the_loop_evaluates_what_the_libraries_have_fitted(car, runs):
     found = found + network.fit(x, left / scale).predict(x) * scale + straight
     np.testing.assert_allclose(reduced._values(x), found, atol=1e-10)
     # At its own samples a process is what was given, but for its noise.
-    reduced, learning = learned(
+    reduced, data = learned(
         "gaussian_process", car, runs, samples=300, length=1.0, noise=1e-9, **few
     )
     rows = np.random.default_rng(0).permutation(len(x))[:300]
@@ -85,10 +87,8 @@ def test_the_loop_evaluates_what_the_libraries_have_fitted(car, runs):
 def test_quadratic_operators_are_those_of_the_library(car, runs):
     import opinf
 
-    reduced, learning = learned(
-        "operator_inference", car, runs, rank=3, form="quadratic", ridge=1e-3
-    )
-    (x, results), r = learning.regression, 3
+    reduced, data = learned("operator_inference", car, runs, rank=3, form="quadratic", ridge=1e-3)
+    (x, results), r = data.regression, 3
     library = opinf.models.ContinuousModel("AHBN", solver=opinf.lstsq.L2Solver(1e-3))
     library.fit(x[:, :r].T, results[:, :r].T, x[:, r:].T)
     found = [library.rhs(0.0, row[:r], lambda _, row=row: row[r:]) for row in x[::40]]
@@ -97,10 +97,10 @@ def test_quadratic_operators_are_those_of_the_library(car, runs):
 
 def test_observables_are_monomials_and_begin_as_those_of_the_start(car, runs):
     settings = {"rank": 3, "degree": 2, "steps": 1}
-    reduced, learning = learned("dynamic_mode_decomposition", car, runs, **settings)
+    reduced, data = learned("dynamic_mode_decomposition", car, runs, **settings)
     assert reduced.order == 3 + 6
     state = car.start("dropped")
-    z = learning.forward @ (reduced.states.of(state[None])[0])
+    z = data.forward @ (reduced.states.of(state[None])[0])
     products = [z[i] * z[j] for i in range(3) for j in range(i, 3)]
     np.testing.assert_allclose(reduced._encoded(state)[:9], [*z, *products], rtol=1e-12)
 
@@ -171,9 +171,9 @@ def test_a_run_beyond_the_states_of_training_is_not_trusted(car, runs):
     for wrong in (
         small,
         replace(reduced, time_step=np.inf),
-        replace(reduced, known=np.ones((3, 2))),
+        replace(reduced, ranges=np.ones((3, 2))),
     ):
-        with pytest.raises(ValueError, match=r"equations|time_step|known"):
+        with pytest.raises(ValueError, match=r"equations|time_step|ranges"):
             wrong.check_sizes()
 
 

@@ -85,7 +85,7 @@ def check(system: System, inputs: int, windows: ControlPeriods, solver: str) -> 
         for name, dimensions, dtype in (
             ("buffer", 1, float),
             ("integers", 1, int),
-            ("output.path", 2, float),
+            ("output.states", 2, float),
         )
     ]
     assert space.call() == 0

@@ -14,7 +14,7 @@ from vehiclemor.simulation.system import System
 # With pairs that turn with the heading and without; in the mirror image's two blocks.
 VEHICLES = ("independent_suspension_vehicle", "high_fidelity_vehicle")
 PLACE = 60
-H = catalogue.STEP_GRID[PLACE]
+H = catalogue.STEP_SIZES[PLACE]
 
 
 def reduced_vehicle() -> System:

@@ -3,6 +3,8 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from vehiclemor.codegen.loop_types import Cube, Float, IntVector, Matrix, Vector
 from vehiclemor.inputs.polynomial_loops import Pieces
 
@@ -12,13 +14,22 @@ DERIVATIVE, SECOND_ORDER, SPEEDS, STEP_KERNEL = range(4)
 FINISHED, TOO_MANY_CALLS, NOT_FINITE, SINGULAR, STEP_TOO_SMALL = range(5)
 # Places of the counts of a run.
 RHS_CALLS, STEPS, REJECTED_STEPS, JACOBIANS, FACTORISATIONS, LINEAR_SOLVES = range(6)
+# Nodes of a step: the Chebyshev points of a cubic, as parts of the step.
+NODES = 4
+NODE_1, NODE_2 = 0.03806023374435663, 0.30865828381745514
 
 
 class Equations(NamedTuple):
     """Compiled equations dx/dt = f(x, u).
 
-    Addresses of the kernels by place, zero where there is none, and their hoisted constants; the
-    magnitude of each state below which errors count absolutely.
+    Attributes
+    ----------
+    kernels
+        Addresses of the kernels, see `DERIVATIVE`; zero where there is none.
+    constants
+        Hoisted constants of the kernels.
+    error_scale
+        Magnitude of each state below which errors count absolutely.
     """
 
     kernels: IntVector
@@ -49,12 +60,20 @@ class Subspaces(NamedTuple):
 class Method(NamedTuple):
     """What an integrator needs beside its code.
 
-    Its coefficients; step sizes (s) for which operators of a frozen Jacobian are stored, these
-    operators; numbers of the states that the right-hand side depends on.
+    Attributes
+    ----------
+    tableau
+        Coefficients, in rows that the integrator describes.
+    step_sizes
+        In s, those for which operators of a frozen Jacobian are stored.
+    operators
+        Of each step size.
+    active
+        Numbers of the states that the right-hand side depends on.
     """
 
     tableau: Matrix
-    grid: Vector
+    step_sizes: Vector
     operators: Cube
     active: IntVector
 
@@ -76,7 +95,7 @@ class Control(NamedTuple):
     halve_last
         Whether two equal steps are taken instead of a long and a tiny one (1) or not (0).
     tolerance
-        Largest local error of a state relative to its scale plus its own size.
+        Largest local error of a state relative to its scale plus its magnitude.
     shortest_first, longest, restart, first
         In s: shortest first guess of a step, longest step, longest first step after a break point
         of the inputs, first step to try (0 if it is to be guessed).
@@ -104,30 +123,86 @@ class Control(NamedTuple):
     first: Float = 0.0
 
 
-# Points of a step: the Chebyshev points of a cubic.
-NODES = 4
-NODE_1, NODE_2 = 0.03806023374435663, 0.30865828381745514
-
-
 class Output(NamedTuple):
-    """Where a run is recorded: states (samples, n) at its output times, and counts by place.
+    """Where a run is recorded: states at its samples, or at points from which these follow.
 
-    A run with `places` is recorded at points instead: at the samples themselves where a step has
-    few, and up to the time `direct_until`; else at `NODES` points of the step, through which cubics
-    give the samples, as dense output of order 3 does.  A place (samples, 2) is the row of the
-    sample's point, or of the first of its step's, and which part of the step has passed then; -1
-    where there is no row, and no step.  Inputs are those given at the samples, and those at the
-    points, whose times are kept too.
+    The points of a step are its samples where they are few, and up to `record_all_until`; else its
+    `NODES`, through which cubics give the samples, as dense output of order 3 does.
+
+    Attributes
+    ----------
+    samples
+        Output times in s.
+    states
+        A row for each point, in order.
+    rows
+        How many of these rows are recorded (1,).
+    counts
+        See `RHS_CALLS`.
+    sample_inputs
+        Inputs at the samples.
+    point_inputs, point_times
+        Inputs and times in s at the points; empty if these are the samples.
+    point_of_sample
+        Row of the sample's point, or of the first node of its step, and the part of the step that
+        has passed, -1 where the point is the sample.  Both are -1 where a run has not come.  Empty
+        if the points are the samples.
+    record_all_until
+        Time in s from which on nodes may stand for samples.
     """
 
     samples: Vector
-    path: Matrix
+    states: Matrix
+    rows: IntVector
     counts: IntVector
-    given: Matrix
-    inputs: Matrix
+    sample_inputs: Matrix
+    point_inputs: Matrix
     point_times: Vector
-    places: Matrix
-    direct_until: Float
+    point_of_sample: Matrix
+    record_all_until: Float
+
+    @classmethod
+    def at_samples(
+        cls,
+        samples: np.ndarray,
+        states: np.ndarray,
+        counts: np.ndarray,
+        inputs: np.ndarray | None = None,
+    ) -> "Output":
+        """Record a run at its samples."""
+        return cls(
+            samples,
+            states,
+            np.zeros(1, dtype=np.int64),
+            counts,
+            sample_inputs=np.empty((0, 0)) if inputs is None else inputs,
+            point_inputs=np.empty((0, 0)),
+            point_times=np.empty(0),
+            point_of_sample=np.empty((0, 2)),
+            record_all_until=math.inf,
+        )
+
+    @classmethod
+    def at_points(
+        cls,
+        samples: np.ndarray,
+        states: np.ndarray,
+        counts: np.ndarray,
+        inputs: np.ndarray,
+        record_all_until: float,
+    ) -> "Output":
+        """Record a run at few points from a time on."""
+        return cls(
+            samples,
+            states,
+            np.zeros(1, dtype=np.int64),
+            counts,
+            sample_inputs=inputs,
+            point_inputs=np.empty(inputs.shape),
+            point_times=np.empty(len(samples)),
+            point_of_sample=np.empty((len(samples), 2)),
+            record_all_until=record_all_until,
+        )
 
 
 class Outputs(NamedTuple):
@@ -147,9 +222,20 @@ class Outputs(NamedTuple):
 class Problem(NamedTuple):
     """Equations on one span and one window, with scratch space.
 
-    A segment of the signal, the mean (n,) of the window, trial and test basis (R, n) by rows.
-    Scratch: state (n,), inputs, rates (n,); mass matrix and forces (n / 2, n / 2 + 1), and their
-    projection; when the present second of the run began, and how many calls there had been.
+    Attributes
+    ----------
+    segment, signal
+        Number of the segment of the signal, the signal.
+    equations
+        The equations of the full system.
+    mean, trial, test
+        Mean (n,) of the window, trial and test basis (R, n) by rows.
+    x, u, dx
+        Scratch for a state (n,), inputs, rates (n,).
+    second_order, small
+        Scratch for mass matrix and forces (n / 2, n / 2 + 1), and for their projection.
+    second
+        When the present second of the run began, and how many calls there had been.
     """
 
     segment: int
@@ -164,36 +250,3 @@ class Problem(NamedTuple):
     second_order: Matrix
     small: Matrix
     second: Vector
-
-
-class Work(NamedTuple):
-    """Scratch space of an integrator; what it doesn't use is empty.
-
-    Reduced state y (dim,) and right-hand side f at the beginning of the step, the new ones at its
-    end once it is accepted; error (dim,); state in the middle of a step; rows of stages; curve
-    (3, dim), powers 1 to 3 of the part that has passed; Jacobian and factorised matrix (dim, dim)
-    with its pivots; the integrator's own integers (places) and numbers (memory), four each;
-    arguments and result of a kernel that takes whole steps.
-    """
-
-    y: Vector
-    f: Vector
-    new: Vector
-    f_new: Vector
-    error: Vector
-    middle: Vector
-    stages: Matrix
-    curve: Matrix
-    jacobian: Matrix
-    factors: Matrix
-    pivots: IntVector
-    places: IntVector
-    memory: Vector
-    given: Vector
-    values: Vector
-    result: Vector
-
-
-def rows_of(states):
-    """The first vectors of `Work`, from the state to the middle, as rows of a matrix."""
-    return states[0], states[1], states[2], states[3], states[4], states[5]

@@ -1,10 +1,10 @@
-"""Methods of general learners: a library fits polynomials, kernels or a network, our loop runs."""
+"""General learned methods: a library fits polynomials, kernels or a network, one loop runs them."""
 
 from collections.abc import Callable
 from typing import Any
 
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, Learning
+from vehiclemor.reduction.learned.learned_model import LearnedModel, LearnedSettings, TrainingData
 from vehiclemor.reduction.training import Training
 
 MOVING = ("ode", "dae", "structural")
@@ -13,22 +13,22 @@ EVERY = ("ae", *MOVING)
 PACKAGES = {"opinf": "opinf", "pysindy": "pysindy", "sklearn": "scikit-learn"}
 
 
-def learner(
+def learned_method(
     name: str,
     summary: str,
     reference: str,
-    learned: Callable[[Learning, Any], LearnedModel],
+    regression: Callable[[TrainingData, Any], LearnedModel],
     settings: type[LearnedSettings],
     library: str,
     *,
-    mapped: bool = True,
+    discrete_time: bool = True,
     kinds: tuple[str, ...] = MOVING,
 ) -> Method:
-    """The method of a learner: of changes in one step where `mapped`, else of rates."""
+    """A method that learns changes in one step where time is discrete, else rates."""
 
     def fit(model: Any, training: Training, chosen: Any) -> LearnedModel:
-        steps = mapped and model.kind != "ae"
-        return learned(Learning.of(model, training, chosen, steps, library), chosen)
+        steps = discrete_time and model.kind != "ae"
+        return regression(TrainingData.of(model, training, chosen, steps, library), chosen)
 
     declared = dict.fromkeys(kinds, settings)
     return Method(name, summary, declared, fit, reference, packages=(PACKAGES[library],))
