@@ -50,11 +50,11 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
             if len(members) > 1:
                 raise InputError(f"{name} is a collection: name one of {', '.join(members)}")
             ((study, definition),) = members.items()
-            found = result_path(results, study, content_hash(definition))
-            if found is None:
+            stored_path = result_path(results, study, content_hash(definition))
+            if stored_path is None:
                 path = combined_path(results, study)
                 raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
-            path = found
+            path = stored_path
     return read_dataset(path, "source", "vehiclemor", stored)
 
 
