@@ -223,7 +223,7 @@ def simulate(
     VehiclemorError
         If the input is wrong or can't be reached.  A model that diverges is a result.
     """
-    import vehiclemor.report.result_selection  # noqa: F401  (results draw themselves)
+    import vehiclemor.report.result_accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
@@ -313,7 +313,7 @@ def run_study(
         run of its studies on the dimension `cell`, without histories; the datasets of the studies
         are in the folder `studies`.
     """
-    import vehiclemor.report.result_selection  # noqa: F401  (results draw themselves)
+    import vehiclemor.report.result_accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.progress import listening
     from vehiclemor.study.plans.results import flattened
     from vehiclemor.study.run import run_studies
@@ -382,7 +382,8 @@ def plot(
     """
     import xarray as xr
 
-    from vehiclemor.report.result_selection import ResultAccessor, dataset_of, stored_result
+    from vehiclemor.report.result_accessor import ResultAccessor
+    from vehiclemor.report.result_selection import dataset_of, stored_result
     from vehiclemor.simulation.trajectory import Trajectory
 
     if isinstance(result, str | Path):
