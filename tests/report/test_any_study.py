@@ -207,7 +207,7 @@ def test_errors_have_every_method_and_output(folder):
             for label in ("full_order_strongest", "replay")
         )
         # The reference is more accurate than the integrator that is compared.
-        assert 0.0 < full < 1e-3 * replayed
+        assert 0.0 < full < 1e-2 * replayed
         assert errors.loc[f"{CAR}-nominal", "replay", "equilibrium", output] == 0.0
 
 
