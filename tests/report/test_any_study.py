@@ -204,10 +204,10 @@ def test_errors_have_every_method_and_output(folder):
     for output in tabled_outputs(component("model", CAR)):
         full, replayed = (
             errors.loc[f"{CAR}-perturbed", label, "equilibrium", output]
-            for label in ("full_order", "replay")
+            for label in ("full_order_strongest", "replay")
         )
         # The reference is more accurate than the integrator that is compared.
-        assert 0.0 < full < 1e-3 * replayed
+        assert 0.0 < full < 1e-2 * replayed
         assert errors.loc[f"{CAR}-nominal", "replay", "equilibrium", output] == 0.0
 
 

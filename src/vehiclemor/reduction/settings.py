@@ -30,7 +30,7 @@ class Settings(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _plain_number(cls, value: object) -> object:
-        """NumPy's numbers as Python's, and 3.0 as 3: the field's own type decides what it is."""
+        """NumPy's numbers as Python's, and 3.0 as 3: the type of the field decides what it is."""
         if isinstance(value, np.integer | np.floating):
             value = value.item()
         if isinstance(value, int | float) and LARGEST_NUMBER < abs(value) < np.inf:

@@ -20,8 +20,6 @@ from vehiclemor.study.plans.study_runs import FACTORS
 from vehiclemor.study.store import combined_path, result_path
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from vehiclemor.simulation.trajectory import Trajectory
 
 # Kinds of pictures of a run, or of a point of a grid.
@@ -50,11 +48,11 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
             if len(members) > 1:
                 raise InputError(f"{name} is a collection: name one of {', '.join(members)}")
             ((study, definition),) = members.items()
-            found = result_path(results, study, content_hash(definition))
-            if found is None:
+            stored_path = result_path(results, study, content_hash(definition))
+            if stored_path is None:
                 path = combined_path(results, study)
                 raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
-            path = found
+            path = stored_path
     return read_dataset(path, "source", "vehiclemor", stored)
 
 
@@ -109,21 +107,6 @@ def _index_of(dimension: str, values: list[Any], value: Any) -> int:
     if len(values) > MOST_NAMED:
         listed += ", ..."
     raise InputError(f"{dimension} is {quoted(value)}, not one of {listed}")
-
-
-@xr.register_dataset_accessor("vehiclemor")
-class ResultAccessor:
-    """What a result of this package can do beyond xarray."""
-
-    def __init__(self, dataset: xr.Dataset) -> None:
-        self._dataset = dataset
-
-    def plot(self, kind: str = "histories", out: str | Path | None = None, **at: object) -> Figure:
-        """Draw the result; see `vehiclemor.plot`."""
-        from vehiclemor.report.figures.result_plot import plot_result
-
-        dataset, _ = select_point(self._dataset, kind, at)
-        return plot_result(dataset, None if out is None else file_path("out", out), kind)
 
 
 def dataset_of(run: Trajectory, full: Trajectory | None = None) -> xr.Dataset:

@@ -1,4 +1,4 @@
-"""How a registered model of any kind is made ready to run: derived, compiled, parametrised."""
+"""How a registered model of any kind becomes ready to run: derived, compiled, parametrised."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
 
 # Integrators freeze the Jacobian of the model of rounded parameters, which many cars share.  They
-# are rounded to the model's own ones and steps of this part of them; points to steps of so many m.
+# are rounded to the default ones and steps of this part of them; points to steps of so many m.
 ROUNDED, ROUNDED_POINT, SMALLEST = 0.25, 0.02, 1e-9
 # Largest gap (m or rad) between the joints of a mechanism that counts as assembled.
 CLOSED = 1e-9
@@ -43,7 +43,7 @@ def build(
 ) -> Model:
     """Derive (or fetch), compile and parametrise a registered model.
 
-    The parameter file is the model's own by default, overrides are values in SI units by name.
+    The parameter file is the registered one by default, overrides are values in SI units by name.
     `InputError` if the name or an override is wrong; another `VehiclemorError` if the parameters
     can't be read, or the model can't be assembled from them or can't stand.
     """
@@ -119,7 +119,7 @@ def _near(definition: ModelDefinition, flat: np.ndarray, *derived: Any) -> Dynam
 
 @lru_cache(maxsize=64)
 def _usual_parameters(definition: ModelDefinition) -> tuple[np.ndarray, np.ndarray]:
-    """Components of the model's own parameters, and the steps to which others are rounded."""
+    """Components of the default parameters, and the steps to which others are rounded."""
     declared = definition.parameters
     usual = load_parameters(definition.name, declared, definition.parameter_file).flat()
     points = np.repeat([d.size > 1 for d in declared.values()], [d.size for d in declared.values()])
@@ -158,18 +158,18 @@ def _standing(*fields: Any) -> StructuralModel:
     from vehiclemor.simulation.structures.model import StructuralModel
 
     model = StructuralModel(*fields)
-    # What is wrong with the matrices is told now.
+    # Wrong matrices raise now.
     _ = model.system
     return model
 
 
 def kept_build(name: str) -> Model:
-    """As `build` with the model's own parameters; kept while these are the same, to be read."""
+    """As `build` with the default parameters, to be read; cached while their file is the same."""
     definition: ModelDefinition = component("model", name)
     try:
         parameters = (definition.parameter_file or parameter_path(name)).read_bytes()
     except OSError:
-        # What is wrong with it is told where it is read.
+        # The error is raised where the file is read.
         parameters = b""
     return _kept(definition, parameters)
 
@@ -225,6 +225,6 @@ def compiled(
 ) -> tuple[Derivation, str]:
     """Derivation of a model, and the hash of its source and of the loops that run it."""
     with blamed(f"model {name!r}: its equations can't be derived", derive):
-        made = derivation(name, derive)
-    text = f"{made.source}\n{loops_digest(loops)}"
-    return made, hashlib.sha256(text.encode()).hexdigest()[:16]
+        equations = derivation(name, derive)
+    text = f"{equations.source}\n{loops_digest(loops)}"
+    return equations, hashlib.sha256(text.encode()).hexdigest()[:16]

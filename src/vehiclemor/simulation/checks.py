@@ -34,7 +34,7 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
 def checked_path(
     value: Any, size: int, name: str, samples: int | None = None, finite: bool = True
 ) -> np.ndarray:
-    """A path (samples, size) for compiled functions, finite unless told; or `InputError`."""
+    """A path (samples, size) for compiled functions, finite by default; or `InputError`."""
     try:
         path = loop_array(value)
     except (TypeError, ValueError) as error:

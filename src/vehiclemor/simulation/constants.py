@@ -20,11 +20,11 @@ STEP, SMALLEST = 1e-4, 1e-2
 
 def values_of(definition: ModelDefinition, flat: np.ndarray) -> dict[str, Any]:
     """Values by name of all components in declared order: floats, and arrays of several."""
-    values, numbers, place = {}, flat.tolist(), 0
+    values, numbers, first = {}, flat.tolist(), 0
     for name, declared in definition.parameters.items():
-        end = place + declared.size
-        values[name] = flat[place:end].copy() if declared.size > 1 else numbers[place]
-        place = end
+        end = first + declared.size
+        values[name] = flat[first:end].copy() if declared.size > 1 else numbers[first]
+        first = end
     return values
 
 
@@ -56,8 +56,8 @@ def solved_parameters(
 def components(definition: ModelDefinition, name: str) -> range:
     """Numbers of the components of a parameter among those of all, or `InputError`."""
     declared = definition.parameters
-    place = [*declared].index(choice("parameter", name, declared))
-    first = sum(before.size for before in [*declared.values()][:place])
+    position = [*declared].index(choice("parameter", name, declared))
+    first = sum(before.size for before in [*declared.values()][:position])
     return range(first, first + declared[name].size)
 
 
@@ -71,8 +71,8 @@ def constant_derivatives(
     """
 
     def solved(moved: np.ndarray) -> np.ndarray:
-        found = solved_parameters(definition, moved, equations)
-        return np.array([found[name] for name in definition.solved])
+        solved = solved_parameters(definition, moved, equations)
+        return np.array([solved[name] for name in definition.solved])
 
     directions = np.zeros((len(numbers), len(flat) + len(definition.solved)))
     directions[np.arange(len(numbers)), numbers] = 1.0

@@ -10,7 +10,7 @@ from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.loop_arguments import Spans, Subspaces
 
-# Lists of spans that are kept.
+# Lists of spans that are cached.
 MOST_SPANS = 64
 
 
@@ -55,7 +55,7 @@ class ControlPeriods(ShortRepr):
         return {}
 
     def spans(self, breaks: np.ndarray, end: float, begin: float = 0.0) -> Ready:
-        """As `smooth_spans`, with the window edges; those of whole runs are kept."""
+        """As `smooth_spans`, with the window edges; those of complete runs are cached."""
         if begin:
             return ready(smooth_spans(breaks, self.edges, end, begin))
         key = breaks.tobytes(), end
@@ -88,7 +88,7 @@ def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float
 
 @lru_cache(maxsize=64)
 def whole_space(dim: int) -> ControlPeriods:
-    """The whole space of a system with `dim` states, in one window."""
+    """The full space of a system with `dim` states, in one window."""
     nothing = np.zeros((1, 1, 1))
     return ControlPeriods(
         "full",

@@ -76,7 +76,7 @@ class DynamicModel(Model):
         Empty where the states are components in the vehicle.
         """
         pairs = self.definition.heading_pairs
-        # The heading comes after the place; it matters where states turn with it.
+        # The heading comes after the two positions; it matters where states turn with it.
         heading = self.definition.planar[2:] if pairs else ()
         return self._numbers([*heading, *(state for pair in pairs for state in pair)])
 
@@ -141,7 +141,7 @@ class DynamicModel(Model):
         return pairs[:, 0], pairs[:, 1]
 
     def speeds_of_rates(self, x: Any) -> np.ndarray:
-        """Speeds (n,) where x (2 n,) holds the rates of the coordinates in their place."""
+        """Speeds (n,) where x (2 n,) holds the rates of the coordinates instead."""
         return self.evaluated("speeds", x, np.zeros(len(self.inputs)))
 
     def simulate(
@@ -193,17 +193,19 @@ class DynamicModel(Model):
     ) -> Trajectory:
         """Trajectory of the full or a projected system from a state; it records a divergence.
 
-        The windows tell the formulation and its subspaces; of outputs those named alone are kept.
+        The windows tell the formulation and its subspaces; outputs are computed as they are named.
         """
         maneuver = checked_maneuver(maneuver, self.definition)
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
         run = self.system.run(maneuver, state, windows, how, 0.0)
-        whole = how.times is None and not how.begin
-        inputs = maneuver.recorded_inputs[1] if whole else maneuver.at(run.times)
-        found = self.recorded(maneuver, run, inputs, run.whole, outputs=outputs)
+        if how.times is None and not how.begin:
+            inputs = maneuver.recorded_inputs[1]
+        else:
+            inputs = maneuver.at(run.times)
+        trajectory = self.recorded(maneuver, run, inputs, run.recorded_states, outputs=outputs)
         run.give_back()
-        return found
+        return trajectory
 
     def trajectory(
         self,
@@ -231,14 +233,14 @@ class DynamicModel(Model):
 
         Inputs are those at the output times (samples, inputs); states stand where the run is
         recorded, 2 n columns and what may follow them.  Trust is what a reduced model tells of the
-        run.  Where outputs are named, these alone are kept; else all can be read.
+        run.  Where outputs are named, these alone are computed; else all can be read.
         """
         remark = "" if maneuver is None else cut_short(maneuver)
         recorder, times, n = self._recorder, run.times, 2 * len(self.coordinates)
         at_points = run.recorded_at(inputs)[1]
         first = recorder.first_outside(run, at_points, states)
         limited, message, end = len(recorder.limited), run.failure, len(times)
-        points = states[: run.rows], at_points[: run.rows], run.places
+        points = states[: run.rows], at_points[: run.rows], run.point_of_sample
         left = min(first[:limited], default=end)
         if message:
             # From the failure on there are no numbers, which says nothing of limits.
@@ -264,16 +266,19 @@ class DynamicModel(Model):
         if outputs not in (None, self.outputs) and not message:
             histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]
             fields |= {"names": outputs, "coordinates": nothing, "speeds": nothing}
-            found = Trajectory.of(**fields, outputs=histories)
+            trajectory = Trajectory.of(**fields, outputs=histories)
         else:
             points = points[0][:, :n], *points[1:]
             recording = Recording(recorder, *(array.copy() for array in points))
             if left < end and not run.failure:
                 # What follows means nothing.
                 recording.end = left
-            found = Trajectory.of(**fields, recording=recording)
-            found = found if outputs is None else found.chosen(outputs)
-        return found.judged(trust) if trust is not None and trust.reason else found
+            trajectory = Trajectory.of(**fields, recording=recording)
+            if outputs is not None:
+                trajectory = trajectory.chosen(outputs)
+        if trust is not None and trust.reason:
+            return trajectory.judged(trust)
+        return trajectory
 
     @cached_property
     def _recorder(self) -> Recorder:

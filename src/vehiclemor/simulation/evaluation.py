@@ -80,23 +80,23 @@ def path_loops() -> Mapping[str, Loop]:
     return loops(PATH_LOOPS, entries)
 
 
-def partial(kernels: Kernels, name: str, arrays: Arrays, size: int, place: int) -> np.ndarray:
-    """Derivatives (size, n) of a kernel's result by the entries of the argument at a place."""
-    return _jacobian_product(kernels, name, arrays, size, place).jacobian(arrays)
+def partial(kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int) -> np.ndarray:
+    """Derivatives (size, n) of a kernel's result by the entries of the argument at a argument."""
+    return _jacobian_product(kernels, name, arrays, size, argument).jacobian(arrays)
 
 
 def directional(
-    kernels: Kernels, name: str, arrays: Arrays, size: int, place: int, directions: np.ndarray
+    kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int, directions: np.ndarray
 ) -> np.ndarray:
     """Derivatives (k, size) of a kernel's result along directions (k, n) of one argument."""
-    return _jacobian_product(kernels, name, arrays, size, place).columns(arrays, directions)
+    return _jacobian_product(kernels, name, arrays, size, argument).columns(arrays, directions)
 
 
 def _jacobian_product(
-    kernels: Kernels, name: str, arrays: Arrays, size: int, place: int
+    kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int
 ) -> JacobianProduct:
     source = kernels.sources[name]
-    return jacobian_product(source, source.arguments[place], size, len(arrays[place]))
+    return jacobian_product(source, source.arguments[argument], size, len(arrays[argument]))
 
 
 def parameter_names(by: Any) -> tuple[str, ...]:

@@ -95,7 +95,7 @@ class Control(NamedTuple):
     halve_last
         Whether two equal steps are taken instead of a long and a tiny one (1) or not (0).
     tolerance
-        Largest local error of a state relative to its scale plus its own size.
+        Largest local error of a state relative to its scale plus its magnitude.
     shortest_first, longest, restart, first
         In s: shortest first guess of a step, longest step, longest first step after a break point
         of the inputs, first step to try (0 if it is to be guessed).

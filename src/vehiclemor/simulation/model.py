@@ -182,7 +182,7 @@ class Model(ShortRepr):
         tolerance
             Largest component of the last step of an iteration (rad or m), 1e-12 by default; of
             structures largest error of an output by the step size, as part of the output's range;
-            else largest local error of a state relative to its typical size plus its own.
+            else largest local error of a state relative to its typical size plus its magnitude.
         outputs
             Names of outputs, coordinates or speeds to keep, see `Trajectory.chosen`.
 
@@ -203,7 +203,7 @@ class Model(ShortRepr):
     def values_at(
         self, function: str, states: np.ndarray, inputs: np.ndarray, finite: bool = False
     ) -> np.ndarray:
-        """Results (samples, size) of a function of the equations along a path, finite if told."""
+        """Results (samples, size) of a function of the equations along a path."""
         self.require(function)
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
         return at_samples(self.kernels, function, self.constants, (states, inputs), sizes, finite)
@@ -215,7 +215,7 @@ class Model(ShortRepr):
         ----------
         with_respect_to
             `state`, `inputs`, or names of parameters: a column for each component of each, in
-            order, of models made anew with it.
+            order, of models with other values of it.
 
         Raises
         ------
@@ -257,16 +257,16 @@ class Model(ShortRepr):
         arrays = state, u, self.constants
         if names:
             directions = self.constant_derivatives(names)
-            found = directional(self.kernels, function, arrays, size, CONSTANTS, directions).T
+            derivatives = directional(self.kernels, function, arrays, size, CONSTANTS, directions).T
         else:
             assert isinstance(by, str)
-            found = partial(self.kernels, function, arrays, size, PLACES[by])
-        if not np.isfinite(found).all():
+            derivatives = partial(self.kernels, function, arrays, size, PLACES[by])
+        if not np.isfinite(derivatives).all():
             raise InputError(f"the derivatives of {self.name} are not finite at this state")
-        return found
+        return derivatives
 
     def constant_derivatives(self, names: Sequence[str]) -> np.ndarray:
-        """Derivatives (components, constants) of the constants by parameters; they are kept."""
+        """Derivatives (components, constants) of the constants by parameters, cached."""
         for name in names:
             if name not in self._constant_derivatives:
                 numbers, flat = components(self.definition, name), self.parameters.flat()

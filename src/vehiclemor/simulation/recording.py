@@ -1,4 +1,4 @@
-"""Runs as they are recorded: states at the points of steps; all else is made when it is read."""
+"""Runs as they are recorded: states at the points of steps; the rest follows when it is read."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ class Recorder:
 
         Inputs and states are those at the points of the run (points or more, number).
         """
-        held = run.kept.get("watched")
+        held = run.cached_loops.get("watched")
         if held is None or held[0] is not states:
             first = np.empty(len(self._watched), dtype=np.int64)
             outputs, results = self.packed(self._watched, run.rows, self._ranges)
             scratch = np.empty((len(states), results))
-            arrays = states, inputs, run.places, outputs, scratch, first
+            arrays = states, inputs, run.point_of_sample, outputs, scratch, first
             call = path_loops()["watched"].prepared(*arrays)
-            held = run.kept["watched"] = states, call, first, call.address("states") + 1
+            held = run.cached_loops["watched"] = states, call, first, call.address("states") + 1
         _, call, first, rows = held
         call.words[rows] = run.rows
         self._run(call)
@@ -60,14 +60,14 @@ class Recorder:
         self, run: Run, inputs: np.ndarray, states: np.ndarray, names: tuple[str, ...]
     ) -> np.ndarray:
         """Outputs, coordinates or speeds (samples, names) of a run, arguments as above."""
-        held = run.kept.get("chosen")
+        held = run.cached_loops.get("chosen")
         if held is None or held[0] is not states or held[1] != names:
             outputs, results = self.packed(names, run.rows)
             arrays = np.empty((len(states), results)), np.empty((len(names), len(run.times)))
             loop = path_loops()["chosen"]
-            call = loop.prepared(states, inputs, run.places, outputs, *arrays)
+            call = loop.prepared(states, inputs, run.point_of_sample, outputs, *arrays)
             words = call.address("states") + 1, call.address("result")
-            held = run.kept["chosen"] = states, names, call, words
+            held = run.cached_loops["chosen"] = states, names, call, words
         *_, call, (rows, address) = held
         result = np.empty((len(names), len(run.times)))
         call.words[rows], call.words[address] = run.rows, address_of_array(result)
@@ -107,16 +107,25 @@ class Recording:
     ----------
     states, inputs
         At the points (points, number), see `loop_arguments.Output`.
-    places
+    point_of_sample
         How the samples follow from them (samples, 2); empty (0, 2) if they are these.
     """
 
     def __init__(
-        self, recorder: Recorder, states: np.ndarray, inputs: np.ndarray, places: np.ndarray
+        self,
+        recorder: Recorder,
+        states: np.ndarray,
+        inputs: np.ndarray,
+        point_of_sample: np.ndarray,
     ) -> None:
-        self._recorder, self.states, self.inputs, self.places = recorder, states, inputs, places
+        self._recorder, self.states, self.inputs, self.point_of_sample = (
+            recorder,
+            states,
+            inputs,
+            point_of_sample,
+        )
         # The first sample without numbers.
-        self.end = len(places) or len(states)
+        self.end = len(point_of_sample) or len(states)
 
     @cached_property
     def state_history(self) -> np.ndarray:
@@ -134,21 +143,21 @@ class Recording:
     def columns(self, names: tuple[str, ...]) -> np.ndarray:
         """Some outputs, coordinates or speeds (samples, names), without the others."""
         outputs, results = self._recorder.packed(names, len(self.states))
-        histories = np.empty((len(names), len(self.places) or len(self.states)))
+        histories = np.empty((len(names), len(self.point_of_sample) or len(self.states)))
         arrays = np.empty((len(self.states), results)), histories
-        points = self.states, self.inputs, self.places
-        self._recorder._run(path_loops()["chosen"].prepared(*points, outputs, *arrays))
+        path = self.states, self.inputs, self.point_of_sample
+        self._recorder._run(path_loops()["chosen"].prepared(*path, outputs, *arrays))
         return self._cut(histories.T)
 
     def at(self, rows: np.ndarray) -> Recording:
         """The same at some of the samples."""
-        states, inputs, places = self.states, self.inputs, self.places
-        if len(places):
-            found = Recording(self._recorder, states, inputs, places[rows])
+        states, inputs, points = self.states, self.inputs, self.point_of_sample
+        if len(points):
+            part = Recording(self._recorder, states, inputs, points[rows])
         else:
-            found = Recording(self._recorder, states[rows], inputs[rows], places)
-        found.end = int(np.searchsorted(rows, self.end))
-        return found
+            part = Recording(self._recorder, states[rows], inputs[rows], points)
+        part.end = int(np.searchsorted(rows, self.end))
+        return part
 
     def _cut(self, history: np.ndarray) -> np.ndarray:
         history[self.end :] = np.nan
@@ -156,8 +165,8 @@ class Recording:
 
     def _sampled(self, table: np.ndarray) -> np.ndarray:
         """A table at the points, at the samples."""
-        if not len(self.places):
+        if not len(self.point_of_sample):
             return table.copy()
-        histories = np.empty((len(self.places), table.shape[1]))
-        path_loops()["sampled"](table, self.places, histories)
+        histories = np.empty((len(self.point_of_sample), table.shape[1]))
+        path_loops()["sampled"](table, self.point_of_sample, histories)
         return histories

@@ -1,4 +1,4 @@
-"""How runs are timed by their own account (studies take whole calls), and in how many threads."""
+"""Clock of the compiled loops (studies time complete calls), and the number of threads."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def one_thread() -> Iterator[None]:
     How many threads add up a sum decides how it is rounded: results are then the same to the bit,
     whatever the number of cores, jobs or limits set outside.
     """
-    # SciPy brings a library of its own.
+    # SciPy brings another library.
     with _libraries("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
         yield
 

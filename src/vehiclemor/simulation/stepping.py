@@ -22,7 +22,7 @@ from vehiclemor.simulation.evaluation import CONSTANTS, STATE, directional, part
 from vehiclemor.simulation.loop_arguments import Output, Spans
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import DrivenBy, Pool, Solver, Workspace
+from vehiclemor.simulation.workspaces import Pool, RunInputs, Solver, Workspace
 
 # Shortest step in s: the time loop takes times that differ by less for one.
 SHORTEST = 1e-9
@@ -116,9 +116,9 @@ class SteppedSystem:
                 reached = time + begin + space.buffer[0]
                 raise ConvergenceError(f"{REASONS[status]} at t = {reached:.6g} s")
             start[:] = output.states[0]
-        found = start.copy()
+        after = start.copy()
         self._pool.give_back(None, held)
-        return found
+        return after
 
     @cached_property
     def _pool(self) -> Pool[StepSpace]:
@@ -145,7 +145,7 @@ class SteppedSystem:
         path, windows = np.empty((1, len(self.system.error_scale))), self.spaces
         if self.moved:
             windows = replace(windows, means=windows.means.copy())
-        drive = DrivenBy(signal, spans, np.empty((0, 0)))
+        drive = RunInputs(signal, spans, np.empty((0, 0)))
         output = Output.at_samples(sample, path, counts)
         space = self.system.packed(windows, Solver(self.solver, self.tolerance), drive, output)
         words = space.call.words
@@ -165,7 +165,7 @@ class SteppedSystem:
         """Analytic derivatives (n, columns) of the rates."""
         kernels = _Kernels(self.system, inputs, by)
         if self.spaces.formulation == "full":
-            return kernels.own("derivative", state, len(state))
+            return kernels.at_state("derivative", state, len(state))
         return self._projected_rates(kernels, state, time)[1]
 
     def projected(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
@@ -246,7 +246,7 @@ class _Kernels(NamedTuple):
         constants = self.by.argument == CONSTANTS
         return np.zeros((n, len(self.by.directions if constants else self.inputs)))
 
-    def own(self, name: str, x: np.ndarray, size: int) -> np.ndarray:
+    def at_state(self, name: str, x: np.ndarray, size: int) -> np.ndarray:
         """Sensitivities (size, columns) at a state that doesn't vary but by itself."""
         assert self.by is not None
         arrays = x, self.inputs, self.system.constants
@@ -255,10 +255,12 @@ class _Kernels(NamedTuple):
         return partial(self.system.kernels, name, arrays, size, self.by.argument)
 
     def of(self, name: str, x: np.ndarray, dx: np.ndarray, size: int) -> Varied:
-        """Result of a kernel with its sensitivities, at a state with its own (n, columns)."""
+        """Result of a kernel with its sensitivities, at a state with sensitivities (n, columns)."""
         value = self.system.values_at(name, x[None], self.inputs[None], size)[0]
         if self.by is None:
             return value, np.zeros((size, 0))
         arrays, seeds = (x, self.inputs, self.system.constants), np.ascontiguousarray(dx.T)
-        found = directional(self.system.kernels, name, arrays, size, STATE, seeds).T
-        return value, found if self.by.argument == STATE else found + self.own(name, x, size)
+        change = directional(self.system.kernels, name, arrays, size, STATE, seeds).T
+        if self.by.argument != STATE:
+            change = change + self.at_state(name, x, size)
+        return value, change

@@ -31,7 +31,7 @@ from vehiclemor.simulation.loop_arguments import (
 )
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import DrivenBy, Pool, Run, Solver, Workspace
+from vehiclemor.simulation.workspaces import Pool, Run, RunInputs, Solver, Workspace
 
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
@@ -72,7 +72,7 @@ class System(ShortRepr):
 
     def with_constants(self, constants: np.ndarray) -> System:
         """The system of other constants; operators, packed arguments and workspaces serve both."""
-        # What is made of the Jacobian is made by this one, before it is shared.
+        # All that follows from the Jacobian is computed by this one, before it is shared.
         _ = self.frame, self.frozen_jacobian, self._ready, self._pool
         other = object.__new__(System)
         vars(other).update(vars(self), constants=constants, _address=constants.ctypes.data)
@@ -102,12 +102,12 @@ class System(ShortRepr):
 
     @cached_property
     def _ready(self) -> dict[tuple, Ready]:
-        # What integrators store of the frozen Jacobian is made when it is first used.
+        # Filled when an integrator is first used.
         return {}
 
     @cached_property
     def frame(self) -> Frame:
-        """Coordinates of the operators of whole steps."""
+        """Coordinates of the stored operators."""
         blocks = (tuple(((i, 1.0),) for i in range(len(self.reference))),)
         if len(self.partners):
             sign = signs(self.frozen_jacobian, self.partners)
@@ -119,7 +119,7 @@ class System(ShortRepr):
         return Frame(blocks, columns, tuple(self.rotating.tolist()))
 
     def method(self, solver: str, active: np.ndarray) -> Ready:
-        """What an integrator needs beside its code; kept for further runs."""
+        """What an integrator needs beside its code, cached."""
         key = solver, active.tobytes()
         if key not in self._ready:
             chosen, operators = catalogue.integrator(solver), np.zeros((1, 1, 1))
@@ -131,7 +131,7 @@ class System(ShortRepr):
         return self._ready[key]
 
     def called(self, formulation: str, solver: str = "") -> Ready:
-        """The kernels that a run calls, a solver's whole steps too; kept for further runs."""
+        """The kernels that a run calls, a solver's step kernel too, cached."""
         key = formulation, solver
         if key not in self._ready:
             kernel, step = self._step_kernel(solver) if solver else None, 0
@@ -147,7 +147,7 @@ class System(ShortRepr):
         return self._ready[key]
 
     def _step_kernel(self, solver: str) -> Kernel | None:
-        """The kernel of whole steps of a solver of the full system, where it has one."""
+        """The step kernel of a solver of the full system, where it has one."""
         make = catalogue.integrator(solver).step_kernel
         return make(self.frame, self.inputs) if make else None
 
@@ -157,11 +157,11 @@ class System(ShortRepr):
         state: np.ndarray,
         windows: ControlPeriods,
         solver: Solver,
-        direct_until: float = np.inf,
+        record_all_until: float = np.inf,
     ) -> Run:
         """Integrate from a state (n,) over a maneuver; `InputError` if a value or name is wrong.
 
-        From `direct_until` s on the run may be recorded at points, see `loop_arguments.Output`.
+        From `record_all_until` s on the run may be recorded at points, see `loop_arguments.Output`.
         """
         name, tolerance, times, longest, begin = solver
         check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
@@ -169,14 +169,14 @@ class System(ShortRepr):
             check_positive("longest_step", longest)
 
         def make() -> Workspace:
-            return self.workspace(maneuver, windows, solver, direct_until)
+            return self.workspace(maneuver, windows, solver, record_all_until)
 
         if times is not None or begin:
             space, left = make(), None
         else:
-            # Of runs over whole maneuvers with the same output times.
+            # Complete maneuvers with the same output times share a workspace.
             length = maneuver.duration, maneuver.samples
-            kind = length, id(windows), name, tolerance, longest, direct_until
+            kind = length, id(windows), name, tolerance, longest, record_all_until
             space, left = self._pool.taken(kind, make), partial(self._pool.give_back, kind)
             if space.signal is not maneuver.packed_pieces:
                 space.take(self._drive(maneuver, windows, space.output.samples))
@@ -198,7 +198,7 @@ class System(ShortRepr):
         maneuver: Excitation,
         windows: ControlPeriods,
         solver: Solver,
-        direct_until: float = np.inf,
+        record_all_until: float = np.inf,
     ) -> Workspace:
         """Arrays of a run over a maneuver, its start still to be written; see `run`."""
         times = output_times(solver.times, maneuver, begin=solver.begin)
@@ -208,23 +208,23 @@ class System(ShortRepr):
         if solver.times is not None or solver.begin:
             return self.packed(windows, solver, drive, Output.at_samples(times, path, counts))
         inputs, cubic = drive.inputs.copy(), catalogue.integrator(solver.name).cubic
-        if cubic and len(times) >= LANES and direct_until < times[-1]:
-            output = Output.at_points(times, path, counts, inputs, direct_until)
+        if cubic and len(times) >= LANES and record_all_until < times[-1]:
+            output = Output.at_points(times, path, counts, inputs, record_all_until)
         else:
             output = Output.at_samples(times, path, counts, inputs)
         return self.packed(windows, solver, drive, output)
 
     def _drive(
         self, maneuver: Excitation, windows: ControlPeriods, times: np.ndarray, begin: float = 0.0
-    ) -> DrivenBy:
+    ) -> RunInputs:
         """What of a maneuver goes into a run."""
         signal = maneuver.packed_pieces
         end = float(times[-1]) if len(times) else maneuver.duration
         spans = windows.spans(signal.bundle.edges, end, begin)
-        return DrivenBy(signal, spans, maneuver.recorded_inputs[1])
+        return RunInputs(signal, spans, maneuver.recorded_inputs[1])
 
     def packed(
-        self, windows: ControlPeriods, solver: Solver, drive: DrivenBy, output: Output
+        self, windows: ControlPeriods, solver: Solver, drive: RunInputs, output: Output
     ) -> Workspace:
         """The time loop with all its arguments, see `integrators/loop.integrate`."""
         name, chosen = solver.name, catalogue.integrator(solver.name)

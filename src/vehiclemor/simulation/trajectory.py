@@ -60,7 +60,7 @@ EVALUATIONS["structural"] = "port_evaluations"
 
 @dataclass(frozen=True)
 class Trust:
-    """What a reduced model tells of its own run.
+    """How far a reduced model trusts its run.
 
     The indicator is the largest value in the run of what tells how far it goes: 1 is the edge of
     what it knows.  `until` is the time in s at which it has first passed 1, infinite if it never
@@ -136,12 +136,12 @@ class Trajectory(ShortRepr):
     def of(cls, **fields: Any) -> Trajectory:
         """A trajectory of these fields, in a third of the time that the constructor takes.
 
-        A `recording` in the place of coordinates, speeds and outputs gives these when one of them
-        is first read.
+        A `recording` instead of coordinates, speeds and outputs gives these when one of them is
+        first read.
         """
-        found = object.__new__(cls)
-        found.__dict__.update(fields)
-        return found
+        trajectory = object.__new__(cls)
+        trajectory.__dict__.update(fields)
+        return trajectory
 
     def __getattr__(self, name: str) -> Any:
         """Histories that nobody has read so far, see `of`."""
@@ -168,16 +168,20 @@ class Trajectory(ShortRepr):
         groups = {"outputs": self.names}
         if recording is not None or self.coordinates.shape[1]:
             groups |= {group: getattr(self.model, group, ()) for group in ("coordinates", "speeds")}
-        places = {
+        columns = {
             name: (group, column)
             for group in reversed(groups)
             for column, name in enumerate(groups[group])
         }
         for name in names:
-            choice("quantity", name, places)
+            choice("quantity", name, columns)
         if recording is not None and "outputs" not in self.__dict__:
             return recording.columns(names)
-        return np.stack([getattr(self, places[name][0])[:, places[name][1]] for name in names], 1)
+        histories = []
+        for name in names:
+            group, column = columns[name]
+            histories.append(getattr(self, group)[:, column])
+        return np.stack(histories, 1)
 
     def chosen(self, outputs: Names = None, times: Any = None) -> Trajectory:
         """The same run with some outputs alone, at some of its output times.
@@ -220,8 +224,8 @@ class Trajectory(ShortRepr):
         """The same with what its model tells of it; untrusted if that is that it has left."""
         if trust is None or self.status not in ("ok", "untrusted") or not trust.reason:
             return Trajectory.of(**self.__dict__ | {"trust": trust})
-        told = {"trust": trust, "status": "untrusted", "message": trust.message}
-        return Trajectory.of(**self.__dict__ | told)
+        verdict = {"trust": trust, "status": "untrusted", "message": trust.message}
+        return Trajectory.of(**self.__dict__ | verdict)
 
     @property
     def states(self) -> np.ndarray:
@@ -304,7 +308,7 @@ def _labels(
     import xarray as xr
 
     seconds = np.frombuffer(times)
-    found: dict[str, tuple] = {"time": ("time", seconds, {"units": "s", "long_name": "time"})}
+    labels: dict[str, tuple] = {"time": ("time", seconds, {"units": "s", "long_name": "time"})}
     declared = (*definition.outputs, *definition.coordinates, *definition.speeds)
     known = {quantity.name: quantity for quantity in reversed(declared)}
     for name in histories:
@@ -317,8 +321,8 @@ def _labels(
         ):
             array = np.array(values)
             array.flags.writeable = False
-            found[key] = label, array, {"long_name": f"{text} of the {label}"}
-    return xr.Dataset(coords=found).coords
+            labels[key] = label, array, {"long_name": f"{text} of the {label}"}
+    return xr.Dataset(coords=labels).coords
 
 
 def with_units(dataset: xr.Dataset) -> xr.Dataset:

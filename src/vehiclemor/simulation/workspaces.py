@@ -17,32 +17,32 @@ from vehiclemor.codegen.vector_lanes import LANES
 from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.loop_arguments import Output
 
-Kept = TypeVar("Kept")
-# Kinds of runs whose workspaces are kept.
+Item = TypeVar("Item")
+# Kinds of runs whose workspaces are cached.
 MOST_KINDS = 64
 ALL_SAMPLES = np.empty((0, 2))
 
 
-class Pool(Generic[Kept]):
+class Pool(Generic[Item]):
     """What no run holds at present, by what all runs of a kind share."""
 
     def __init__(self) -> None:
-        self._kept: dict[Hashable, list[Kept]] = {}
+        self._spare: dict[Hashable, list[Item]] = {}
 
-    def taken(self, kind: Hashable, make: Callable[[], Kept]) -> Kept:
-        """One of that kind, made if none is left."""
+    def taken(self, kind: Hashable, make: Callable[[], Item]) -> Item:
+        """One of that kind, a new one if none is left."""
         try:
-            return self._kept[kind].pop()
+            return self._spare[kind].pop()
         except (KeyError, IndexError):
             return make()
 
-    def give_back(self, kind: Hashable, held: Kept) -> None:
+    def give_back(self, kind: Hashable, held: Item) -> None:
         """Leave it to the next run."""
-        spare = self._kept.get(kind)
+        spare = self._spare.get(kind)
         if spare is None:
-            if len(self._kept) >= MOST_KINDS:
-                self._kept.clear()
-            spare = self._kept.setdefault(kind, [])
+            if len(self._spare) >= MOST_KINDS:
+                self._spare.clear()
+            spare = self._spare.setdefault(kind, [])
         spare.append(held)
 
 
@@ -56,7 +56,7 @@ class Solver(NamedTuple):
     begin: float = 0.0
 
 
-class DrivenBy(NamedTuple):
+class RunInputs(NamedTuple):
     """What of a maneuver goes into a run: signal, parts of the run, inputs at the output times."""
 
     signal: Ready
@@ -69,9 +69,9 @@ class Workspace:
     """Arrays of one run at a time and, packed once, the loop that uses them.
 
     The call is the time loop with its arguments, the start where a run begins (n,); output and
-    buffer are as of `integrators/loop.integrate`.  Windows are kept alive: a workspace is found by
-    the object.  The signal is that of the last run.  Kept is what other loops have made of the run;
-    their arrays last as long.
+    buffer are as of `integrators/loop.integrate`.  The windows stay alive with the workspace, which
+    is cached by their identity.  The signal is that of the last run.  Other loops that read these
+    arrays are cached by name.
     """
 
     call: Prepared
@@ -80,9 +80,9 @@ class Workspace:
     buffer: np.ndarray
     windows: ControlPeriods
     signal: Ready
-    kept: dict[str, Any] = field(default_factory=dict)
+    cached_loops: dict[str, Any] = field(default_factory=dict)
 
-    def take(self, drive: DrivenBy) -> None:
+    def take(self, drive: RunInputs) -> None:
         """Have the next run driven by another maneuver of the same output times."""
         self.call.give("signal", drive.signal)
         self.call.give("spans", drive.spans)
@@ -95,7 +95,7 @@ class Run:
     """What a compiled run leaves behind."""
 
     times: np.ndarray  # Output times (samples,) in s.
-    whole: np.ndarray  # States where it is recorded (rows or more, dim), NaN from a failure on.
+    recorded_states: np.ndarray  # States (rows or more, dim), NaN from a failure on.
     # Numbers in the order of `DYNAMIC_COUNTS`; time in the compiled loop; why it has ended early.
     counts: np.ndarray
     seconds: float
@@ -103,41 +103,41 @@ class Run:
     # Where its arrays are from; called with it once nothing reads them any more.
     space: Workspace | None = None
     left: Callable[[Workspace], None] | None = None
-    rows: int = field(init=False)  # How many of its rows tell something.
+    rows: int = field(init=False)  # How many rows are recorded.
 
     def __post_init__(self) -> None:
-        """Find how far it is recorded."""
-        self.rows = len(self.whole)
-        if self.space is not None and len(self.places):
+        """Count the rows that are recorded."""
+        self.rows = len(self.recorded_states)
+        if self.space is not None and len(self.point_of_sample):
             # Kernels take so many at once.
             self.rows = max(int(self.space.output.rows[0]), LANES)
 
     @property
     def path(self) -> np.ndarray:
         """States (samples, dim) at the output times, or at points, see `loop_arguments.Output`."""
-        return self.whole[: self.rows]
+        return self.recorded_states[: self.rows]
 
     @property
-    def places(self) -> np.ndarray:
-        """How the samples follow from points (samples, 2); empty (0, 2) if they are these."""
+    def point_of_sample(self) -> np.ndarray:
+        """See `loop_arguments.Output` (samples, 2); empty (0, 2) if the samples are the points."""
         return ALL_SAMPLES if self.space is None else self.space.output.point_of_sample
 
     def recorded_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Times (s) and inputs of its rows, or of more; those at the samples are given.
 
-        Of a workspace that is used again they always stand in the same place.
+        In a workspace that serves further runs their addresses stay the same.
         """
         if self.space is None or self.left is None:
             return self.times, inputs
         output = self.space.output
-        if len(self.places):
+        if len(self.point_of_sample):
             return output.point_times, output.point_inputs
         return self.times, output.sample_inputs
 
     @property
-    def kept(self) -> dict[str, Any]:
-        """What other loops have made of it."""
-        return {} if self.space is None else self.space.kept
+    def cached_loops(self) -> dict[str, Any]:
+        """Loops that read the arrays of its workspace, by name."""
+        return {} if self.space is None else self.space.cached_loops
 
     def give_back(self) -> None:
         """Leave its arrays to the next run: nothing may read them any more."""

@@ -64,12 +64,12 @@ def test_a_run_keeps_its_path_until_it_gives_it_back():
     known = first.path.copy()
     second = run("dropped")
     np.testing.assert_array_equal(first.path, known)
-    assert not np.shares_memory(first.whole, second.whole)
+    assert not np.shares_memory(first.recorded_states, second.recorded_states)
     second.give_back()
     second.give_back()
     third, fourth = run("dropped"), run("dropped")
-    assert np.shares_memory(third.whole, second.whole)
-    assert not np.shares_memory(third.whole, fourth.whole)
+    assert np.shares_memory(third.recorded_states, second.recorded_states)
+    assert not np.shares_memory(third.recorded_states, fourth.recorded_states)
 
 
 def test_spare_spaces_are_found_by_kind_and_are_few():
@@ -81,7 +81,7 @@ def test_spare_spaces_are_found_by_kind_and_are_few():
     assert spare.taken("a", list) is not mine
     for kind in range(2 * MOST_KINDS):
         spare.give_back(kind, [])
-    assert len(spare._kept) <= MOST_KINDS
+    assert len(spare._spare) <= MOST_KINDS
 
 
 def test_limits_are_watched_between_the_points_of_a_step(rng):

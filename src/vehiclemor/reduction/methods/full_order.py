@@ -89,7 +89,7 @@ def _presets(solver: str, tolerance: float, **others: Mapping[str, Value]) -> Pr
 
 @dataclass(frozen=True, eq=False)
 class FullOrder:
-    """The full-order model in the place of a reduced one."""
+    """The full-order model as if it were a reduced one."""
 
     model: Model
     solver: str
@@ -129,12 +129,12 @@ class FullOrderSystem(FullOrder, ReducedSystem):
 
     @property
     def system(self) -> System:
-        """The model's own."""
+        """The equations of the model."""
         return self.model.system
 
     @cached_property
     def spaces(self) -> ControlPeriods:
-        """The whole space."""
+        """All of the state space."""
         return whole_space(2 * len(self.model.coordinates))
 
 
@@ -156,7 +156,7 @@ class FullOrderMechanism(FullOrder, ReducedMechanism):
 
 @dataclass(frozen=True, eq=False)
 class FullOrderStructure(StructuralRuns, FullOrder):
-    """A structural model; it gives whole runs alone."""
+    """A structural model; it can't be stepped."""
 
     model: StructuralModel
     step_size: float = 0.0

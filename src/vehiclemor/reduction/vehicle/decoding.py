@@ -269,11 +269,11 @@ class Decoding(ShortRepr):
 
         `inputs` are those at the samples; of `start` see `decoding_loops.Known`.
         """
-        space = run.kept.get("decoded")
+        space = run.cached_loops.get("decoded")
         if space is None or space.excited.shape != excited.shape:
             times, inputs = run.recorded_at(inputs)
-            space = self.space((times, run.whole, inputs), excited.copy(), run.rows)
-            run.kept["decoded"] = space
+            space = self.space((times, run.recorded_states, inputs), excited.copy(), run.rows)
+            run.cached_loops["decoded"] = space
         space.excited[:] = excited
         space.start[:] = start
         return self._decode(space, run.rows)

@@ -195,7 +195,7 @@ class ReducedVehicle(ReducedSystem):
         states, trust = self.decoder.of_run(
             run, inputs, known.excited, (*known.start_trust, *input_use)
         )
-        if not len(run.places) or run.places[0, 1] < 0.0:
+        if not len(run.point_of_sample) or run.point_of_sample[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(known.state)] = known.state
         trajectory = self.model.recorded(maneuver, run, inputs, states, trust, outputs)

@@ -1,6 +1,6 @@
 """Projection of the equations of motion: y = (a, b), coordinates q = mean + V a, their rates V b.
 
-V^T M V db/dt = V^T F with the model's own mass matrix; the first half of the rows of the trial
+V^T M V db/dt = V^T F with the mass matrix of the model; the first half of the rows of the trial
 basis are V^T, those of the test basis its left inverse.
 """
 
@@ -61,7 +61,7 @@ def product(n, matrix, row, trial, image):
     """Product of the first n columns of a symmetric matrix with a row of trial into image (n,)."""
     for i in range(n):
         image[i] = 0.0
-    # Four rows at a time: a loop over a dozen places costs as much to enter as to run.
+    # Four rows at a time: a loop over a dozen numbers costs as much to enter as to run.
     j = 0
     while j + 3 < n:
         a, b, c, d = trial[row, j], trial[row, j + 1], trial[row, j + 2], trial[row, j + 3]
@@ -96,7 +96,7 @@ def galerkin(r, trial, matrix, image, small):
 
 
 def add_motion(problem, y, x):
-    """Add coordinates and their rates, in place of the speeds, to x (n,)."""
+    """Add coordinates and their rates, instead of the speeds, to x (n,)."""
     trial, n, r = problem.trial, len(x) // 2, len(y) // 2
     for j in range(r):
         for i in range(n):

@@ -4,7 +4,7 @@ from vehiclemor.codegen.loop_types import call_kernel
 from vehiclemor.inputs.polynomial_loops import input_at
 from vehiclemor.simulation.loop_arguments import DERIVATIVE
 
-# One place in each integrator calls it for all stages of a step.
+# Each integrator calls it once for all stages of a step.
 INLINED = ("rhs", "reconstruct")
 
 

@@ -20,7 +20,7 @@ from vehiclemor.simulation.loop_arguments import Control
 # Step sizes (s) for which operators are stored.  Where a step and the nearest of them differ more,
 # its error grows and steps are rejected.
 STEP_SIZES = 2.0 ** (0.125 * np.arange(-128, 25))
-# Formulation -> kernels that it calls; a kernel of whole steps may come besides.
+# Formulation -> kernels that it calls; a step kernel may come besides.
 FORMULATIONS = {
     "full": ("derivative",),
     "state": ("derivative",),
@@ -47,7 +47,7 @@ class Integrator:
     inputs: int = 0
     cubic: bool = True  # Whether its dense output is a cubic in each step.
     tableau: np.ndarray = field(default_factory=lambda: np.zeros((1, 1)))  # Its coefficients.
-    # Makes the kernel of a whole step from the frame and the number of inputs, where it has one.
+    # Makes the step kernel from the frame and the number of inputs, where it has one.
     step_kernel: Callable[[Frame, int], Kernel] | None = None
     # Makes what is stored of a frozen Jacobian: transposed operators (step sizes, tables, n, n) of
     # a diagonal block.  None for a method with fresh Jacobians or without any.
@@ -152,7 +152,7 @@ def scratch_size(
 ) -> int:
     """Floats of scratch space for n states, the largest reduced dimension and so many inputs.
 
-    A kernel of whole steps works in its result.
+    A step kernel works in its result.
     """
     of_method = chosen.rows * dim + chosen.squares * dim * dim + chosen.numbers
     of_step = step.shape[0] if step else 0

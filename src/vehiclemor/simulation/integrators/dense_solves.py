@@ -40,19 +40,19 @@ def small_solve(a, r):
 
 
 def factorise(matrix, rows):
-    """Factors in place of the matrix; False if it is singular."""
+    """Replace a matrix by its factors; False if it is singular."""
     dim = len(matrix)
     for k in range(dim):
-        best, place = abs(matrix[k, k]), k
+        best, row = abs(matrix[k, k]), k
         for i in range(k + 1, dim):
             if abs(matrix[i, k]) > best:
-                best, place = abs(matrix[i, k]), i
+                best, row = abs(matrix[i, k]), i
         if not 1e-300 < best < 1e300:
             return False
-        rows[k] = place
-        if place != k:
+        rows[k] = row
+        if row != k:
             for j in range(dim):
-                matrix[k, j], matrix[place, j] = matrix[place, j], matrix[k, j]
+                matrix[k, j], matrix[row, j] = matrix[row, j], matrix[k, j]
         inverse = 1.0 / matrix[k, k]
         for i in range(k + 1, dim):
             factor = matrix[i, k] * inverse
@@ -64,12 +64,12 @@ def factorise(matrix, rows):
 
 
 def substitute(matrix, rows, b):
-    """Solution of L U x = b in place of b."""
+    """Replace b by the solution of L U x = b."""
     dim = len(b)
     for k in range(dim):
-        place = rows[k]
-        if place != k:
-            b[k], b[place] = b[place], b[k]
+        row = rows[k]
+        if row != k:
+            b[k], b[row] = b[row], b[k]
     for k in range(dim):
         value = b[k]
         for i in range(k + 1, dim):

@@ -17,7 +17,7 @@ end (in the first step of a span, of order 2 through now and its end).  Linear m
 at the end of a step, however long, but the cubic between has: its defect half-way is added.
 
 Step sizes are those that operators are stored for; where a break point asks for another step h
-those of the nearest one serve, exact for A = J step_sizes[index] / h.  A whole step is one kernel,
+those of the nearest one serve, exact for A = J step_sizes[index] / h.  A step is one kernel,
 see `step_kernels.exponential_step`.
 
 Matrix functions: phi_0(z) = exp(z), phi_k(z) = (phi_{k-1}(z) - 1/(k-1)!) / z.  Taylor series at a
@@ -40,7 +40,7 @@ from vehiclemor.simulation.integrators.contract import rhs
 from vehiclemor.simulation.integrators.shared import POWERS
 from vehiclemor.simulation.loop_arguments import RHS_CALLS, STEP_KERNEL
 
-# Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
+# Called once in the time loop: bundles of arrays cost more to pass than they take inside.
 INLINED = (
     *("accept", "longest_step", "step", "quadrature_weights", "keep_past"),
     *("index_below", "nearest_index"),
@@ -228,13 +228,13 @@ def exponential_tables(
     tables = np.empty((len(steps), TABLES, *jacobian.shape))
     half = phi_functions(0.5 * steps[:octave, None, None] * jacobian)
     for begin in range(0, len(steps), octave):
-        whole = _doubled(half)
-        _, first, second, third = whole
+        full = _doubled(half)
+        _, first, second, third = full
         columns = (
             *(np.broadcast_to(jacobian, first.shape), half[1] / 2.0, half[2]),
             *(first, 2.0 * second, 2.0 * second - 4.0 * third, 4.0 * third - second),
         )
         part = tables[begin : begin + octave]
         part[:] = np.stack(columns, axis=1)[: len(part)].swapaxes(2, 3)
-        half = whole
+        half = full
     return tables

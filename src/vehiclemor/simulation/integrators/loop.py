@@ -1,7 +1,6 @@
 """The one time loop: spans and windows, samples, limits, step sizes.
 
-What it calls of an integrator and of a formulation is told in `contract`; they are compiled
-together.
+It calls functions of an integrator and of a formulation, see `contract`, and is compiled with them.
 """
 
 import math
@@ -102,7 +101,7 @@ def integrate(
 
 
 def scratch_end(n, inputs):
-    """First place of the buffer that `on_span` leaves to the integrator."""
+    """First number of the buffer that `on_span` leaves to the integrator."""
     half = n // 2
     return 3 * n + inputs + 2 * half * (half + 1) + 2
 
@@ -192,10 +191,10 @@ def over_span(problem, times, h, method, control, work, output, sample):
             y[i] = work.new[i]
         for i in range(len(f)):
             f[i] = work.f_new[i]
-        whole = t + 1.0001 * h <= end
+        uncut = t + 1.0001 * h <= end
         t += h
         # A step that was cut at the end of the span says nothing against longer ones.
-        tried = h * factor if whole else max(tried, h * factor)
+        tried = h * factor if uncut else max(tried, h * factor)
     return FINISHED, t, tried, sample
 
 

@@ -29,7 +29,7 @@ ALPHA, D, M, E = 12, 13, 14, 15
 # Scratch space: vectors, then stages and powers of the cubic; matrices; one integer.
 VECTORS = ("y", "f", "new", "f_new", "error", "middle", "image", "f_t", "b")
 ROWS, SQUARES, FLAGS = len(VECTORS) + S + POWERS, 2, 1
-# Called at one place of the time loop: bundles of arrays cost more to pass than they take inside.
+# Called once in the time loop: bundles of arrays cost more to pass than they take inside.
 INLINED = ("accept", "step")
 
 

@@ -1,11 +1,11 @@
-"""A kernel that takes whole steps of a system with a frozen Jacobian.
+"""A kernel that takes steps of a system with a frozen Jacobian.
 
 With two or four dozen states the loops around the stages would take as long as the right-hand side.
 This kernel does a step of `etdrk4` in vectors of known length and executes the right-hand side by
 its address.  Vectors that stored operators are applied to stand in a frame: the
-heading is turned to zero, and left and right are replaced by sum and difference.  A vehicle is its
-own mirror image: in these its Jacobian at straight running has two diagonal blocks, one of motions
-that are their own mirror image, one of those that reverse.
+heading is turned to zero, and left and right are replaced by sum and difference.  A vehicle equals
+its mirror image: in these its Jacobian at straight running has two diagonal blocks, of motions that
+the mirror leaves and of motions that it reverses.
 """
 
 from __future__ import annotations
@@ -26,45 +26,48 @@ from vehiclemor.simulation.integrators import etdrk4
 RESULTS = ("new", "rates", "error")
 # Wheels that the mirror exchanges, as parts of names.
 SWAPPED = {"FL": "FR", "FR": "FL", "RL": "RR", "RR": "RL"}
-# Entries of a Jacobian, in its own units, below which they are rounding of its differences.
+# Entries of a Jacobian, in SI units, below which they are rounding of its differences.
 ROUNDING = 1e-5
 # Coordinates of a diagonal block: each a sum of states times signs.
 Block = tuple[tuple[tuple[int, float], ...], ...]
 
 
 def partners(names: Sequence[str]) -> np.ndarray:
-    """Number of the state that each becomes in the mirror, its own if it has no partner."""
-    images = ["_".join(SWAPPED.get(part, part) for part in name.split("_")) for name in names]
-    places = {name: i for i, name in enumerate(names)}
-    return np.array([places.get(image, i) for i, image in enumerate(images)], dtype=np.int64)
+    """Number of the state that each becomes in the mirror; the same if it has no partner."""
+    numbers = {name: i for i, name in enumerate(names)}
+    images = []
+    for name in names:
+        image = "_".join(SWAPPED.get(part, part) for part in name.split("_"))
+        images.append(numbers.get(image, numbers[name]))
+    return np.array(images, dtype=np.int64)
 
 
 def signs(jacobian: np.ndarray, partner: np.ndarray) -> np.ndarray | None:
-    """Signs (n,) with which J (n, n) is its own mirror image; none if there are no such signs.
+    """Signs (n,) with which J (n, n) equals its mirror image; none if there are no such signs.
 
     S J S = J for (S x)_i = signs[i] x[partner[i]] fixes the signs of states that are coupled
-    against one another; each group of coupled states may be reversed as a whole.
+    against one another; each group of coupled states may be reversed together.
     """
     image = jacobian[np.ix_(partner, partner)]
     coupled = (np.abs(jacobian) > ROUNDING) & (np.abs(image) > ROUNDING)
     relation = np.where(coupled, np.sign(jacobian * image), 0.0)
     # Either of a pair has the same sign, so that S S is the identity.
     relation[np.arange(len(partner)), partner] = 1.0
-    found = np.zeros(len(partner))
+    sign_of = np.zeros(len(partner))
     for first in range(len(partner)):
-        waiting = [] if found[first] else [(first, 1.0)]
+        waiting = [] if sign_of[first] else [(first, 1.0)]
         while waiting:
             i, sign = waiting.pop()
-            if not found[i]:
-                found[i] = sign
+            if not sign_of[i]:
+                sign_of[i] = sign
                 related = relation[i] + relation[:, i] * (relation[i] == 0.0)
                 waiting += [(j, sign * related[j]) for j in np.flatnonzero(related)]
-    reflected = found[:, None] * image * found
-    return found if np.abs(reflected - jacobian).max(initial=0.0) <= ROUNDING else None
+    reflected = sign_of[:, None] * image * sign_of
+    return sign_of if np.abs(reflected - jacobian).max(initial=0.0) <= ROUNDING else None
 
 
 def mirror_blocks(partner: np.ndarray, sign: np.ndarray) -> tuple[Block, ...]:
-    """Coordinates that are their own mirror image, and those that reverse, as sums of states."""
+    """Coordinates that the mirror leaves, and those that it reverses, as sums of states."""
     blocks: list[Block] = []
     for parity in (1.0, -1.0):
         rows: list[tuple[tuple[int, float], ...]] = []
@@ -102,19 +105,35 @@ class Frame(NamedTuple):
     def diagonal(self, jacobian: np.ndarray) -> list[np.ndarray]:
         """Diagonal blocks of a Jacobian (n, n) in these coordinates."""
         transform = self.transform
-        whole = np.linalg.solve(transform.T, (transform @ jacobian).T).T
+        in_frame = np.linalg.solve(transform.T, (transform @ jacobian).T).T
         ends = np.cumsum([0, *(len(block) for block in self.blocks)])
-        return [whole[a:b, a:b] for a, b in pairwise(ends)]
+        return [in_frame[a:b, a:b] for a, b in pairwise(ends)]
+
+    @property
+    def inverse(self) -> np.ndarray:
+        """Matrix (n, n) from coordinates to states: rows of the transform are orthogonal."""
+        transform = self.transform
+        return transform.T / np.count_nonzero(transform, axis=1)
+
+    @property
+    def coordinate_entries(self) -> list[int]:
+        """Entry of each coordinate in a vector, block after block."""
+        return [
+            first + k
+            for first, block in zip(self.offsets, self.blocks, strict=False)
+            for k in range(len(block))
+        ]
 
     @property
     def plain(self) -> bool:
         """Whether coordinates are the states."""
-        own = tuple(((i, 1.0),) for i in range(sum(len(block) for block in self.blocks)))
-        return self.blocks == (own,) and not self.rotating
+        states = sum(len(block) for block in self.blocks)
+        same = tuple(((i, 1.0),) for i in range(states))
+        return self.blocks == (same,) and not self.rotating
 
     @property
-    def places(self) -> list[int]:
-        """First place of each block in a vector, and the length of a vector."""
+    def offsets(self) -> list[int]:
+        """Where each block begins in a vector, and the length of a vector."""
         return np.cumsum([0, *(padded(len(block)) for block in self.blocks)]).tolist()
 
     def entries(self, table: int) -> list[int]:
@@ -141,7 +160,7 @@ class _Step(Listing):
         self.frame = frame
         self.n = n = sum(len(block) for block in frame.blocks)
         # Of a vector of coordinates, and room for any.
-        self.width = frame.places[-1]
+        self.width = frame.offsets[-1]
         self.stride = max(padded(n), self.width)
         self.vectors = {name: ("_x", k * n) for k, name in enumerate(given)}
         first = len(given) * n
@@ -155,22 +174,21 @@ class _Step(Listing):
             for a, b in zip(frame.rotating[1::2], frame.rotating[2::2], strict=True):
                 self.partners |= {a: (b, True), b: (a, False)}
 
-    def at(self, name: str, place: int = 0) -> tuple[str, int]:
-        """An entry of a vector."""
+    def at(self, name: str, entry: int = 0) -> tuple[str, int]:
+        """Array and number of an entry of a vector."""
         if name not in self.vectors:
             self.vectors[name] = ("_result", self.used)
             self.used += padded(self.n) if name in RESULTS else self.stride
         array, first = self.vectors[name]
-        return array, first + place
+        return array, first + entry
 
     def sum(self, to: str, *terms: tuple[Value | float, str], n: int = 0) -> None:
         """A vector as the sum of factors times vectors, of coordinates by default."""
-        places = [self.at(name) for _, name in terms]
-        detail = self.at(to), n or self.width, *places
+        detail = self.at(to), n or self.width, *(self.at(name) for _, name in terms)
         self.new("combine", *(factor for factor, _ in terms), detail=detail)
 
     def rates(self, state: str, inputs: int, to: str) -> None:
-        """The right-hand side at a state and the inputs from a place on."""
+        """The right-hand side at a state and the inputs that begin at a number."""
         given = self.at(state), ("_x", self.inputs + inputs), ("_constants", 0)
         self.new("execute", detail=(("_kernels", 0), *given, self.at(to)))
 
@@ -179,8 +197,8 @@ class _Step(Listing):
         if state not in self.partners:
             return read(state)
         other, first = self.partners[state]
-        own, beside = self.cosine * read(state), self.sine * read(other)
-        return own - beside if first == back else own + beside
+        along, across = self.cosine * read(state), self.sine * read(other)
+        return along - across if first == back else along + across
 
     def enter(self, to: str, vector: str) -> None:
         """Coordinates of a vector of states; the same vector if they are the states."""
@@ -191,7 +209,7 @@ class _Step(Listing):
         def read(state: int) -> Value:
             return self.entry(*self.at(vector, state))
 
-        for first, block in zip(self.frame.places, self.frame.blocks, strict=False):
+        for first, block in zip(self.frame.offsets, self.frame.blocks, strict=False):
             for k in range(padded(len(block))):
                 row = block[k] if k < len(block) else ()
                 terms = [w * self.turned(read, i, back=False) for i, w in row]
@@ -202,33 +220,30 @@ class _Step(Listing):
         if self.frame.plain:
             self.sum(to, *[(1.0, name) for name in (start, coordinates) if name], n=self.n)
             return
-        shares: dict[int, list[tuple[float, int]]] = {i: [] for i in range(self.n)}
-        for first, block in zip(self.frame.places, self.frame.blocks, strict=False):
-            for k, row in enumerate(block):
-                for i, weight in row:
-                    shares[i].append((weight / len(row), first + k))
+        inverse, entries = self.frame.inverse, self.frame.coordinate_entries
 
         def read(state: int) -> Value:
-            terms = [w * self.entry(*self.at(coordinates, k)) for w, k in shares[state]]
+            terms = []
+            for k in np.flatnonzero(inverse[state]).tolist():
+                coordinate = self.entry(*self.at(coordinates, entries[k]))
+                terms.append(float(inverse[state, k]) * coordinate)
             return _total(terms)
 
         for i in range(self.n):
-            _, place = self.at(to, i)
+            value = self.turned(read, i, back=True)
             if start:
-                begun = self.entry(*self.at(start, i))
-                self.store(place, begun + self.turned(read, i, back=True))
-            else:
-                self.store(place, self.turned(read, i, back=True))
+                value = self.entry(*self.at(start, i)) + value
+            self.store(self.at(to, i)[1], value)
 
     def product(self, to: str, table: int, vector: str, weight: float) -> None:
         """A stored operator times a vector of coordinates."""
         frame, entries = self.frame, self.frame.entries(table)
         for first, block, columns, rows in zip(
-            frame.places, frame.blocks, frame.columns, entries, strict=False
+            frame.offsets, frame.blocks, frame.columns, entries, strict=False
         ):
-            kept = tuple(i for i in range(len(block)) if i not in columns)
-            own = self.at(to, first), padded(len(block)), ("_u", rows), self.at(vector, first)
-            self.new("product", detail=(*own, columns, kept, weight))
+            other = tuple(i for i in range(len(block)) if i not in columns)
+            arrays = self.at(to, first), padded(len(block)), ("_u", rows), self.at(vector, first)
+            self.new("product", detail=(*arrays, columns, other, weight))
 
     def step_kernel(self, name: str) -> Kernel:
         """The kernel; it needs room in the result for all vectors, as long as they are padded."""
@@ -260,7 +275,7 @@ def exponential_step(frame: Frame, inputs: int) -> Kernel:
     against, half_h = step.let(-stretch), step.let(0.5 * h)
     step.enter("f1", "f")
     product("half", etdrk4.HALF_FIRST, "f1")
-    product("whole", etdrk4.FIRST, "f1")
+    product("full", etdrk4.FIRST, "f1")
     step.sum("v", (h, "half"))
     for k in range(4):
         if k == 1:
@@ -268,12 +283,12 @@ def exponential_step(frame: Frame, inputs: int) -> Kernel:
             step.sum("v", (h, "half"), (h, "p"))
         elif k == 2:
             product("p", etdrk4.SECOND, "d1")
-            step.sum("v", (h, "whole"), (h, "p"))
+            step.sum("v", (h, "full"), (h, "p"))
         elif k == 3:
             step.sum("both", (1.0, "d0"), (1.0, "d1"))
             product("p", etdrk4.MIDDLE, "both")
             product("q", etdrk4.LAST, "d2")
-            step.sum("v", (h, "whole"), (h, "p"), (h, "q"))
+            step.sum("v", (h, "full"), (h, "p"), (h, "q"))
         product("p", etdrk4.JACOBIAN, "v")
         state = "new" if k == 3 else "middle"
         step.leave(state, "v", "y")
@@ -292,8 +307,8 @@ def exponential_step(frame: Frame, inputs: int) -> Kernel:
     change = ((pair, "d3"), (-pair, "d2"), (weight_half, "both"), (weight_end, "d3"))
     step.sum("v", *change, (weight_past, "changed"), (weight_linear, "p"))
     product("q", etdrk4.LAST, "v")
-    product("p", etdrk4.JACOBIAN, "whole")
-    step.sum("v", (share, "half"), (share_half, "whole"), (share_linear, "p"))
+    product("p", etdrk4.JACOBIAN, "full")
+    step.sum("v", (share, "half"), (share_half, "full"), (share_linear, "p"))
     step.leave("middle", "q")
     step.leave("error", "v")
     for i in range(n):

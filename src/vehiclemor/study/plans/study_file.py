@@ -346,10 +346,3 @@ def _hint(key: str, schema: type[StudyFile | CollectionFile]) -> str:
         kinds = " or ".join(other.kind for other in others)
         return f"it belongs to {kinds}"
     return did_you_mean(key, schema.model_fields) or f"known: {', '.join(schema.model_fields)}"
-
-
-def study_from(content: Mapping[str, Any]) -> StudyFile:
-    """A study with this content, validated."""
-    schema = schema_of(content)
-    assert schema is not CollectionFile
-    return schema.model_validate(content)  # type: ignore[return-value]
