@@ -3,13 +3,12 @@
 import logging
 import re
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 from sphinx.application import Sphinx
 
 DOCS = Path(__file__).parent
-# Beside this file are two modules.
+# Beside this file is `examples`.
 sys.path.insert(0, str(DOCS))
 
 import vehiclemor  # noqa: E402
@@ -19,10 +18,10 @@ logging.getLogger("vehiclemor").setLevel(logging.WARNING)
 project, release = "vehiclemor", vehiclemor.__version__
 author = "The vehiclemor developers"
 extensions = [
-    "mathml",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "sphinx_gallery.gen_gallery",
 ]
@@ -69,10 +68,7 @@ copybutton_prompt_text = "$ "
 templates_path = ["_templates"]
 html_show_sourcelink = False
 html_css_files = ["site.css"]
-# The font of equations is served from here, so that they look the same everywhere.
-FONTS = Path(find_spec("ziamath").origin).parent / "fonts"  # type: ignore[union-attr,arg-type]
-html_static_path = ["_static", str(FONTS / "STIXTwoMath-Regular.ttf")]
-html_math_renderer = "mathml"
+html_static_path = ["_static"]
 
 
 def unbroken(_: Sphinx, _name: str, source: list[str]) -> None:

@@ -61,8 +61,9 @@ def compare(name):
     reduced = vm.rom(name)
     full = vm.reduce(reduced.model, "full_order")
     start = vm.model(name, parameters={"initial_speed": SPEED}).start()
-    (expected, _), (found, known) = (drive(car, start) for car in (full, reduced))
-    return expected, found, known, [full.output_names.index(name) for name in SEEN]
+    expected, _ = drive(full, start)
+    predicted, known = drive(reduced, start)
+    return expected, predicted, known, [full.output_names.index(name) for name in SEEN]
 
 
 if __name__ == "__main__":
@@ -71,7 +72,8 @@ if __name__ == "__main__":
     off = 1e3 * np.abs(full[:samples, y] - reduced[:samples, y])
     print(f"sideways apart by at most {off.max():.1f} mm; trust indicator {known:.2f} of 1")
     figure, axes = plt.subplots(2, sharex=True, figsize=(6.7, 4.4))
-    axes[0].plot(full[:, x], [lane(place) for place in full[:, x]], ":", label="middle of the lane")
+    middle = [lane(distance) for distance in full[:, x]]
+    axes[0].plot(full[:, x], middle, ":", label="middle of the lane")
     axes[0].plot(full[:, x], full[:, y], label="full car")
     axes[0].plot(reduced[:, x], reduced[:, y], "--", label="reduced car")
     axes[0].set_ylabel("lateral position (m)")

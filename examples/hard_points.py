@@ -7,7 +7,7 @@ travel and leans by 0.35 rad for a metre of travel. SciPy searches; a path map r
 """
 
 # %%
-# The map is made anew for each design. It pays when one design is tried on many travels.
+# Each design needs a new map. It pays when one design is tried on many travels.
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import least_squares
@@ -39,8 +39,8 @@ def runs(change, method):
 
 def off(change, method="path_map"):
     wanted = np.array([0.0, 0.35])
-    found = [run.outputs - run.inputs[:, :1] * wanted for run in runs(change, method)]
-    return np.concatenate(found).T.ravel()
+    errors = [run.outputs - run.inputs[:, :1] * wanted for run in runs(change, method)]
+    return np.concatenate(errors).T.ravel()
 
 
 def slopes(change, method="path_map"):

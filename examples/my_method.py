@@ -56,9 +56,9 @@ def fit(model, training, settings):
     coordinates = np.concatenate([run.coordinates for run in training])
     largest = np.maximum(np.abs(inputs).max(axis=0), 1e-9)
     terms = polyvander2d(*(inputs / largest).T, [settings.degree] * 2)
-    found = np.linalg.lstsq(terms, coordinates, rcond=1e-9)[0]
+    coefficients = np.linalg.lstsq(terms, coordinates, rcond=1e-9)[0]
     cost = offline_cost(began, model, training)
-    return Polynomials(model, settings.degree, largest, found, cost)
+    return Polynomials(model, settings.degree, largest, coefficients, cost)
 
 
 METHOD = Method(

@@ -22,11 +22,11 @@ from vehiclemor.plugin import Declared, Maneuver, ModelDefinition, Quantity, Tap
 folder = Path(tempfile.mkdtemp())
 VALUES = {"m_s": (250, "kg"), "m_u": (45, "kg"), "k": (16e3, "N/m"), "c": (1e3, "N s/m")}
 VALUES["k_t"] = (160e3, "N/m")
-lines = ['model = "quarter_car"\ntitle = "a quarter of a car"\nsources.own.text = "assumed"']
-lines.append('sources.own.licence = "BSD-3-Clause"')
+lines = ['model = "quarter_car"\ntitle = "a quarter of a car"\nsources.assumption.text = "assumed"']
+lines.append('sources.assumption.licence = "BSD-3-Clause"')
 for name, (value, unit) in VALUES.items():
     lines.append(f'[parameters.{name}]\nsymbol = "{name}"\ndescription = "{name}"')
-    lines.append(f'value = {value}\nunit = "{unit}"\nsource = "own"\nstatus = "assumed"')
+    lines.append(f'value = {value}\nunit = "{unit}"\nsource = "assumption"\nstatus = "assumed"')
 (folder / "quarter_car.toml").write_text("\n".join(lines))
 
 

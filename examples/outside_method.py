@@ -41,11 +41,11 @@ def predict(folder, out, degree=3):
     largest = np.maximum(np.abs(known).max(axis=0), 1e-12)
     terms = products(known / largest, degree)
     fitted = np.linalg.lstsq(terms, histories(train, bounded), rcond=1e-9)[0]
-    found = products(new / largest, degree) @ fitted
+    predicted = products(new / largest, degree) @ fitted
     inside = (np.abs(new) <= largest).all(axis=1)
     ends = np.cumsum(test["row_size"].values)[:-1]
     trusted = [int(run.all()) for run in np.split(inside, ends)]
-    columns = {name: ("sample", column) for name, column in zip(bounded, found.T, strict=True)}
+    columns = {name: ("sample", column) for name, column in zip(bounded, predicted.T, strict=True)}
     same = {name: test.attrs[name] for name in ("model", "test_set_digest")}
     same["method"] = f"polynomials of degree {degree}"
     xr.Dataset({**columns, "trusted": ("run", trusted)}, attrs=same).to_netcdf(out)

@@ -48,17 +48,17 @@ def predicted(car, state, steering, steps):
 class Controller:
     def __init__(self, car, steps=1):
         self.car, self.steps, self.steering = car, steps, np.zeros(HORIZON)
-        self.place = [car.states.index(name) for name in ("X", "Y", "psi")]
+        self.pose = [car.states.index(name) for name in ("X", "Y", "psi")]
 
     def costs(self, state, before, steering):
         states, slopes = predicted(self.car, state, steering, self.steps)
-        place, moved = states[:, self.place], slopes[:, self.place]
-        off = (place[:, :2] - OBSTACLE) / CLEARANCE
+        pose, moved = states[:, self.pose], slopes[:, self.pose]
+        off = (pose[:, :2] - OBSTACLE) / CLEARANCE
         depth = np.maximum(1.0 - (off**2).sum(axis=1), 0.0)
         inwards = -2.0 * (depth > 0.0)[:, None] * off / CLEARANCE
         change = np.eye(HORIZON) - np.eye(HORIZON, k=-1)
         turned = change @ steering - before * np.eye(HORIZON)[0]
-        values = (ASIDE * place[:, 1], ASKEW * place[:, 2], INSIDE * depth, STEERED * steering)
+        values = (ASIDE * pose[:, 1], ASKEW * pose[:, 2], INSIDE * depth, STEERED * steering)
         derivatives = (
             ASIDE * moved[:, 1],
             ASKEW * moved[:, 2],
@@ -78,9 +78,9 @@ class Controller:
 
         guess = np.clip(np.append(self.steering[1:], self.steering[-1]), -0.099, 0.099)
         how = {"bounds": (-LIMIT, LIMIT), "ftol": 1e-4, "xtol": 1e-4, "max_nfev": 20}
-        found = least_squares(lambda u: both(u)[0], guess, lambda u: both(u)[1], **how)
-        self.steering = found.x
-        return found
+        solution = least_squares(lambda u: both(u)[0], guess, lambda u: both(u)[1], **how)
+        self.steering = solution.x
+        return solution
 
 
 # %%
@@ -89,9 +89,9 @@ def drive(controller, plant, duration=5.0):
     state, steering = plant.state(), np.zeros(1)
     names = ("longitudinal_position", "lateral_position", "yaw")
     seen = [plant.output_names.index(name) for name in names]
-    record = {"place": [], "steering": [], "evaluations": [], "ms": []}
+    record = {"path": [], "steering": [], "evaluations": [], "ms": []}
     for _ in range(round(duration / PERIOD)):
-        record["place"].append(plant.outputs(state, steering)[seen])
+        record["path"].append(plant.outputs(state, steering)[seen])
         measured = controller.car.state(plant.full_state(state, steering), steering)
         began = time.thread_time()
         plan = controller.plan(measured, steering.item())
@@ -103,8 +103,8 @@ def drive(controller, plant, duration=5.0):
     return {name: np.array(values) for name, values in record.items()}
 
 
-def clearance(places):
-    return float(np.linalg.norm((places[:, :2] - OBSTACLE) / CLEARANCE, axis=1).min())
+def clearance(path):
+    return float(np.linalg.norm((path[:, :2] - OBSTACLE) / CLEARANCE, axis=1).min())
 
 
 # %%
@@ -115,12 +115,12 @@ if __name__ == "__main__":
     print(f"{run['evaluations'].mean():.1f} predictions a plan")
     usual, longest = np.median(run["ms"]), run["ms"].max()
     print(f"{usual:.0f} ms a plan (median), {longest:.0f} at most, {1e3 * PERIOD:.0f} a period")
-    print(f"clearance {clearance(run['place']):.2f}, where 1 touches the ellipse")
+    print(f"clearance {clearance(run['path']):.2f}, where 1 touches the ellipse")
     figure, axes = plt.subplots(2, figsize=(6.7, 4.6))
     round_ = np.linspace(0.0, 2.0 * np.pi, 200)
     ellipse = OBSTACLE + CLEARANCE * np.column_stack([np.cos(round_), np.sin(round_)])
     axes[0].fill(*ellipse.T, color="0.85", label="keep out")
-    axes[0].plot(*run["place"].T[:2], label="full car")
+    axes[0].plot(*run["path"].T[:2], label="full car")
     axes[0].set(xlabel="longitudinal position (m)", ylabel="lateral position (m)")
     axes[0].legend()
     axes[1].step(PERIOD * np.arange(len(run["steering"])), 1e3 * run["steering"], where="post")

@@ -21,15 +21,15 @@ steering = 0.008 * onset * np.sin(rate * t + phase).sum(axis=1)
 # Each run equals a single ``simulate`` to the bit. Choose the outputs that you need.
 car = vm.rom("independent_suspension_vehicle")
 signals = vm.many_signals(t, steering, hold="cubic")
-found = vm.simulate_many(car, signals, outputs=["lateral_position", "yaw_rate"])
-print(f"{found.sizes['run']} runs, {found.seconds.sum().item():.2f} s in compiled loops")
+runs = vm.simulate_many(car, signals, outputs=["lateral_position", "yaw_rate"])
+print(f"{runs.sizes['run']} runs, {runs.seconds.sum().item():.2f} s in compiled loops")
 
 # %%
 # Where is the car after ten seconds, and how hard was it driven? A run that leaves the training of
 # the reduced model has the status ``untrusted``.
-ends = found["values"].sel(output="lateral_position").isel(time=-1)
-hardest = abs(found["values"].sel(output="yaw_rate")).max("time")
-trusted = found.status == "ok"
+ends = runs["values"].sel(output="lateral_position").isel(time=-1)
+hardest = abs(runs["values"].sel(output="yaw_rate")).max("time")
+trusted = runs.status == "ok"
 figure, axis = plt.subplots(figsize=(6.7, 3.6))
 for chosen, label in ((trusted, "ok"), (~trusted, "untrusted")):
     axis.scatter(hardest[chosen], ends[chosen], s=6, label=f"{label}: {int(chosen.sum())} runs")

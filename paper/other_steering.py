@@ -39,7 +39,7 @@ SEARCHED = (
     [0.0, 0.13, 3.07, 4.71, 5.87, 6.53, 7.13, 7.55, 8.49],
     [0.0, 0.017, -0.0002, 0.0309, -0.0034, -0.0105, -0.0009, -0.0169, 0.032],
 )
-COUNTS = "runs", "missed", "undetected", "warned", "warned and right"
+COUNTS = "runs", "missed", "undetected", "warned and right"
 DURATIONS = {"long": (5.0, 10.0, 20.0, 25.0, 40.0), "short": (5.0, 10.0), "start": (5.0, 10.0)}
 Signal = Callable[[np.ndarray], np.ndarray]
 
@@ -124,7 +124,6 @@ def counted(name: str, count: int, seed: int) -> Iterator[tuple[str, float]]:
     nominal, rng = component("maneuver", model.definition.maneuver), np.random.default_rng(seed)
     for kind, durations in DURATIONS.items():
         counts: Counter[str] = Counter(dict.fromkeys(COUNTS, 0))
-        worst = 0.0
         for _ in range(count):
             duration = float(rng.choice(durations))
             family, signal = steering(rng, duration)
@@ -143,16 +142,12 @@ def counted(name: str, count: int, seed: int) -> Iterator[tuple[str, float]]:
             counts["runs"] += 1
             counts["missed"] += score > 1.0
             counts["undetected"] += score > 1.0 and trusted
-            counts["warned"] += not trusted
             counts["warned and right"] += score <= 1.0 and not trusted
-            worst = max(worst, score if trusted else 0.0)
         yield from ((f"{name} {kind} {what}, 1", counts[what]) for what in COUNTS)
-        yield f"{name} {kind} worst score without a warning, 1", worst
     if name == "independent_suspension_vehicle":
         searched = vm.Signal.from_samples(*SEARCHED, "cubic")
-        score, trusted = score_of(protocol, vm.rom(name), searched, "equilibrium")
+        score, _ = score_of(protocol, vm.rom(name), searched, "equilibrium")
         yield "searched score, 1", score
-        yield "searched trusted, 1", trusted
 
 
 def main() -> None:

@@ -45,17 +45,36 @@ def figure_schematic(*, name: str) -> Figure:
         axis.set_title(title)
     space.set_aspect("equal")
     plane = _plane(*drawing["view"])
-    states = [
-        ({key: np.array(place) for key, place in state["points"].items()}, state["alpha"])
-        for state in drawing["states"]
-    ]
-    for points, alpha in states:
-        _draw_bodies(space, drawing, points, plane, alpha)
-    _draw_outline(space, drawing, states[0][0], plane)
+    points = _points(drawing)
+    for state in drawing["states"]:
+        _draw_bodies(space, drawing, _moved(points, state), plane, state["alpha"])
+    _draw_outline(space, drawing, points, plane)
     _draw_graph(graph, drawing)
     legend = dict(zip(*reversed(space.get_legend_handles_labels()), strict=True))
     figure.legend(legend.values(), legend, loc="outside lower center", ncols=4)
     return figure
+
+
+def _points(drawing: Drawing) -> Points:
+    """Hard points of a drawing's model, and those that it declares."""
+    points: Points = {}
+    if name := drawing.get("model"):
+        values = load_parameters(name, component("model", name).parameters).values()
+        for point, value in values.items():
+            if np.shape(value) == (3,):
+                origin = drawing["rear" if point.startswith("rear_") else "front"]
+                points[point] = np.add(origin, value)
+    return points | {point: np.array(value) for point, value in drawing["points"].items()}
+
+
+def _moved(points: Points, state: Drawing) -> Points:
+    """Points of one state; `schematics.toml` says what is mirrored."""
+    moved = points | {name: np.array(value) for name, value in state.get("points", {}).items()}
+    if state.get("mirrored"):
+        for name, point in moved.items():
+            if np.shape(point) == (3,) and " " not in name:
+                moved[name] = point * [1.0, -1.0, 1.0]
+    return moved
 
 
 def figure_truck() -> Figure:

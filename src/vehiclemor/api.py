@@ -101,7 +101,7 @@ def model(
     parameters
         Parameter name -> value in SI units that replaces the file's.
     parameter_file
-        Parameter file; the model's own public data by default.
+        Parameter file; the model's public data by default.
 
     Raises
     ------
@@ -127,13 +127,13 @@ def reduce(
     Parameters
     ----------
     model
-        Registered name, or a model made by `model()`.
+        Registered name, or a model of `model()`.
     method
         Registered name, see `methods()`; `full_order` gives the full model with the same names.
     training
-        `nominal`: the model's own maneuver from its first start.  `protocol`: the training set of
-        the model's own protocol, which is the default of the methods that compete there.  Or the
-        name of a maneuver, a maneuver, a signal, a scenario, or a list of these.
+        `nominal`: the model's maneuver from its first start.  `protocol`: the training set of the
+        model's protocol, the default of the methods that compete there.  Or the name of a maneuver,
+        a maneuver, a signal, a scenario, or a list of these.
     preset, **settings
         Of the method; see `describe()`.
 
@@ -183,29 +183,29 @@ def simulate(
 ) -> xr.Dataset:
     """Simulate a model with a method and measure its errors against the full-order solution.
 
-    Models that are built by name, the last fits and the last full-order solutions are kept, and
-    used again while what they depend on is the same.
+    Models by name, the last fits and the last full-order solutions are cached, and used again
+    while nothing that they depend on changes.
 
     Parameters
     ----------
     model
-        Registered name, or a model made by `model()`.
+        Registered name, or a model of `model()`.
     method
         Registered name, see `methods()`.
     maneuver
-        Registered name, maneuver or signal; the model's own by default.
+        Registered name, maneuver or signal; the model's maneuver by default.
     start
         Initial condition, by name or as a state (n,); the model's first by default.
     frequency, amplitude
-        Factors on the maneuver, beside its own.
+        Factors on the maneuver, times those that it has.
     preset
         `recommended`, or another preset of the method, such as `literal` (the paper's words).
     training
-        What is learnt from: `matched` (the very run that is simulated), `nominal` (the model's own
-        maneuver), the name of a maneuver, a maneuver, a signal or a scenario; `protocol` (the
-        training of the model's protocol), `set`; or a list of these.
+        Training runs: `matched` (the very run that is simulated), `nominal` (the model's maneuver),
+        the name of a maneuver, a maneuver, a signal or a scenario; `protocol` (the training of the
+        model's protocol), `set`; or a list of these.
     training_set
-        (frequency, amplitude) factors of `set`, with which the maneuver is learnt from.
+        (frequency, amplitude) factors on the maneuver, of `set`.
     rtol
         Tolerance of the solver; for a kinematic model the largest step of the last iteration.
     errors
@@ -223,7 +223,7 @@ def simulate(
     VehiclemorError
         If the input is wrong or can't be reached.  A model that diverges is a result.
     """
-    import vehiclemor.report.result_selection  # noqa: F401  (results draw themselves)
+    import vehiclemor.report.result_accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
@@ -253,7 +253,7 @@ def _scenario(
     start: Start | None,
     factors: tuple[float, float],
 ) -> Scenario:
-    """What is simulated, checked."""
+    """The run to simulate, checked."""
     from vehiclemor.inputs.checks import checked_maneuver
     from vehiclemor.inputs.excitation import FACTORS, checked_factor
     from vehiclemor.study.scenario import Scenario, check
@@ -261,10 +261,10 @@ def _scenario(
     chosen = model.definition.maneuver if maneuver is None else maneuver
     base = checked_maneuver(chosen, model.definition)
     start = model.starts[0] if start is None else start
-    own = start if isinstance(start, str) else tuple(model.start(start).tolist())
+    begin = start if isinstance(start, str) else tuple(model.start(start).tolist())
     pairs = zip(FACTORS, factors, strict=True)
     scaled = [checked_factor(name, f) * getattr(base, f"{name}_factor") for name, f in pairs]
-    scenario = Scenario(base.perturbed(*scaled), own)
+    scenario = Scenario(base.perturbed(*scaled), begin)
     check(model, scenario)
     return scenario
 
@@ -310,10 +310,10 @@ def run_study(
     -------
     xarray.Dataset
         Combined dataset on the dimensions of the study's grid.  For a collection, one row for each
-        run of its studies on the dimension `cell`, without histories; the studies' own datasets
+        run of its studies on the dimension `cell`, without histories; the datasets of the studies
         are in the folder `studies`.
     """
-    import vehiclemor.report.result_selection  # noqa: F401  (results draw themselves)
+    import vehiclemor.report.result_accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.progress import listening
     from vehiclemor.study.plans.results import flattened
     from vehiclemor.study.run import run_studies
@@ -324,8 +324,8 @@ def run_study(
         raise InputError(f"scheduler is {quoted(scheduler)}, not an address")
     with listening(progress):
         study, folder = str(file_path("study", study)), file_path("results", results)
-        found = run_studies(study, folder, jobs, scheduler, seed)
-    return next(iter(found.values())) if len(found) == 1 else flattened(found)
+        datasets = run_studies(study, folder, jobs, scheduler, seed)
+    return next(iter(datasets.values())) if len(datasets) == 1 else flattened(datasets)
 
 
 def status(
@@ -382,7 +382,8 @@ def plot(
     """
     import xarray as xr
 
-    from vehiclemor.report.result_selection import ResultAccessor, dataset_of, stored_result
+    from vehiclemor.report.result_accessor import ResultAccessor
+    from vehiclemor.report.result_selection import dataset_of, stored_result
     from vehiclemor.simulation.trajectory import Trajectory
 
     if isinstance(result, str | Path):

@@ -1,4 +1,4 @@
-"""What users hand in, checked where it comes in: numbers, counts, arrays, folders."""
+"""Checks of arguments: numbers, counts, arrays, folders."""
 
 import math
 import os
@@ -63,9 +63,9 @@ def within(name: str, value: float, bounds: tuple[float, float], unit: str = "")
 
 
 def count(name: str, value: object, least: int = 1, most: int | None = None) -> int:
-    """A whole number within bounds, or `InputError`."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)
-    if not whole or int(value) < least or (most and int(value) > most):  # type: ignore[arg-type]
+    """An integer within bounds, or `InputError`."""
+    integer = isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)
+    if not integer or int(value) < least or (most and int(value) > most):  # type: ignore[arg-type]
         bounds = f"at least {least}" + (f", at most {most}" if most else "")
         raise InputError(f"{name} is {quoted(value)}; it must be a whole number, {bounds}")
     return int(value)  # type: ignore[arg-type]
@@ -82,7 +82,7 @@ def file_path(name: str, value: object) -> Path:
     """Path of a file or folder; `InputError` if it is none, or an empty one."""
     try:
         text = os.fspath(value)  # type: ignore[call-overload]
-        # Results name the files that they are made from, in UTF-8 and in one line.
+        # Results name their source files, in UTF-8 and in one line.
         if not (isinstance(text, str) and text.encode()) or min(text) < " ":
             raise TypeError
         path = Path(text)

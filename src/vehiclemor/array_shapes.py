@@ -22,7 +22,7 @@ def check_shapes(what: str, *arrays: Sequence[Any]) -> None:
 
 
 def check_indices(what: str, indices: Sequence[Any], size: int) -> None:
-    """Require whole numbers from zero to below a size."""
+    """Require integers from zero to below a size."""
     require(all(type(index) is int and 0 <= index < size for index in indices), what)
 
 

@@ -1,6 +1,6 @@
 """Contract tests that every registered model and method must pass, plug-ins included.
 
-Each function raises `AssertionError` with what is broken.  Call them from a test of your own.
+Each function raises `AssertionError` with what is broken.  Call them from your tests.
 """
 
 from __future__ import annotations
@@ -108,13 +108,13 @@ def _check_structural(model: StructuralModel, maneuver: Excitation) -> None:
     # Near the static state, and where no force has a kink at rest.
     w, rates, u = 1e-3 * np.cos(np.arange(p)), 0.1 + 0.01 * np.arange(p), trajectory.inputs[-1]
     steps = {1: (1e-7, 0.0), 2: (0.0, 1e-7)}
-    found = law.at(w, rates, u)
+    forces = law.at(w, rates, u)
     for column, (moved, quicker) in steps.items():
         for port in np.eye(p):
             ends = [law.at(w + s * moved * port, rates + s * quicker * port, u) for s in (1, -1)]
             difference = (ends[0][:, 0] - ends[1][:, 0]) / 2e-7
-            error = np.abs(difference - found[:, column] * port).max()
-            bound = 1e-5 * max(1.0, np.abs(found[:, column]).max())
+            error = np.abs(difference - forces[:, column] * port).max()
+            bound = 1e-5 * max(1.0, np.abs(forces[:, column]).max())
             assert error < bound, f"{name}: a derivative of port forces is off by {error:.1e}"
 
 

@@ -48,7 +48,7 @@ class FileError(VehiclemorError):
 
 
 class CorruptError(FileError):
-    """A stored result is damaged, or not the one that belongs there: never read, made again.
+    """A stored result is damaged, or another than expected: it is computed again.
 
     Attributes
     ----------
@@ -119,15 +119,15 @@ def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
     package = of.partition(".")[0]
     if isinstance(error, KeyboardInterrupt) and not _is_raised(error, package):
         raise error
-    places = [
+    lines = [
         f" ({frame.f_code.co_filename}:{line})"
         for frame, line in walk_tb(error.__traceback__)
         if frame.f_globals.get("__name__", "").partition(".")[0] == package
     ]
-    place = places[-1] if places else ""
+    where = lines[-1] if lines else ""
     if reason := machine_reason(error):
-        return MachineError(f"{whose}: {reason}{place}")
-    return PlugInError(f"{whose}: {one_line(error)}{place}")
+        return MachineError(f"{whose}: {reason}{where}")
+    return PlugInError(f"{whose}: {one_line(error)}{where}")
 
 
 def _is_raised(error: BaseException, package: str) -> bool:
@@ -138,9 +138,9 @@ def _is_raised(error: BaseException, package: str) -> bool:
 
 
 class blamed:  # noqa: N801
-    """Turn what the code of a plug-in raises into one line that names it, see `blame`.
+    """Turn errors of a plug-in's code into one line that names it, see `blame`.
 
-    What is an error of this package already passes.
+    Errors of this package pass.
     """
 
     def __init__(self, whose: str, code: Any) -> None:

@@ -55,14 +55,14 @@ def attempt(run: Callable[[], Result], whose: str = "") -> Result | Failure:
 
 
 def attempt_apart(name: str, failed: dict[str, str], run: Callable[[], Result]) -> list[Result]:
-    """What a call gives; nothing, and why in `failed`, if it fails, its own files included."""
+    """The result of a call; none if it or a file of it fails, with the reason in `failed`."""
     try:
-        found = attempt(run)
+        result = attempt(run)
     except MachineError:
         raise
     except VehiclemorError as error:
-        found = Failure("error", str(error))
-    if isinstance(found, Failure):
-        failed[name] = found.message
+        result = Failure("error", str(error))
+    if isinstance(result, Failure):
+        failed[name] = result.message
         return []
-    return [found]
+    return [result]

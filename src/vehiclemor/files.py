@@ -18,7 +18,7 @@ NO_FILE = "it is a folder, pipe or device, not a file"
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it; `FileError` if it is a file, or can't be made."""
+    """Create a folder and those above it; `FileError` if it is a file, or that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
@@ -72,7 +72,7 @@ def replaceable(path: Path, kind: str, is_kind: Callable[[Path], bool]) -> Path:
 
 
 def not_written(path: Path, error: Exception) -> FileError | MachineError:
-    """The error that tells why a path can't be written."""
+    """The error that says why a path can't be written."""
     machine = machine_reason(error)
     reason = machine or getattr(error, "strerror", None) or error
     return (MachineError if machine else FileError)(f"{path}: can't be written ({reason})")
@@ -86,13 +86,13 @@ def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None
     like, `MachineError` if the disk fails.
     """
     replaceable(path, "file or folder", Path.exists)
-    whole = path.absolute()
-    temporary = temporary_path((folder or whole.parent) / whole.name)
+    target = path.absolute()
+    temporary = temporary_path((folder or target.parent) / target.name)
     old = temporary.with_name(f"{temporary.name}.old")
     try:
         write(temporary)
-        if whole.is_dir():
-            # Nothing moves onto a folder: the old one is kept until the new one is there.
+        if target.is_dir():
+            # Nothing moves onto a folder: the old one stays aside until the new one is there.
             os.replace(path, old)
         os.replace(temporary, path)
         shutil.rmtree(old, ignore_errors=True)
@@ -108,7 +108,7 @@ def write_whole(path: Path, write: Callable[[Path], object], folder: Path | None
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a text file whole; its folder is made."""
+    """Write a text file at once; its folder is created."""
     make_folder(path.parent)
     return write_whole(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 

@@ -1,4 +1,4 @@
-"""Datasets as whole netCDF-4 files: combined results, single runs, saved models.
+"""Datasets as netCDF-4 files: combined results, single runs, saved models.
 
 Each ends with the hash of its bytes, which is checked before the library reads them: of damaged
 ones it may never come back.  Anybody can write such a hash, so what is neither data of the package,
@@ -45,7 +45,7 @@ _KNOWN: set[bytes] = set()
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Write a dataset as a whole file."""
+    """Write a dataset to a file, which replaces an older one when it is complete."""
     import netCDF4
     from xarray.backends import NetCDF4DataStore
 
@@ -88,7 +88,7 @@ def read_dataset(path: Path, attribute: str, expected: str, stored: bool = False
 
 
 def global_attributes(path: Path, stored: bool = False) -> dict[str, Any]:
-    """Attributes of a file of this package that is whole; of no other."""
+    """Attributes of an undamaged file of this package; empty of any other."""
     with suppress(FileError), opened(path, "result file", "", stored) as file:
         if INTEGRITY in file.groups:
             return {name: file.getncattr(name) for name in file.ncattrs()}
@@ -143,10 +143,10 @@ def opened(
 
 def _sealed(path: Path) -> bytes:
     """The hash that a file ends with, if it does; `ValueError` if it is not that of its bytes."""
-    whole, seal, digest = read_regular(path, MOST_BYTES).rpartition(SEAL)
+    content, seal, digest = read_regular(path, MOST_BYTES).rpartition(SEAL)
     if not seal or len(digest) != len(_digest(b"")):
         return b""
-    if digest != _digest(whole):
+    if digest != _digest(content):
         raise ValueError("what it holds is not what was written")
     return digest
 

@@ -50,7 +50,7 @@ def point() -> Declared:
 class Source(FileSchema):
     """Where values come from, and under which licence they are used."""
 
-    text: str = Field(description="the publication or file, so that it can be found")
+    text: str = Field(description="the publication or file, so that readers can get it")
     licence: str = Field(description="under which its values are used")
 
 
@@ -98,7 +98,7 @@ class ParameterSet(ShortRepr):
 
 
 def parameter_path(model: str) -> Path:
-    """File with the package's own public data for a model."""
+    """File with the public data for a model."""
     return data_folder() / "parameters" / f"{model}.toml"
 
 
@@ -108,7 +108,7 @@ def load_parameters(
     path: Path | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> ParameterSet:
-    """Load and validate the parameters of a model, by default its own public data.
+    """Load and validate the parameters of a model, by default its public data.
 
     `expected` are declarations by name; overrides are values in SI units by name, where `name.z` is
     one component of a point.  `FileError` if the file is unreadable, for another model, incomplete,
@@ -168,17 +168,17 @@ def parameter_and_axis(
 
     `InputError` if the model has no such parameter.
     """
-    whole, _, axis = str(name).partition(".")
-    declared = expected.get(name, expected.get(whole))
+    point, _, axis = str(name).partition(".")
+    declared = expected.get(name, expected.get(point))
     if declared is None:
-        hint = did_you_mean(whole, expected) or f"it has {', '.join(expected)}"
-    elif name == whole:
+        hint = did_you_mean(point, expected) or f"it has {', '.join(expected)}"
+    elif name == point:
         return name, None
     elif declared.size == len(AXES) and axis in AXES:
-        return whole, AXES.index(axis)
+        return point, AXES.index(axis)
     else:
         has = "is a number" if declared.size == 1 else f"has the components {', '.join(AXES)}"
-        hint = f"{whole} {has}"
+        hint = f"{point} {has}"
     raise InputError(f"{quoted(name)} is not a parameter of {model}; {hint}")
 
 

@@ -82,5 +82,5 @@ def code_digest(model: str, method: str) -> str:
 
 @cache
 def layout_digest() -> str:
-    """Hash of the source that combines runs: a dataset laid out by other source is made again."""
+    """Hash of the source that combines runs: after a change datasets are combined again."""
     return source_digest((), ("study/plans/results.py", "study/result.py"))

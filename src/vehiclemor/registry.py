@@ -48,9 +48,9 @@ def component(kind: str, name: str) -> Any:
         raise blame(f"{where} can't be imported", entries[name].module, error) from error
     wanted = _class(kind)
     if not isinstance(loaded, wanted):
-        found = type(loaded).__name__
-        raise PlugInError(f"{where} is of type {found}: it must be a {wanted.__name__}")
-    # Models are built again by their own names.
+        class_name = type(loaded).__name__
+        raise PlugInError(f"{where} is of type {class_name}: it must be a {wanted.__name__}")
+    # Models are built again by name.
     if kind == "model" and loaded.name != name:
         raise PlugInError(f"{where} names itself {quoted(loaded.name)}: it must be the same name")
     return loaded
@@ -64,11 +64,11 @@ def _member(kind: str, base: str, number: str) -> Any:
         raise InputError(f"unknown {kind} {quoted(name)}; {base} is no family: it has no members")
     where = f"{kind} {name!r} ({_entries(kind)[base].value})"
     with blamed(where, make):
-        found = make(int(number))
+        member = make(int(number))
     wanted = _class(kind)
-    if not isinstance(found, wanted) or getattr(found, "name", "") != name:
-        raise PlugInError(f"{where} is {quoted(found)}: it must be a {wanted.__name__} {name!r}")
-    return found
+    if not isinstance(member, wanted) or getattr(member, "name", "") != name:
+        raise PlugInError(f"{where} is {quoted(member)}: it must be a {wanted.__name__} {name!r}")
+    return member
 
 
 def choice(kind: str, name: Any, known: Collection[str]) -> str:
@@ -93,7 +93,7 @@ def _class(kind: str) -> type:
 @cache
 def _entries(kind: str) -> dict[str, EntryPoint]:
     choice("kind of component", kind, GROUPS)
-    found = entry_points(group=GROUPS[kind])
+    entries = entry_points(group=GROUPS[kind])
     # Built-ins come last: no plug-in takes the name of one away.
-    ordered = sorted(found, key=lambda entry: entry.value.startswith("vehiclemor."))
+    ordered = sorted(entries, key=lambda entry: entry.value.startswith("vehiclemor."))
     return {entry.name: entry for entry in ordered}

@@ -16,18 +16,18 @@ def shortened(text: str) -> str:
 
 
 class ShortRepr:
-    """Base of dataclasses that hold arrays, functions or whole models."""
+    """Base of dataclasses that hold arrays, functions or models."""
 
     # Attributes that are shown; all fields by default.
     repr_fields: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        # A dataclass makes its own where a class has none in itself.
+        # A dataclass writes one where a class does not define it itself.
         cls.__repr__ = ShortRepr.__repr__
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy takes along: not what is kept for runs, which points into memory."""
+        """Fields alone: cached results of runs have addresses, which a copy must not share."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # type: ignore[arg-type]
 
     def __repr__(self) -> str:

@@ -7,15 +7,15 @@ import pytest
 
 from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.report import criteria
-from vehiclemor.report.comparison import of_published_start
-from vehiclemor.report.criteria import ANGLE, CRITERIA, DISPLACEMENT, OF_SUBSPACES
-from vehiclemor.report.findings import VISIBLE
+from vehiclemor.report.comparison import at_published_start
+from vehiclemor.report.criteria import ANGLE, DISPLACEMENT, OF_SUBSPACES
+from vehiclemor.report.findings import CRITERIA, VISIBLE
 from vehiclemor.report.published import load_published
 
 
 @pytest.fixture(scope="module")
 def judged(results):
-    return {name: of_published_start(dataset) for name, dataset in results.items()}
+    return {name: at_published_start(dataset) for name, dataset in results.items()}
 
 
 def changed(results, study, change):
@@ -128,6 +128,10 @@ COUNTEREXAMPLES = {
 }
 
 
+# Their counterexamples stand in test_compare.
+OF_TIMES = {"dw_fig14_six_slower_than_three", "all_close_agreement_less_time"}
+
+
 @pytest.mark.parametrize("claim", COUNTEREXAMPLES)
 def test_a_criterion_fails_on_a_counterexample(judged, claim):
     study, changes = COUNTEREXAMPLES[claim]
@@ -138,8 +142,8 @@ def test_a_criterion_fails_on_a_counterexample(judged, claim):
 
 
 def test_every_criterion_has_a_counterexample_and_a_claim():
-    of_subspaces = {claim for claim, own in CRITERIA.items() if own.variants == OF_SUBSPACES}
-    assert set(COUNTEREXAMPLES) | of_subspaces == set(CRITERIA)
+    of_subspaces = {claim for claim, each in CRITERIA.items() if each.variants == OF_SUBSPACES}
+    assert set(COUNTEREXAMPLES) | of_subspaces | OF_TIMES == set(CRITERIA)
     assert set(CRITERIA) <= set(load_published().claims)
 
 

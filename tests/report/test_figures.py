@@ -11,10 +11,9 @@ from matplotlib.image import imread
 
 from tests.report.figure_texts import checked, texts_of, varied
 from vehiclemor.exceptions import InputError
-from vehiclemor.report.figures.catalogue import find
 from vehiclemor.report.figures.costs import figure_pareto, figure_size
 from vehiclemor.report.figures.errors import figure_errors
-from vehiclemor.report.figures.result_plot import shown_outputs
+from vehiclemor.report.figures.result_plot import draw, pictures_of, shown_outputs
 from vehiclemor.report.figures.theme import panels, save_figure, styled
 from vehiclemor.report.sizes import size_rows
 from vehiclemor.study.run import run_studies
@@ -85,11 +84,12 @@ def test_a_reduced_model_is_set_beside_the_cheapest_mesh_that_is_as_accurate():
 
 
 @pytest.fixture(scope="session")
-def drawn(results, results_folder, unseen_travels):
+def drawn(results, unseen_travels):
     """Every figure of the paper's studies, and one of each other kind, drawn."""
     with styled():
-        every = find("paper", results_folder)
-        figures = {entry.name: entry.draw(results[entry.result]) for entry in every}
+        figures = {}
+        for study, dataset in results.items():
+            figures |= {f"{study}-{kind}": draw(dataset, kind) for kind in pictures_of(dataset)}
         figures["map"] = figure_errors(grid_of("pod", "replay"), outputs=OUTPUTS)
         figures["pareto"] = figure_pareto(unseen_travels)
         figures["size"] = figure_size(sized())

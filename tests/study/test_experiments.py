@@ -45,7 +45,7 @@ def of_runs(model, method, training, tests, **settings):
 def _nothing_kept():
     """What an earlier test has fitted or solved is not used again."""
     evaluation.cached_reference.cache_clear()
-    evaluation._KEPT.clear()
+    evaluation._FITS.clear()
 
 
 @pytest.fixture(scope="module")
@@ -214,6 +214,10 @@ def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
     found = [cached_fit(vehicle, wanted).status for _ in range(4)]
     assert found == ["error", "error", "diverged", "diverged"]
     assert len(raised) == 3
+
+
+def test_a_fit_for_a_model_of_another_kind_is_a_failure(vehicle):
+    assert isinstance(cached_fit(vehicle, experiment(vehicle, "path_map")), Failure)
 
 
 MODELS = {

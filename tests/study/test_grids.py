@@ -8,7 +8,7 @@ from tests.study.small import small_study
 from vehiclemor.study.plans.grid import expand, sampled
 from vehiclemor.study.plans.loading import load_studies, read_study, write_study
 from vehiclemor.study.plans.results import flattened
-from vehiclemor.study.plans.study_file import study_from
+from vehiclemor.study.plans.study_file import GridFile
 from vehiclemor.study.plans.study_runs import Sampling
 from vehiclemor.study.run import run_studies
 
@@ -18,7 +18,7 @@ CAR, WISHBONE = "independent_suspension_vehicle", "double_wishbone"
 def grid_of(**given):
     """A grid of a study with these entries."""
     study = {"title": "t", "model": WISHBONE, "keep": "metrics", "methods": [{"method": "pod"}]}
-    return expand("mine", study_from(study | given))
+    return expand("mine", GridFile.model_validate(study | given))
 
 
 def test_a_method_that_a_setting_does_not_concern_is_computed_once():

@@ -108,7 +108,7 @@ def test_nothing_of_the_test_set_is_simulated_before_the_choice(
     seen, trained, simulate = [], [], AlgebraicModel.simulate
     # What an earlier test has solved or fitted would not be again.
     evaluate.cached_reference.cache_clear()
-    evaluate._KEPT.clear()
+    evaluate._FITS.clear()
 
     def recorded(self, maneuver, *arguments, **named):
         seen.append(maneuver.at(TIMES).tobytes() in inputs)

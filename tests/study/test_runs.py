@@ -52,9 +52,9 @@ SMALL = 'keep = "metrics"\ngrid = { rank = [2, 3] }\n'
 
 @pytest.fixture(autouse=True)
 def _nothing_kept():
-    evaluate._KEPT.clear()
+    evaluate._FITS.clear()
     yield
-    evaluate._KEPT.clear()
+    evaluate._FITS.clear()
 
 
 @pytest.fixture(scope="module")

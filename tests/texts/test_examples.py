@@ -78,16 +78,16 @@ def test_the_car_goes_around_the_obstacle_and_comes_back(control, reduced):
     full = vm.reduce(reduced.model, "full_order")
     runs = [control.drive(control.Controller(reduced), car, 3.6) for car in (full, reduced)]
     for run in runs:
-        assert control.clearance(run["place"]) > 0.98
+        assert control.clearance(run["path"]) > 0.98
         assert np.abs(run["steering"]).max() < control.LIMIT
         # Begun with the plan before, a few predictions do.
         assert run["evaluations"].mean() < 6.0
-        x, y, yaw = run["place"].T
+        x, y, yaw = run["path"].T
         assert x[-1] > control.OBSTACLE[0] + 2.0 * control.CLEARANCE[0]
         assert abs(y[-1]) < 1.0
         assert abs(yaw[-1]) < 0.1
     # Straight on, the car would hit it.
-    assert control.clearance(runs[0]["place"] * [1.0, 0.0, 0.0]) < 0.2
+    assert control.clearance(runs[0]["path"] * [1.0, 0.0, 0.0]) < 0.2
     # The loop is closed over the full car, whose state the reduced one begins with.
-    apart = np.abs(runs[0]["place"] - runs[1]["place"]).max(axis=0)
+    apart = np.abs(runs[0]["path"] - runs[1]["path"]).max(axis=0)
     assert (apart < [0.02, 0.02, 2e-3]).all()

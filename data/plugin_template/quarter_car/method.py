@@ -58,7 +58,7 @@ def fit(model, training, settings):
     a, b = model.jacobian(x, none), model.jacobian(x, none, "inputs")
     rate = model.rhs(x, none)
     spaces = (schur(m, sort=lambda re, im: np.hypot(re, im) <= settings.fastest) for m in (a, a.T))
-    right, left = (vectors[:, :kept] for _, vectors, kept in spaces)
+    right, left = (vectors[:, :number] for _, vectors, number in spaces)
     left = np.linalg.solve(left.T @ right, left.T)
     # A column of a Jacobian costs about one evaluation.
     cost = offline_cost(began, model, further=1 + len(x) + len(none))

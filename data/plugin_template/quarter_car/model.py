@@ -42,7 +42,7 @@ def derive():
         "outputs": ([body, z_u - z_s, tire], (3,)),
         # M and F of M q'' = F, side by side.
         "second_order": ([m_s, 0, strut, 0, m_u, tire - strut], (2, 3)),
-        # Speeds, where x holds the rates of the coordinates in their place.
+        # Speeds, where x holds the rates of the coordinates instead.
         "speeds": ([v_s, v_u], (2,)),
     }
     return assemble(tape, {"x": x, "u": u}, p, functions)

@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class _StopError(KeyboardInterrupt):
-    """A signal, with its number: a class of its own, since Python ends otherwise after Ctrl-C."""
+    """A signal, with its number; after a plain `KeyboardInterrupt` Python would end by SIGINT."""
 
 
 def ended(run: Callable[[], int | None]) -> int:

@@ -1,8 +1,9 @@
-"""What is registered, what a name declares, and a package of your own to begin with."""
+"""Registered names, their declarations, citations, and a template of a plug-in."""
 
 import json
 import os
 import re
+from collections.abc import Iterable
 from importlib.util import find_spec
 from keyword import iskeyword
 from pathlib import Path
@@ -35,12 +36,12 @@ def list_components(
     what
         One kind; all by default.
     """
-    found = {kind: getattr(api, kind)() for kind in KINDS if what in (None, kind)}
+    listed = {kind: getattr(api, kind)() for kind in KINDS if what in (None, kind)}
     if json_output:
-        print(json.dumps(found if what is None else found[what], indent=2))
+        print(json.dumps(listed if what is None else listed[what], indent=2))
         return
     # A table of rich would take a tenth of the time of this command.
-    for kind, entries in found.items():
+    for kind, entries in listed.items():
         print(f"{kind}:")
         column = min(max(map(len, entries)), LONGEST)
         for name, summary in entries.items():
@@ -65,7 +66,7 @@ def show(
         A model, method, maneuver or study, a study's TOML file, or study-schema,
         parameter-schema: the keys of such a file.
     every
-        Print long tables of a model as a whole, not only their first rows.
+        Print all rows of long tables of a model, not only the first ones.
     """
     described = api.describe(name, key_values("--parameter", parameter), parameter_file)
     if json_output:
@@ -90,24 +91,29 @@ def _print(key: str, content: Any, few: bool, indent: str = "") -> int:
     shown = content[:FEW] if few and len(content) > SOME else content
     cut = len(content) - len(shown)
     for heading, rows in _by_source(key, shown).items():
-        columns = [name for name in rows[0] if any(r[name] not in ("", None, [], {}) for r in rows)]
+        columns = [name for name in rows[0] if not _empty(row[name] for row in rows)]
         more = f" ({len(shown)} of {len(content)})" if cut else ""
         print(f"\n{wrapped(f'{heading}{more}:', 0, 2)}\n{Table(rows, columns, explain=False)}")
     return cut
 
 
+def _empty(column: Iterable[Any]) -> bool:
+    return all(value in ("", None, [], {}) for value in column)
+
+
 def _by_source(key: str, rows: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
-    """Heading -> rows: those that have a source stand together, since columns would not fit."""
-    found: dict[str, list[dict[str, Any]]] = {}
+    """Heading -> rows: a source stands in the heading of its rows, since columns would not fit."""
+    by_heading: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
-        rest = {name: value for name, value in row.items() if name not in ("status", "source")}
-        heading = f"{key}, {row['status']} ({row['source']})" if "status" in row else key
-        found.setdefault(heading, []).append(rest if "status" in row else row)
-    return found
+        heading, columns = key, dict(row)
+        if "status" in row:
+            heading = f"{key}, {columns.pop('status')} ({columns.pop('source')})"
+        by_heading.setdefault(heading, []).append(columns)
+    return by_heading
 
 
 def cite() -> None:
-    """Print how to cite this suite, the paper, and the methods with a reference of their own."""
+    """Print how to cite this suite, the paper, and the methods that have a reference."""
     from vehiclemor.report.published import citations
 
     print(citations())
@@ -119,7 +125,7 @@ NAME = re.compile(r"[a-z]([a-z0-9_]{0,38}[a-z0-9])?")
 
 
 def new_plugin(name: str, *, out: Path | None = None) -> None:
-    """Write a package of your own to begin with: a model, a maneuver, a method, studies, tests.
+    """Write a plug-in to begin with: a model, a maneuver, a method, studies, tests.
 
     Parameters
     ----------
@@ -159,6 +165,6 @@ def _write(folder: Path, name: str) -> None:
         if path.suffix in (".py", ".toml"):
             text = path.read_text(encoding="utf-8")
             text = text.replace(TEMPLATE.replace("_", "-"), name.replace("_", "-"))
-            place = folder / path.relative_to(template).as_posix().replace(TEMPLATE, name)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_text(text.replace(TEMPLATE, name), encoding="utf-8")
+            file = folder / path.relative_to(template).as_posix().replace(TEMPLATE, name)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text.replace(TEMPLATE, name), encoding="utf-8")

@@ -19,7 +19,7 @@ Results = Annotated[Path, Parameter(help="Results folder.")]
 Jobs = Annotated[int, Parameter(help="Number of processes, for what is missing.")]
 Seed = Annotated[
     int | None,
-    Parameter(help="Samples fresh test runs of protocols, for an audit with results of its own."),
+    Parameter(help="Samples fresh test runs of protocols, for an audit with separate results."),
 ]
 # One value or several: separated by spaces, or behind the same option again.
 Several = Parameter(consume_multiple=True)
@@ -38,7 +38,7 @@ Parameters = Annotated[
     ),
 ]
 ParameterFile = Annotated[
-    Path | None, Parameter(help="Parameter file; the model's own public data by default.")
+    Path | None, Parameter(help="Parameter file; the model's public data by default.")
 ]
 
 
@@ -63,15 +63,15 @@ def check_names(option: str, names: Iterable[str]) -> None:
 
 def key_values(option: str, given: Iterable[str] | None) -> dict[str, Any]:
     """Key -> an integer, a number, numbers that commas separate as a list, or text."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for text in given or ():
         key, separator, value = text.partition("=")
         if not separator or not key:
             raise InputError(f"{option} {text!r} is not key=value")
-        if key in found:
+        if key in values:
             raise InputError(f"{option} {key} is given twice")
-        found[key] = _parsed(value)
-    return found
+        values[key] = _parsed(value)
+    return values
 
 
 def _parsed(text: str) -> object:

@@ -59,7 +59,7 @@ def simulate(
     method
         Registered name.
     maneuver
-        Registered name, or a CSV file of a log; the model's own by default.
+        Registered name, or a CSV file of a log; the model's default maneuver if left out.
     csv
         key=value, one or several: how to read a CSV file. INPUT=COLUMN says which column is an
         input; time=COLUMN, unit=deg (or mm), ratio=16 (steering wheel to wheels), hold=cubic,
@@ -73,7 +73,7 @@ def simulate(
     preset
         Preset of the method's settings.
     training
-        matched (the very run that is simulated; the default), nominal (the model's own maneuver),
+        matched (the very run that is simulated; the default), nominal (the model's maneuver),
         protocol (the training of the model's protocol), or names of maneuvers; one or several.
     out
         netCDF file for the result.
@@ -222,12 +222,12 @@ def export(
     """
     given, values = key_values("--set", settings), key_values("--parameter", parameter)
     file = Path(model).suffix == ".nc"
-    kept = file or method == SHIPPED
-    if (file and method) or (kept and (given or values)):
-        raise InputError("a reduced model that is kept has its method, settings and parameters")
+    saved = file or method == SHIPPED
+    if (file and method) or (saved and (given or values)):
+        raise InputError("a saved reduced model has its method, settings and parameters")
     if given and method is None:
         raise InputError("--set is for a method: --method NAME")
-    if kept:
+    if saved:
         chosen = vm.load(model) if file else vm.rom(model)
         out = destination(name_of(chosen.model.name, chosen.method), to, out, overwrite)
     else:
@@ -273,11 +273,11 @@ def judge(
     if json_output:
         print(json_text(rows))
         return
-    own, errors = ["label", "runs", "misses", "silent", "flagged"], ["score", "median_score"]
-    own += [*errors, "output"]
-    if rows["seconds"].notna().any():
-        own.append("seconds")
+    errors = ["score", "median_score"]
+    columns = ["label", "runs", "misses", "silent", "flagged", *errors, "output"]
+    if bool(rows["seconds"].notna().any()):
+        columns.append("seconds")
     methods, outputs = (rows.query(f"kind == {kind!r}") for kind in ("method", "output"))
-    print(Table(methods, own))
+    print(Table(methods, columns))
     each = ["output", "measure", "bound", "unit", "misses", "silent", *errors]
     print(f"\n{Table(outputs, each, explain=False)}")

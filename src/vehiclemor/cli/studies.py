@@ -53,14 +53,14 @@ def run(
 
     began, errors = time.perf_counter(), 0
     with shown_progress() as runs:
-        found = run_studies(study, results, jobs, scheduler, seed)
-    for name, dataset in found.items():
+        datasets = run_studies(study, results, jobs, scheduler, seed)
+    for name, dataset in datasets.items():
         if "status" not in dataset:
             print(f"{name}: {dataset.sizes['mesh']} meshes; {dataset.encoding['source']}")
             continue
-        places = f"{dataset['status'].size} grid points, {runs[name]} runs"
+        sizes = f"{dataset['status'].size} grid points, {runs[name]} runs"
         counts = counted_ends(dataset)
-        print(wrapped(f"{name}: {places}: {counts}; {dataset.encoding['source']}", 0, 2))
+        print(wrapped(f"{name}: {sizes}: {counts}; {dataset.encoding['source']}", 0, 2))
         ends = zip(dataset["status"].values.flat, dataset["message"].values.flat, strict=True)
         _print_reasons(Counter(end for end in ends if end[0] in ("rejected", "error")))
         errors += int((dataset["status"] == "error").sum())
@@ -70,27 +70,27 @@ def run(
 
 def status(study: Study, *, results: Results = RESULTS, seed: Seed = None) -> None:
     """Show how far a study is, without computing anything."""
-    for name, found in vm.status(study, results, seed).items():
-        parts = [f"{name}: {found.done} of {found.runs} runs done"]
-        parts += [f"{found.to_do} to do"] if found.to_do else []
-        parts += [found.later] if found.later and not found.result else []
+    for name, progress in vm.status(study, results, seed).items():
+        parts = [f"{name}: {progress.done} of {progress.runs} runs done"]
+        parts += [f"{progress.to_do} to do"] if progress.to_do else []
+        parts += [progress.later] if progress.later and not progress.result else []
         text = ", ".join(parts)
-        if found.ends:
-            text += f"; {ends_text(kind for kind, _ in found.ends.elements())}"
-        older = " is older" if found.result and found.to_do else ""
-        print(wrapped(f"{text}; {found.result or 'not combined yet'}{older}", 0, 2))
-        _print_reasons(found.failed)
+        if progress.ends:
+            text += f"; {ends_text(kind for kind, _ in progress.ends.elements())}"
+        older = " is older" if progress.result and progress.to_do else ""
+        print(wrapped(f"{text}; {progress.result or 'not combined yet'}{older}", 0, 2))
+        _print_reasons(progress.failed)
 
 
 def _print_reasons(failed: Counter[tuple[str, str]]) -> None:
     """Print why runs have failed, the most frequent reasons first."""
-    found = failed.most_common()
-    for (kind, message), runs in found[:REASONS]:
+    reasons = failed.most_common()
+    for (kind, message), runs in reasons[:REASONS]:
         again = ", tried again by the next run" if kind == "error" else ""
         print(wrapped(f"{runs} {kind}{again}: {message}", 2, 4))
-    if len(found) > REASONS:
-        rest = sum(runs for _, runs in found[REASONS:])
-        print(f"  {rest} for {len(found) - REASONS} other reasons")
+    if len(reasons) > REASONS:
+        rest = sum(runs for _, runs in reasons[REASONS:])
+        print(f"  {rest} for {len(reasons) - REASONS} other reasons")
 
 
 def compare(
@@ -193,7 +193,7 @@ def convert(study: str, *, to: Format, out: Path | None = None, results: Results
     study
         Name or file of a study that has been run, or a netCDF file of its result.
     to
-        zarr: the whole dataset; parquet, csv: a table with a row for each point of the grid.
+        zarr: the dataset; parquet, csv: a table with a row for each point of the grid.
     out
         New file or folder; under the study's name here by default.
     """

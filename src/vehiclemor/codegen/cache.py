@@ -135,7 +135,7 @@ def from_cache(name: str, compute: Callable[[], bytes]) -> bytes:
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """A tenth of the time of what makes many small objects and drops few."""
+    """Pause the garbage collector: code that makes many small objects takes a tenth of the time."""
     enabled = gc.isenabled()
     gc.disable()
     try:

@@ -220,7 +220,7 @@ def call_kernel(typing_context: Any, kernels: Any, index: Any, *arrays: Any) -> 
     """See `loop_types.call_kernel`."""
     del typing_context
     _require_plain(*arrays)
-    packed = types.StarArgTuple.from_types(arrays)
+    packed: Any = types.StarArgTuple.from_types(arrays)
     return types.void(kernels, index, packed), _call_kernel
 
 

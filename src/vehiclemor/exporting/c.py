@@ -42,7 +42,7 @@ FORMS = {
 }
 # Expressions that are written are less deep; of a longer one the inside gets a name.
 SHALLOW = 12
-# Parameters have their places whether anything here depends on them or not.
+# Of parameters on which no function depends; all are listed.
 START_ALONE = "of the start alone, no effect here"
 HEADER, MODEL, TANGENT = "vehiclemor_model.h", "vehiclemor_model.c", "vehiclemor_tangent.c"
 STEPPER, DRIVER = "vehiclemor_step.c", "vehiclemor_driver.c"
@@ -51,11 +51,9 @@ STEPPER, DRIVER = "vehiclemor_step.c", "vehiclemor_driver.c"
 def c_files(system: ExportedSystem, step: float) -> dict[str, str]:
     """Name -> text of the files of a system; the header names a step size in s."""
     shipped = {name: (SOURCES / name).read_text(encoding="utf-8") for name in (STEPPER, DRIVER)}
-    values = [
-        _array("parameters", system.values),
-        *(_array(_start(name), state) for name, state in system.starts.items()),
-    ]
-    tangents = {f"{name}_tangent": found for name, found in system.tangents().items()}
+    values = [_array("parameters", system.values)]
+    values += [_array(_start(name), state) for name, state in system.starts.items()]
+    tangents = {f"{name}_tangent": function for name, function in system.tangents().items()}
     return {
         HEADER: _header(system, step),
         MODEL: _source(system, "its functions", values, system.functions),

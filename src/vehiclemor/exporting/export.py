@@ -1,4 +1,4 @@
-"""Models and reduced models, taken along into other tools."""
+"""Export of full and reduced models to other tools."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ IS_EXPORT: dict[str, Callable[[Path], bool]] = {
     "fmu": begins_with(b"modelDescription.xml", at=30),
     "casadi": begins_with(b"jhpnnagiieaha"),
 }
-# What is always written.
+# Targets that are always written to a file.
 FILES = ("c", "fmu")
 # A folder with this file is one of ours.
 OURS = "vehiclemor_model.h"
@@ -53,8 +53,7 @@ def export(
     Parameters
     ----------
     model
-        Registered name, a model made by `model()`, or a reduced one: of `reduce()`, `load()` or
-        `rom()`.
+        Registered name, a model of `model()`, or a reduced one of `reduce()`, `load()` or `rom()`.
     to
         `c`: a folder with C99 sources.  `fmu`: a functional mock-up unit by FMI 2.0 for model
         exchange and co-simulation, with sources, and a binary for this platform where there is a C
@@ -62,8 +61,8 @@ def export(
         `parameter_values`.  `jax`: a function (x, u, p) -> (dx, y).  `sympy`: expressions.
     out
         File or folder to write.  Without it C and FMU go under the model's name into the working
-        folder; of the others the object is returned.  With it CasADi's own file for `Function.load`
-        is written; what is made for JAX and SymPy is an object alone.
+        folder; of the others the object is returned.  With it CasADi writes its file for
+        `Function.load`; for JAX and SymPy there is no file.
     overwrite
         Whether an export that is there is replaced.
     step
@@ -83,30 +82,32 @@ def export(
     choice("target", to, TARGETS)
     step = within("step", number("step", step), STEPS, " s")
     if out is not None and to not in ENDINGS:
-        raise InputError(f"out: what is made for {to} is an object, no file")
+        raise InputError(f"out: an export to {to} is an object, no file")
     if isinstance(model, str):
         from vehiclemor.simulation.build import build
 
         model = build(model)
     system = system_of(model)
-    place: Any = None
+    path: Any = None
     if out is not None or to in FILES:
-        place = destination(system.name, to, out, overwrite)
+        path = destination(system.name, to, out, overwrite)
     if len(system.table) and to in ("casadi", "sympy"):
         raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
     if to == "c":
         from vehiclemor.exporting.c import c_files
 
-        return _write_folder(place, c_files(system, step))
+        return _write_folder(path, c_files(system, step))
     if to == "fmu":
         from vehiclemor.exporting.fmu import fmu_files, write_archive
 
         files = fmu_files(system, step)
-        return write_whole(place, lambda path: write_archive(files, path))
+        return write_whole(path, lambda temporary: write_archive(files, temporary))
     from vehiclemor.exporting.libraries import OBJECTS
 
-    made = OBJECTS[to](system)
-    return made if place is None else write_whole(place, lambda path: made.save(str(path)))
+    exported = OBJECTS[to](system)
+    if path is None:
+        return exported
+    return write_whole(path, lambda temporary: exported.save(str(temporary)))
 
 
 def destination(name: str, to: str, out: str | Path | None, overwrite: bool) -> Path:
@@ -142,7 +143,7 @@ def system_of(model: Model | ReducedOrderModel) -> ExportedSystem:
 
 
 def _write_folder(path: Path, files: dict[str, str]) -> Path:
-    """Write a folder whole; what is there goes once the new one is complete."""
+    """Write a folder; it replaces an older one when it is complete."""
 
     def write(temporary: Path) -> None:
         make_folder(temporary)

@@ -98,36 +98,38 @@ class Variable(NamedTuple):
     derivative_of: int | None = None
 
 
-def variables(system: ExportedSystem) -> dict[int, Variable]:
+def variables_of(system: ExportedSystem) -> dict[int, Variable]:
     """Variables by value reference, in order; without parameters that nothing depends on."""
     start = next(iter(system.starts.values()))
     of_states = "local", "continuous"
-    found = [Variable("time", "s", "time", "independent", "continuous")]
+    variables = [Variable("time", "s", "time", "independent", "continuous")]
     for q, value in zip(system.states, start.tolist(), strict=True):
-        found.append(Variable(f"state.{q.name}", q.unit, q.long_name, *of_states, "exact", value))
+        variables.append(
+            Variable(f"state.{q.name}", q.unit, q.long_name, *of_states, "exact", value)
+        )
     for reference, q in enumerate(system.states, 1):
         named = f"der(state.{q.name})", f"{q.unit}/s", f"rate of: {q.long_name}"
-        found.append(Variable(*named, *of_states, "calculated", None, reference))
-    found += [
+        variables.append(Variable(*named, *of_states, "calculated", None, reference))
+    variables += [
         Variable(q.name, q.unit, q.long_name, "input", "continuous", "", 0.0) for q in system.inputs
     ]
-    found += [
+    variables += [
         Variable(q.name, q.unit, q.long_name, "output", "continuous", "calculated")
         for q in system.outputs
     ]
-    every, first = dict(enumerate(found)), len(found)
-    for place in sorted(system.acting):
-        q, value = system.parameters[place], float(system.values[place])
+    by_reference, first = dict(enumerate(variables)), len(variables)
+    for number in sorted(system.acting):
+        q, value = system.parameters[number], float(system.values[number])
         name = f"parameter.{q.name}"
-        every[first + place] = Variable(
+        by_reference[first + number] = Variable(
             name, q.unit, q.long_name, "parameter", "tunable", "exact", value
         )
-    return every
+    return by_reference
 
 
 def model_description(system: ExportedSystem, token: str) -> bytes:
     """The file; by the token an importer's file and binary know one another."""
-    every = variables(system)
+    every = variables_of(system)
     root = ElementTree.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
@@ -161,7 +163,7 @@ def model_description(system: ExportedSystem, token: str) -> bytes:
 
 
 def _variable(listed: ElementTree.Element, variable: Variable, reference: int) -> None:
-    own = {
+    attributes = {
         "name": variable.name,
         "valueReference": str(reference),
         "description": variable.description,
@@ -169,14 +171,14 @@ def _variable(listed: ElementTree.Element, variable: Variable, reference: int) -
         "variability": variable.variability,
     }
     if variable.initial:
-        own["initial"] = variable.initial
+        attributes["initial"] = variable.initial
     typed = {} if variable.unit == "1" else {"unit": variable.unit}
     if variable.start is not None:
         typed["start"] = repr(variable.start)
     if variable.derivative_of is not None:
         # Variables are counted from one, and time is the first.
         typed["derivative"] = str(variable.derivative_of + 1)
-    scalar = ElementTree.SubElement(listed, "ScalarVariable", own)
+    scalar = ElementTree.SubElement(listed, "ScalarVariable", attributes)
     ElementTree.SubElement(scalar, "Real", typed)
 
 
@@ -184,8 +186,8 @@ def _structure(structure: ElementTree.Element, every: Mapping[int, Variable]) ->
     outputs = [i for i, v in every.items() if v.causality == "output"]
     rates = [i for i, v in every.items() if v.derivative_of is not None]
     kinds = {"Outputs": outputs, "Derivatives": rates, "InitialUnknowns": sorted(outputs + rates)}
-    for name, places in kinds.items():
-        if places:
+    for name, references in kinds.items():
+        if references:
             listed = ElementTree.SubElement(structure, name)
-            for place in places:
-                ElementTree.SubElement(listed, "Unknown", index=str(place + 1))
+            for reference in references:
+                ElementTree.SubElement(listed, "Unknown", index=str(reference + 1))

@@ -50,16 +50,17 @@ def casadi_function(system: ExportedSystem) -> casadi.Function:
 
 
 def jax_function(system: ExportedSystem) -> Callable[..., tuple[Any, Any]]:
-    """Function (x, u, p=own values) -> (dx, y) of arrays; for `jit`, `vmap`, `jacfwd` and so on.
+    """Function (x, u, p) -> (dx, y) of arrays; for `jit`, `vmap`, `jacfwd` and so on.
 
-    It is as accurate as its arguments: in double precision where `jax_enable_x64` is set.
+    Without p it takes the model's parameters.  It is as accurate as its arguments: in double
+    precision where `jax_enable_x64` is set.
     """
     _needed("jax")
     import jax.numpy as jnp  # pyright: ignore[reportMissingImports]  (an extra)
 
     functions = _functions(jnp, OF_JAX) | {"select": jnp.where}
     table = np.array(system.table)
-    functions["entry"] = lambda row, place: jnp.asarray(table)[row.astype(int) + place]
+    functions["entry"] = lambda row, offset: jnp.asarray(table)[row.astype(int) + offset]
     values = np.array(system.values)
 
     def function(x: Any, u: Any, p: Any = values) -> tuple[Any, Any]:
@@ -98,10 +99,9 @@ def sympy_expressions(system: ExportedSystem) -> Expressions:
     import sympy as sp
 
     quantities = {"x": system.states, "u": system.inputs, "p": system.parameters}
-    arrays: dict[str, list[Any]] = {
-        array: [sp.Symbol(q.name, real=True) for q in listed]
-        for array, listed in quantities.items()
-    }
+    arrays: dict[str, list[Any]] = {}
+    for array, listed in quantities.items():
+        arrays[array] = [sp.Symbol(q.name, real=True) for q in listed]
     functions = _functions(sp, OF_SYMPY) | {"==": sp.Eq, "!=": sp.Ne}
     functions["select"] = lambda test, then, other: sp.Piecewise((then, test), (other, True))
     assignments: list[tuple[sp.Symbol, sp.Expr]] = []
@@ -110,11 +110,9 @@ def sympy_expressions(system: ExportedSystem) -> Expressions:
         assignments.append((sp.Symbol(f"_{len(assignments)}", real=True), value))
         return assignments[-1][0]
 
-    found = {}
-    for name in ("constants", "derivative", "outputs"):
-        found[name] = evaluated(system.functions[name], arrays, functions, let)
-        arrays["c"] = found["constants"]
-    derivative, outputs = (sp.Matrix(found[name]) for name in ("derivative", "outputs"))
+    arrays["c"] = evaluated(system.functions["constants"], arrays, functions, let)
+    derivative = sp.Matrix(evaluated(system.functions["derivative"], arrays, functions, let))
+    outputs = sp.Matrix(evaluated(system.functions["outputs"], arrays, functions, let))
     return Expressions(arrays["x"], arrays["u"], arrays["p"], assignments, derivative, outputs)
 
 

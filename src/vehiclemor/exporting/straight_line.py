@@ -2,7 +2,7 @@
 
 Kernels also have batches of elementary functions and sums with weights, which are for vector units.
 What is left here is short enough for any printer or interpreter: operations with one result, `min`,
-`max`, and `table` (a number of a table, of a row and at a place).
+`max`, and `table` (a number of a table, by row and offset).
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ OPERATORS: dict[str, Callable[..., Any]] = {
     "==": operator.eq,
     "!=": operator.ne,
 }
-Given = Mapping[str, Sequence[Value]]
+# Name of an array -> its entries.
+Arrays = Mapping[str, Sequence[Value]]
 
 
 class StraightLine(NamedTuple):
@@ -53,9 +54,13 @@ class StraightLine(NamedTuple):
         return needed(self.operations, self.results)
 
     def read(self, array: str) -> set[int]:
-        """Places of the entries of an array that the results depend on."""
-        found = (self.operations[number] for number in self.needed)
-        return {op.detail[1] for op in found if op.kind == "entry" and op.detail[0] == array}
+        """Indices of the entries of an array that the results depend on."""
+        indices = set()
+        for number in self.needed:
+            kind, _, detail = self.operations[number]
+            if kind == "entry" and detail[0] == array:
+                indices.add(detail[1])
+        return indices
 
 
 class Lines(Listing):
@@ -63,61 +68,64 @@ class Lines(Listing):
 
     def entries(self, array: str, count: int) -> list[Value]:
         """Entries of an array."""
-        return [self.entry(array, place) for place in range(count)]
+        return [self.entry(array, index) for index in range(count)]
 
     def numbers(self, values: Iterable[float]) -> list[Value]:
         """Numbers."""
         return [self.number(value) for value in values]
 
     def functions(self, results: Mapping[str, Sequence[Value]]) -> dict[str, StraightLine]:
-        """Name -> function; what has no results is a function too."""
-        listed = {name: [value.number for value in results.get(name, ())] for name in NAMES}
-        return {name: StraightLine(self.operations, numbers) for name, numbers in listed.items()}
+        """Name -> function; one without results is a function too."""
+        by_name = {}
+        for name in NAMES:
+            numbers = [value.number for value in results.get(name, ())]
+            by_name[name] = StraightLine(self.operations, numbers)
+        return by_name
 
-    def include(self, kernel: Kernel, given: Given) -> list[Value]:
-        """Write a kernel out, given entries of its arguments; its results, row by row."""
+    def include(self, kernel: Kernel, arrays: Arrays) -> list[Value]:
+        """Write a kernel out for entries of its arguments; its results, row by row."""
         written: list[Any] = []
-        stored = {}
+        results = {}
         for kind, arguments, detail in kernel.operations:
             values = [written[n] for n in arguments]
             match kind:
                 case "entry":
-                    found: Any = given[detail[0]][detail[1]]
+                    value: Any = arrays[detail[0]][detail[1]]
                 case "store":
-                    found = stored[detail] = values[0]
+                    value = results[detail] = values[0]
                 case "sincos":
-                    found = [self.new(name, *values) for name in PARTS[kind]]
+                    value = [self.new(name, *values) for name in PARTS[kind]]
                 case "batch":
-                    found = [self.new(name, v) for name in PARTS[detail] for v in values]
+                    value = [self.new(name, v) for name in PARTS[detail] for v in values]
                 case "sums":
-                    found = self._sums(given, values, *detail)
+                    value = self._sums(arrays, values, *detail)
                 case "part":
-                    found = values[0][detail]
+                    value = values[0][detail]
                 case _:
-                    found = self.new(kind, *values, detail=detail)
-            written.append(found)
-        return [stored[place] for place in sorted(stored)]
+                    value = self.new(kind, *values, detail=detail)
+            written.append(value)
+        return [results[index] for index in sorted(results)]
 
-    def derivative(self, kernel: Kernel, given: Given, seeds: Given) -> list[Value]:
+    def derivative(self, kernel: Kernel, arrays: Arrays, seeds: Arrays) -> list[Value]:
         """The derivative of a kernel along seeds of some of its arguments, see `derivatives`."""
-        own = {name: seed for name, seed in seeds.items() if name in kernel.arguments}
-        seeded = {SEED + name: seed for name, seed in own.items()}
-        return self.include(derivative(kernel, tuple(own)), {**given, **seeded})
+        seeded = tuple(name for name in seeds if name in kernel.arguments)
+        seed_arrays = {SEED + name: seeds[name] for name in seeded}
+        return self.include(derivative(kernel, seeded), {**arrays, **seed_arrays})
 
     def _sums(
-        self, given: Given, factors: Sequence[Value], array: str, first: int, targets: int
+        self, arrays: Arrays, factors: Sequence[Value], array: str, first: int, targets: int
     ) -> list[Value]:
         """Sums of factors times weights, of which zeros are left out."""
         zero, one = (Operation("number", (), number) for number in (0.0, 1.0))
-        rows, found = given[array][first:], []
+        rows, sums = arrays[array][first:], []
         for column in range(targets):
             terms = []
             for weight, factor in zip(rows[column :: padded(targets)], factors, strict=False):
                 if self.operations[weight.number] != zero:
                     alone = self.operations[factor.number] == one
                     terms.append(weight if alone else weight * factor)
-            found.append(self._total(terms))
-        return found
+            sums.append(self._total(terms))
+        return sums
 
     def _total(self, terms: Sequence[Value]) -> Value:
         """Sum of terms in pairs: shallow for whoever walks through it, and rounded less."""
@@ -127,19 +135,20 @@ class Lines(Listing):
         return self._total(terms[:half]) + self._total(terms[half:])
 
     def largest(self, values: Sequence[Value]) -> Value:
-        """The largest magnitude: what tells how far a state goes in what a model knows."""
+        """The largest magnitude, which says how far a state goes within the training."""
         first, *others = map(abs, values)
         for value in others:
             first = self.new("max", first, value)
         return first
 
     def largest_derivative(self, values: Sequence[Value], changes: Sequence[Value]) -> Value:
-        """Derivative of the largest magnitude, of values that change so."""
-        largest, found = self.largest(values), self.number(0.0)
+        """Derivative of the largest magnitude, from changes of the values."""
+        largest, result = self.largest(values), self.number(0.0)
         for value, change in zip(values, changes, strict=True):
-            own = self.new("select", self.new("<", value, 0.0), -change, change)
-            found = self.new("select", self.new(">=", abs(value), largest), own, found)
-        return found
+            of_magnitude = self.new("select", self.new("<", value, 0.0), -change, change)
+            is_largest = self.new(">=", abs(value), largest)
+            result = self.new("select", is_largest, of_magnitude, result)
+        return result
 
 
 def evaluated(
@@ -159,13 +168,14 @@ def evaluated(
         kind, arguments, detail = function.operations[number]
         values = [known[n] for n in arguments]
         if kind == "number":
-            found = detail
+            value = detail
         elif kind == "entry":
-            found = arrays[detail[0]][detail[1]]
+            value = arrays[detail[0]][detail[1]]
         elif kind == "table":
-            found = functions["entry"](*values, detail)
+            value = functions["entry"](*values, detail)
         else:
-            found = computed[kind](*values)
-            found = let(found) if let and counts[number] > 1 else found
-        known[number] = found
+            value = computed[kind](*values)
+            if let and counts[number] > 1:
+                value = let(value)
+        known[number] = value
     return [known[number] for number in function.results]

@@ -1,6 +1,6 @@
 """What is exported: a system in straight-line functions, with names, units, values and starts.
 
-It is that of a model, or of what a method has made of one.
+It is that of a full or a reduced model.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 
-# Who has written it.
 TOOL = f"vehiclemor {version('vehiclemor')}"
 # Function -> names of its arguments, in order, and of its result.
 SIGNATURES = {
@@ -38,10 +37,10 @@ SIGNATURES = {
 }
 # Derivatives along seeds of the arguments: what the results change by.
 SEED = "_seed"
-TANGENTS = {
-    f"{name}_tangent": (*given, *(f"{argument}{SEED}" for argument in given), f"{result}_change")
-    for name, (*given, result) in SIGNATURES.items()
-}
+TANGENTS = {}
+for _name, (*_arguments, _result) in SIGNATURES.items():
+    _seeds = [f"{argument}{SEED}" for argument in _arguments]
+    TANGENTS[f"{_name}_tangent"] = (*_arguments, *_seeds, f"{_result}_change")
 TRUST = Quantity("trust_indicator", "1", "how far it goes: beyond 1 the reduced model isn't known")
 # From the design position; the suspension needs six where wheels and racks go.
 STEPS = 7
@@ -68,9 +67,9 @@ class ExportedSystem(ShortRepr):
     starts: Mapping[str, np.ndarray]  # Name -> state; the default first.
     # `constants` of the array `p`, `derivative` and `outputs` of the arrays `x`, `u` and `c`.
     functions: Mapping[str, StraightLine]
-    # Makes the derivatives of these functions, by the same names, see `TANGENTS`.
+    # Gives the derivatives of these functions, by the same names, see `TANGENTS`.
     tangents: Callable[[], Mapping[str, StraightLine]]
-    # What `entry(row, place)` reads, a number at row + place; empty if there is none.
+    # Numbers that `entry(row, offset)` reads, at row + offset; may be empty.
     table: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
@@ -85,12 +84,12 @@ class ExportedSystem(ShortRepr):
         """Numbers of the parameters that rates or outputs depend on; others shape the start."""
         constants, rates, outputs = (self.functions[name] for name in SIGNATURES)
         used = sorted(rates.read("c") | outputs.read("c"))
-        of_these = [constants.results[place] for place in used]
-        return StraightLine(constants.operations, of_these).read("p")
+        results = [constants.results[index] for index in used]
+        return StraightLine(constants.operations, results).read("p")
 
 
 def exported_system(what: Any, name: str) -> ExportedSystem:
-    """The system, called so, of a model or of what the fit of a method has given.
+    """The system of a model, or of a fitted method, under a name.
 
     `InputError` if it is no system of straight-line equations.
     """
@@ -114,10 +113,18 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
 
 
 def full_system(model: DynamicModel, name: str) -> ExportedSystem:
-    """A model with its parameters; among them is what it has solved for."""
+    """A model with its parameters, among them those that it has solved for."""
     definition, sources = model.definition, model.equations.sources
     lines = Lines()
-    given = full_arrays(lines, model) | {"_x": lines.entries("x", len(definition.states))}
+    arrays = full_arrays(lines, model) | {"_x": lines.entries("x", len(definition.states))}
+
+    def tangents() -> dict[str, StraightLine]:
+        changes = {}
+        for function in SIGNATURES:
+            seeds = seeds_of(lines, arrays)
+            changes[function] = lines.derivative(sources[function], arrays, seeds)
+        return lines.functions(changes)
+
     return ExportedSystem(
         name,
         model.summary,
@@ -127,13 +134,8 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
         parameter_quantities(model),
         model.parameter_values,
         model.initial,
-        lines.functions({key: lines.include(sources[key], given) for key in SIGNATURES}),
-        lambda: lines.functions(
-            {
-                key: lines.derivative(sources[key], given, seeds_of(lines, given))
-                for key in SIGNATURES
-            }
-        ),
+        lines.functions({name: lines.include(sources[name], arrays) for name in SIGNATURES}),
+        tangents,
     )
 
 
@@ -141,22 +143,23 @@ def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
     """A kinematic model: outputs from inputs, without states."""
     definition, sources = model.definition, model.equations.sources
     lines = Lines()
-    given = full_arrays(lines, model)
+    arrays = full_arrays(lines, model)
     q, correction = lines.numbers(model.start()), []
     for _ in range(STEPS):
-        correction = lines.include(sources["newton_step"], given | {"_q": q})
-        q = [place - change for place, change in zip(q, correction, strict=True)]
-    solved = given | {"_q": q}
+        correction = lines.include(sources["newton_step"], arrays | {"_q": q})
+        q = [coordinate - change for coordinate, change in zip(q, correction, strict=True)]
+    solved = arrays | {"_q": q}
     outputs = lines.include(sources["outputs"], solved)
 
     def tangents() -> dict[str, StraightLine]:
-        seeds = seeds_of(lines, given)
-        # The residual is zero: the position changes by minus what the next step does.
-        falling = lines.derivative(sources["newton_step"], solved, seeds)
-        moved = [-change for change in falling]
-        found = lines.derivative(sources["outputs"], solved, seeds | {"_q": moved})
-        constants = lines.derivative(sources["constants"], given, seeds)
-        return lines.functions({"constants": constants, "outputs": [*found, *lines.numbers([0.0])]})
+        seeds = seeds_of(lines, arrays)
+        # The residual is zero: the position changes by minus the change of the next step.
+        step_changes = lines.derivative(sources["newton_step"], solved, seeds)
+        q_changes = [-change for change in step_changes]
+        outputs = lines.derivative(sources["outputs"], solved, seeds | {"_q": q_changes})
+        constants = lines.derivative(sources["constants"], arrays, seeds)
+        correction = lines.numbers([0.0])
+        return lines.functions({"constants": constants, "outputs": [*outputs, *correction]})
 
     return ExportedSystem(
         name,
@@ -169,7 +172,7 @@ def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
         {model.starts[0]: np.zeros(0)},
         lines.functions(
             {
-                "constants": lines.include(sources["constants"], given),
+                "constants": lines.include(sources["constants"], arrays),
                 "outputs": [*outputs, lines.largest(correction)],
             }
         ),
@@ -187,18 +190,19 @@ def full_arrays(lines: Lines, model: Model) -> dict[str, list[Value]]:
 
 
 def seeds_of(lines: Lines, arrays: Mapping[str, Sequence]) -> dict[str, list[Value]]:
-    """What the entries of arrays change by."""
-    return {key: lines.entries(f"{key[1]}{SEED}", len(listed)) for key, listed in arrays.items()}
+    """Changes of the entries of arrays."""
+    return {key: lines.entries(f"{key[1]}{SEED}", len(array)) for key, array in arrays.items()}
 
 
 def parameter_quantities(model: Model) -> tuple[Quantity, ...]:
-    """Components of the parameters and after them what was solved for, as the kernels take them."""
-    found = []
+    """Components of the parameters, then lengths that were solved for, in the kernels' order."""
+    quantities = []
     for name, entry in model.parameters.entries.items():
         size = model.definition.parameters[name].size
         names = [f"{name}.{axis}" for axis in "xyz"] if size > 1 else [name]
-        found += [Quantity(component, entry.unit, entry.description) for component in names]
-    return (*found, *(Quantity(name, "m", "set at rest") for name in model.definition.solved))
+        quantities += [Quantity(component, entry.unit, entry.description) for component in names]
+    quantities += [Quantity(name, "m", "set at rest") for name in model.definition.solved]
+    return tuple(quantities)
 
 
 def reduced_system(
@@ -206,50 +210,58 @@ def reduced_system(
 ) -> ExportedSystem:
     """A reduced system: its states are decoded, then the model's outputs follow from them.
 
-    The decoder is the kernel that gives full states, and after them what is watched, with its
+    The decoder is the kernel that gives full states, and after them trust indicators, with its
     constants; none where the states are the model's.
     """
     model, system = reduced.model, reduced.system
     definition, full = model.definition, 2 * len(model.coordinates)
     lines = Lines()
-    own = {
+    arrays = {
         "_x": lines.entries("x", len(reduced.states)),
         "_u": lines.entries("u", system.inputs),
     }
     rates, source = system.kernels.sources["derivative"], model.kernels.sources["outputs"]
-    of_rates = own | {"_constants": lines.numbers(system.constants)}
-    decoded, of_decoder = own["_x"], own
+    rate_arrays = arrays | {"_constants": lines.numbers(system.constants)}
+    decoded, decoder_arrays = arrays["_x"], arrays
     if decoder is not None:
-        of_decoder = own | {"_constants": lines.numbers(decoder[1])}
-        decoded = lines.include(decoder[0], of_decoder)
-    given = {"_x": decoded, "_u": own["_u"], "_constants": lines.numbers(model.constants)}
-    outputs, used = lines.include(source, given), decoded[full:]
+        decoder_arrays = arrays | {"_constants": lines.numbers(decoder[1])}
+        decoded = lines.include(decoder[0], decoder_arrays)
+    output_arrays = {
+        "_x": decoded,
+        "_u": arrays["_u"],
+        "_constants": lines.numbers(model.constants),
+    }
+    outputs, trust = lines.include(source, output_arrays), decoded[full:]
 
     def tangents() -> dict[str, StraightLine]:
-        seeds = seeds_of(lines, own)
-        moved = seeds["_x"] if decoder is None else lines.derivative(decoder[0], of_decoder, seeds)
-        found = lines.derivative(source, given, seeds | {"_x": moved})
-        further = [lines.largest_derivative(used, moved[full:])] if used else []
-        rising = lines.derivative(rates, of_rates, seeds)
-        return lines.functions({"derivative": rising, "outputs": [*found, *further]})
+        seeds = seeds_of(lines, arrays)
+        state_changes = seeds["_x"]
+        if decoder is not None:
+            state_changes = lines.derivative(decoder[0], decoder_arrays, seeds)
+        changes = lines.derivative(source, output_arrays, seeds | {"_x": state_changes})
+        if trust:
+            changes.append(lines.largest_derivative(trust, state_changes[full:]))
+        rate_changes = lines.derivative(rates, rate_arrays, seeds)
+        return lines.functions({"derivative": rate_changes, "outputs": changes})
 
-    known = {q.name: q for q in (*definition.coordinates, *definition.speeds)}
+    derivative = lines.include(rates, rate_arrays)
+    quantities = definition.outputs
+    if trust:
+        outputs.append(lines.largest(trust))
+        quantities = (*quantities, TRUST)
+    of_model = {q.name: q for q in (*definition.coordinates, *definition.speeds)}
+    states = [of_model.get(n, Quantity(n, "1", "reduced coordinate")) for n in reduced.states]
     at_rest = np.zeros(system.inputs)
     return ExportedSystem(
         name,
         f"reduced model of: {model.summary}",
-        tuple(known.get(n, Quantity(n, "1", "reduced coordinate")) for n in reduced.states),
+        tuple(states),
         definition.inputs,
-        (*definition.outputs, *([TRUST] if used else [])),
+        quantities,
         (),
         np.zeros(0),
         {key: reduced.begin(key, at_rest) for key in model.starts},
-        lines.functions(
-            {
-                "derivative": lines.include(rates, of_rates),
-                "outputs": [*outputs, *([lines.largest(used)] if used else [])],
-            }
-        ),
+        lines.functions({"derivative": derivative, "outputs": outputs}),
         tangents,
     )
 
@@ -258,26 +270,27 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
     """Outputs as polynomials in cells of the inputs; a table has their coefficients."""
     definition, coefficients = reduced.model.definition, reduced.cells.coefficients
     columns = reduced.columns[len(definition.coordinates) :]
-    kept = sorted(set(columns))
-    table = np.zeros((*coefficients.shape[:2], padded(len(kept))))
-    table[:, :, : len(kept)] = coefficients[:, :, kept]
+    exported = sorted(set(columns))
+    table = np.zeros((*coefficients.shape[:2], padded(len(exported))))
+    table[:, :, : len(exported)] = coefficients[:, :, exported]
     lines, size, n = Lines(), table[0].size, len(definition.inputs)
-    places, row, used = _cell(lines, reduced, size)
-    own = tuple(kept.index(column) for column in columns)
-    kernel = map_kernel(reduced.moving, reduced.degree, own)
-    given = {
-        "_x": places,
-        "_coefficients": [lines.new("table", row, detail=place) for place in range(size)],
+    in_cell, row, in_box = _cell(lines, reduced, size)
+    table_columns = tuple(exported.index(column) for column in columns)
+    kernel = map_kernel(reduced.moving, reduced.degree, table_columns)
+    arrays = {
+        "_x": in_cell,
+        "_coefficients": [lines.new("table", row, detail=offset) for offset in range(size)],
     }
-    outputs = lines.include(kernel, given)
+    outputs = lines.include(kernel, arrays)
 
     def tangents() -> dict[str, StraightLine]:
         scales, halves = reduced.cells.scales, reduced.cells.halves
         seeds = lines.entries(f"u{SEED}", n)
         changes = [scale * seed for scale, seed in zip(scales.tolist(), seeds, strict=True)]
         steps = [2.0 * half * c for half, c in zip(halves.tolist(), changes, strict=True)]
-        found = lines.derivative(kernel, given, {"_x": steps})
-        return lines.functions({"outputs": [*found, lines.largest_derivative(used, changes)]})
+        output_changes = lines.derivative(kernel, arrays, {"_x": steps})
+        output_changes.append(lines.largest_derivative(in_box, changes))
+        return lines.functions({"outputs": output_changes})
 
     return ExportedSystem(
         name,
@@ -288,24 +301,24 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
         (),
         np.zeros(0),
         {reduced.model.starts[0]: np.zeros(0)},
-        lines.functions({"outputs": [*outputs, lines.largest(used)]}),
+        lines.functions({"outputs": [*outputs, lines.largest(in_box)]}),
         tangents,
         table.ravel(),
     )
 
 
 def _cell(lines: Lines, reduced: PathMapModel, size: int) -> tuple[list[Value], Value, list[Value]]:
-    """Places in a cell, where its coefficients begin, and places in the box.
+    """Inputs in their cell (-1 to 1), first coefficient of the cell, inputs in the box (-1 to 1).
 
-    It does what `map_loops.map_path` does for a sample.
+    The same as `map_loops.map_path` computes for a sample.
     """
-    places, within, row, cells = [], [], lines.number(0.0), reduced.cells
+    in_cell, in_box, row, cells = [], [], lines.number(0.0), reduced.cells
     for i, u in enumerate(lines.entries("u", len(cells.centres))):
         numbers = (float(a[i]) for a in (cells.centres, cells.scales, cells.halves, cells.tops))
         centre, scale, half, top = numbers
-        within.append((u - centre) * scale)
-        place = (within[-1] + 1.0) * half
-        cell = lines.new("min", lines.new("max", lines.new("floor", place), 0.0), top)
-        places.append(2.0 * (place - cell) - 1.0)
+        in_box.append((u - centre) * scale)
+        position = (in_box[-1] + 1.0) * half
+        cell = lines.new("min", lines.new("max", lines.new("floor", position), 0.0), top)
+        in_cell.append(2.0 * (position - cell) - 1.0)
         row = row * float(cells.numbers[i]) + cell
-    return places, row * float(size), within
+    return in_cell, row * float(size), in_box

@@ -80,7 +80,7 @@ def check_resolved(maneuver: Excitation) -> None:
     step = times[1]
     values = maneuver.at(times)
     inside = maneuver.at(times[:-1] + between * step)
-    # What is not finite is found, with its time, by whoever solves it.
+    # A solver names the time of a value that is not finite.
     if not (np.isfinite(values).all() and np.isfinite(inside).all()):
         return
     off = np.abs(inside - (1.0 - between) * values[:-1] - between * values[1:])

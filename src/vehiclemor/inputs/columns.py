@@ -1,4 +1,4 @@
-"""Named columns of tables, from which signals are made."""
+"""Named columns of tables, the samples of signals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vehiclemor.exceptions import FileError, InputError, one_line
 from vehiclemor.files import NO_FILE
 from vehiclemor.registry import choice
 
-# What may stand between columns in the place of the separator that is expected.
+# Usual separators of columns, to guess the one that is meant.
 SEPARATORS = ",;\t| "
 # Units of logged inputs -> SI.
 UNITS = {"SI": 1.0, "deg": np.pi / 180.0, "mm": 1e-3}
@@ -46,7 +46,8 @@ def csv_samples(
             raise ValueError(NO_FILE)
         with path.open(encoding="utf-8-sig") as file:
             _check_separator(path, separator, file.readline(), file.readline())
-        # A longer row, of which an index would be made, is refused here; names are not yet altered.
+        # Rows longer than the first, which pandas would take for an index, are refused here; names
+        # are as in the file.
         names = read(header=None, nrows=2, dtype=str).iloc[0]
         table = read()
     except FileNotFoundError:
@@ -120,7 +121,7 @@ def column_names(inputs: Any, columns: int) -> tuple[str, ...]:
 
 
 def integral_of(name: str) -> str:
-    """Name of the input whose derivative an input is by its own name, if it is one."""
+    """Name of the input whose time derivative has this name, such as s of s_dot; else empty."""
     base, dot, order = name.rpartition("_")
     if order == "ddot":
         return f"{base}_dot"

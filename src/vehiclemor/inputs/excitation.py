@@ -39,7 +39,7 @@ def cached(compute: Callable[..., Result]) -> Callable[..., Result]:
 
 
 class Extent(NamedTuple):
-    """Extremes of the inputs of a whole run, see `polynomial_loops.extent`.
+    """Extremes of the inputs of a run, see `polynomial_loops.extent`.
 
     Largest (3, inputs) are magnitudes of the inputs, of what of them is above 2 Hz, and the root of
     the integral of the square of what is above 8 Hz.
@@ -96,7 +96,7 @@ class Excitation(ShortRepr):
         return self
 
     def subdivided(self, parts: int) -> Self:
-        """The same inputs with so many output intervals in place of each."""
+        """The same inputs, each interval between output times divided into so many parts."""
         return replace(self, samples=(self.samples - 1) * parts + 1)  # type: ignore[type-var]
 
     @property

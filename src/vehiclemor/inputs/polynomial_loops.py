@@ -10,7 +10,7 @@ from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector
 INLINED = ("input_at", "signal_at", "passed")
 # Time constants (s) of two high passes, one after the other, that leave what is above 2 and 8 Hz.
 CORNER, HIGHER = 0.08, 0.02
-# Parts that a piece is looked at in, and the longest of them (s).
+# Parts of a piece between evaluations, and the longest of them (s).
 PARTS, LONGEST = 4, 0.01
 # Samples whose spacings differ by less, relative to them, are equidistant.
 EQUIDISTANT = 1e-8
@@ -32,12 +32,12 @@ class Pieces(NamedTuple):
 
 
 def input_at(problem, t, u):
-    """Inputs at time t, by the polynomials of the span's segment also beyond its ends, into u."""
+    """Inputs at time t, into u, by the segment of the current span, also beyond its ends."""
     signal_at(problem.signal, problem.segment, t, u)
 
 
 def signal_at(signal, segment, t, u):
-    """The same of a segment of a signal."""
+    """Inputs at time t in one smooth segment, into u."""
     edges, first, starts, coefficients = signal
     row, end = first[segment], first[segment + 1]
     a, b = edges[segment], edges[segment + 1]
@@ -53,11 +53,11 @@ def signal_at(signal, segment, t, u):
             b = starts[row + 1]
         z = (t - a) / (b - a)
     else:
-        place = (t - a) / (b - a) * (end - row)
-        i = int(np.floor(place))
+        position = (t - a) / (b - a) * (end - row)
+        i = int(np.floor(position))
         i = max(i, 0)
         i = min(i, end - row - 1)
-        z = place - i
+        z = position - i
         row += i
     degree = coefficients.shape[2] - 1
     for j in range(len(u)):
@@ -80,7 +80,7 @@ def sampled(signal: Pieces, times: Vector, inputs: Matrix) -> Int:
 
 
 def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
-    """Extremes of whole inputs, between samples too, and of what of them is quick.
+    """Extremes of inputs over a run, between samples too, and of their quick parts.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
     degree, pieces, segments = coefficients.shape[2] - 1, len(coefficients), len(edges) - 1
     for j in range(coefficients.shape[1]):
         low, high, most, since = math.inf, -math.inf, 0.0, math.inf
-        # Before it begins an input is zero.  What has passed one filter and both, of each corner.
+        # Before it begins an input is zero.  Outputs of the first and second filter, by corner.
         before, once, twice, high_once, high_twice, squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         segment, parts, length, span, share = 0, 1, -1.0, 1.0, 1.0
         decay, high_decay, half_decay = 1.0, 1.0, 1.0
@@ -141,6 +141,9 @@ def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
 
 
 def passed(once, twice, change, time, decay):
-    """What has passed a high pass once and twice after a linear change; time is in its constant."""
+    """Outputs of a high pass and of two in series after a linear change.
+
+    Time is relative to their time constant.
+    """
     steady = change / time
     return steady + (once - steady) * decay, (twice + change - once * time) * decay

@@ -35,7 +35,7 @@ def fitted_pieces(maneuver: Excitation) -> Pieces:
         raise InputError(
             f"input {maneuver.inputs[column]} is not finite at t = {probe[sample]:.6g} s"
         )
-    # A short pulse may lie between the probes of the whole run.
+    # A short pulse may lie between the probes of the run.
     inside = np.concatenate([np.linspace(a, b, 18)[1:-1] for a, b in pairwise(edges)])
     times, samples = np.concatenate([probe, inside]), np.concatenate([values, maneuver.at(inside)])
     largest = np.abs(samples).max(axis=0) + 1e-300
@@ -54,16 +54,16 @@ def _segment(
     a, b = ends
     # One-sided values at the ends, where the input may jump.
     inside = min(max(1e-13, 2.0 * np.spacing(b) / (b - a)), 1e-6)
-    known_places = (known[0] - a) / (b - a)
-    within = (known_places > inside) & (known_places < 1.0 - inside)
-    known_places, known_values = known_places[within], known[1][within]
+    known_parts = (known[0] - a) / (b - a)
+    within = (known_parts > inside) & (known_parts < 1.0 - inside)
+    known_parts, known_values = known_parts[within], known[1][within]
 
-    def inputs_at(places: np.ndarray) -> np.ndarray:
-        times = a + (b - a) * np.clip(places, inside, 1.0 - inside)
+    def inputs_at(parts: np.ndarray) -> np.ndarray:
+        times = a + (b - a) * np.clip(parts, inside, 1.0 - inside)
         values = maneuver.at(times.ravel())
         if not np.isfinite(values).all():
             raise InputError(f"an input is not finite between t = {a:g} and {b:g} s")
-        return values.reshape(*places.shape, -1)
+        return values.reshape(*parts.shape, -1)
 
     nodes = _nodes()
     middles = 0.5 * (nodes[1:] + nodes[:-1])
@@ -81,7 +81,7 @@ def _segment(
         coefficients[-1] = (_powers(np.fmin(nodes, 1.0 - inside * pieces)) @ values[-1]).T
         between = (coefficients @ middles ** np.arange(DEGREE + 1)[:, None]).swapaxes(1, 2)
         errors = between - inputs_at((left + middles) / pieces)
-        further = _values(coefficients, known_places) - known_values
+        further = _values(coefficients, known_parts) - known_values
         if max(np.abs(e / largest).max(initial=0.0) for e in (errors, further)) < ACCURACY:
             return np.ascontiguousarray(coefficients)
         pieces *= 2
@@ -102,8 +102,8 @@ def _powers(nodes: np.ndarray) -> np.ndarray:
     return np.linalg.inv(nodes[:, None] ** np.arange(DEGREE + 1))
 
 
-def _values(coefficients: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Polynomials (places, inputs) at places between 0 and 1 of their segment."""
-    pieces = np.floor(places * len(coefficients)).astype(int)
-    powers = (places * len(coefficients) - pieces)[:, None] ** np.arange(DEGREE + 1)
+def _values(coefficients: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Polynomials (n, inputs) at parts (n,) between 0 and 1 of their segment."""
+    pieces = np.floor(parts * len(coefficients)).astype(int)
+    powers = (parts * len(coefficients) - pieces)[:, None] ** np.arange(DEGREE + 1)
     return np.einsum("nip,np->ni", coefficients[pieces], powers)

@@ -95,15 +95,15 @@ def _series(seed: int) -> np.ndarray:
 
 
 def tracks(seed: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heights (n, 2) in m of the left and right track at the places (n,) in m, and slopes (n, 2).
+    """Heights (n, 2) in m of the left and right track at distances (n,) in m, and slopes (n, 2).
 
     The sum of all waves, as exact as it can be added up: a Taylor series around the nearest cell.
     """
-    place = x * STEP * CELLS
-    cell = np.rint(place)
+    position = x * STEP * CELLS
+    cell = np.rint(position)
     row = cell.astype(np.int64) % CELLS
     # Arrays of one shape multiply ten times as fast as by broadcasting.
-    part = np.repeat((place - cell)[:, None], 2, axis=1)
+    part = np.repeat((position - cell)[:, None], 2, axis=1)
     height, slope = np.zeros((2, len(x), 2))
     for coefficients in _series(seed)[::-1]:
         slope *= part

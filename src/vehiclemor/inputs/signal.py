@@ -1,4 +1,4 @@
-"""Signals: inputs from samples, wherever a maneuver is wanted."""
+"""Signals: inputs through samples, beside the functions of maneuvers."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ FUNCTION_STEP = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Signal(Excitation):
-    """Inputs through samples, made by `from_samples`, `from_function` or `from_csv`.
+    """Inputs through samples; its constructors are `from_samples`, `from_function`, `from_csv`.
 
     It ends with the last sample, whatever the hold: later inputs are refused, not extrapolated.
     `perturbed` scales its time, so its duration, and its values.

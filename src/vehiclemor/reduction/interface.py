@@ -69,7 +69,7 @@ MEMBERS = ("simulate", "best_approximation", "offline", "order")
 
 
 class FittedModel(Protocol):
-    """What `fit` returns: whole runs.
+    """What `fit` returns: a model that is run.
 
     One that can be stepped too is a `ReducedSystem` or a `ReducedMechanism`, or has `states`,
     `begin`, `step`, `rates`, `sensitivities`, `decode` and `trust` as these do.
@@ -88,7 +88,7 @@ class FittedModel(Protocol):
     def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """Trajectory at the maneuver's output times.
 
-        It may take `outputs`, the names (a tuple) of all that is kept of it; see `simulated`.
+        It may take `outputs`, a tuple of the names of the recorded ones; see `simulated`.
         """
         ...
 
@@ -153,7 +153,7 @@ class Method(ShortRepr):
         What `fit` reads of the training: its `runs`, which are of the model that it reduces; their
         `inputs` alone; or `nothing`.
     own_limits
-        Whether its runs have a trust indicator of their own, or it knows no bounds; else a run
+        Whether its runs carry a trust indicator, or it knows no bounds; else a run
         beyond the inputs that `fit` has read is not trusted.
     band
         Name of the setting up to whose frequency in Hz a structure's inputs are known, of a method
@@ -230,7 +230,7 @@ class Method(ShortRepr):
     def known_range(
         self, model: Model, settings: Mapping[str, Any], trained: Callable[[], InputRange | None]
     ) -> InputRange | None:
-        """Inputs that are known, where runs have no trust of their own; none where all are."""
+        """Known inputs, where runs carry no trust indicator; none where all are known."""
         if self.own_limits:
             return None
         if self.learns_from != "nothing":

@@ -1,7 +1,7 @@
-"""Reduced models as files: one netCDF-4 file with all that they are made of, and nothing to run.
+"""Reduced models as files: one netCDF-4 file with all of their parts, and nothing to run.
 
 Numbers are variables by the names of the fields that they stand in, operations of features too;
-their order is JSON.  Machine code is made of these operations, or comes from the cache.
+their order is JSON.  Machine code is compiled from these operations, or comes from the cache.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
 
 
 def read(path: Any) -> dict[str, Any]:
-    """What a `ReducedOrderModel` is made of, by name, from its file; see `rom.load`."""
+    """Arguments of `ReducedOrderModel` from its file; see `rom.load`."""
     path = file_path("path", path)
     stored, attrs = content(path)
     try:
@@ -101,14 +101,14 @@ def read(path: Any) -> dict[str, Any]:
         if not _alike(stored.pop("fingerprint"), fingerprint(model)):
             raise FileError(f"the equations of {name} have changed since")
         reader = Parts(model, stored)
-        made = {name: reader.read(parts[name], name, of) for name, of in PARTS.items()}
-        checked_fit(method, made["reduced"])
+        fields = {name: reader.read(parts[name], name, of) for name, of in PARTS.items()}
+        checked_fit(method, fields["reduced"])
         kinds = {"ae": 1, "structural": len(BANDS)}.get(model.kind, 3)
-        require(made["input_range"].largest.shape == (kinds, len(model.inputs)), "largest")
-        if not _alike(stored["response"], response(model, made["reduced"])):
+        require(fields["input_range"].largest.shape == (kinds, len(model.inputs)), "largest")
+        if not _alike(stored["response"], response(model, fields["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")
-        own = {"model": model, "method": method, "settings": settings, "training": tuple(training)}
-        return own | made
+        further = {"model": model, "method": method, "settings": settings}
+        return further | {"training": tuple(training)} | fields
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
         raise _unfit(path, one_line(error)) from None
     except (SyntaxError, ValueError, VehiclemorError) as error:
@@ -146,7 +146,7 @@ def fingerprint(model: Model) -> np.ndarray:
 def response(model: Model, reduced: Any) -> np.ndarray:
     """What a reduced model gives after one step, full states too; none if it can't be stepped.
 
-    Equal for equal models, whatever version of this package has made them.
+    Equal for equal models, whatever version of this package has reduced them.
     """
     if not hasattr(reduced, "step"):
         return np.empty(0)
@@ -168,15 +168,15 @@ def _parameters(model: Model) -> dict[str, Any]:
 
 
 def _model(name: str, parameters: Mapping[str, Any]) -> Model:
-    """The model with these parameters; those that are its file's own keep their sources."""
+    """The model with these parameters; those of its parameter file keep their sources."""
     model = build(name)
-    own = _parameters(model)
-    changed = {key: value for key, value in parameters.items() if own.get(key) != value}
+    from_file = _parameters(model)
+    changed = {key: value for key, value in parameters.items() if from_file.get(key) != value}
     return build(name, overrides=changed) if changed else model
 
 
 def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Variables and attributes of a file that is whole and of this format, else `FileError`."""
+    """Variables and attributes of an undamaged file of this format, else `FileError`."""
     shipped = data_folder() in path.absolute().parents
     with opened(path, "saved model", trusted=shipped) as file:
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}

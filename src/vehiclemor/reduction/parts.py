@@ -69,8 +69,7 @@ class Parts:
             named_kind = {} if kind is _record(declared) else {CLASS: _name(value, path)}
             fields = {name: getattr(value, name) for name in types}
             return named_kind | self._write_fields(fields, path, types)
-        if kind in (tuple, list):
-            types = _item_types(choice, len(value))
+        if kind in (tuple, list) and len(types := _item_types(choice, len(value))) == len(value):
             items = enumerate(zip(value, types, strict=True))
             return [self.write(item, f"{path}.{i}", of) for i, (item, of) in items]
         if kind is dict and all(isinstance(key, str) for key in value):
@@ -142,21 +141,25 @@ class Parts:
 
 
 def named(name: str) -> Any:
-    """The dataclass or named tuple `module:name` that checks its sizes, or is of a plug-in.
-
-    `ValueError` if it is anything else.
-    """
+    """The class `module:name` of a part; `ValueError` if it is anything else."""
     module, _, attribute = name.partition(":")
     # Of plug-ins only what is in use already: reading a file imports nothing of theirs.
-    known = module.partition(".")[0] in _plug_ins()
     if module.startswith(ROOMS):
         with suppress(ImportError):
             import_module(module)
     kind = getattr(sys.modules.get(module), attribute, None)
-    known = known or (module.startswith(ROOMS) and hasattr(kind, "check_sizes"))
-    if not (known and _fields(kind) and kind.__module__ == module):
+    if not (_is_part(kind) and kind.__module__ == module):
         raise ValueError(f"there is no {name}")
     return kind
+
+
+def _is_part(kind: Any) -> bool:
+    """Whether it is a dataclass or named tuple that checks its sizes, or that of a plug-in."""
+    if not _fields(kind):
+        return False
+    if kind.__module__.startswith(ROOMS):
+        return hasattr(kind, "check_sizes")
+    return kind.__module__.partition(".")[0] in _plug_ins()
 
 
 @cache
@@ -202,7 +205,7 @@ def _choices(declared: Any) -> tuple[Any, ...]:
 
 def _record(declared: Any) -> Any:
     """The class of a declared type that leaves none open; else none."""
-    records = [choice for choice in _choices(declared) if _fields(choice)]
+    records = [choice for choice in _choices(declared) if _is_part(choice)]
     return records[0] if len(records) == 1 else None
 
 
@@ -214,7 +217,7 @@ def _allows(choice: Any, kind: type) -> bool:
         return kind not in (list, dict)
     if origin is float:
         return kind in (float, int)
-    # A truth value is a whole number to Python, and a list a sequence.
+    # To Python a truth value is an integer, and a list a sequence.
     return kind is origin or (kind not in (bool, list) and issubclass(kind, origin))
 
 

@@ -1,4 +1,4 @@
-"""A model in use, reduced or full: an object that is made once, then run, stepped and asked."""
+"""A model in use, reduced or full: an object that is built once, then run, stepped and asked."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ReducedOrderModel(ShortRepr):
         What the method's fit gave.
     input_range
         Range of the inputs of its training, in which a run is known whose model has learnt from
-        them and has no ranges of its own.
+        them and has no other ranges.
     """
 
     repr_fields = ("model", "method", "settings", "states", "inputs", "output_names")
@@ -77,7 +77,7 @@ class ReducedOrderModel(ShortRepr):
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """Names of the states; empty for a method that gives whole runs alone."""
+        """Names of the states; empty for a model that can't be stepped."""
         return tuple(self._stepped.states) if hasattr(self.reduced, "step") else ()
 
     @cached_property
@@ -110,24 +110,24 @@ class ReducedOrderModel(ShortRepr):
         outputs: Names = None,
         times: Any = None,
     ) -> Trajectory:
-        """A whole run at the maneuver's output times.
+        """A run at the maneuver's output times.
 
         Parameters
         ----------
         maneuver
-            A maneuver or its registered name; the model's own by default.
+            A maneuver or its registered name; by default that of the model.
         start
             Initial condition of the full model, by name or as a state (n,); its first by default.
         outputs, times
-            What alone is kept, see `Trajectory.chosen`.
+            What of it is recorded, see `Trajectory.chosen`.
         """
         chosen = self.model.definition.maneuver if maneuver is None else maneuver
         if isinstance(chosen, str):
             chosen = registered(chosen)
-        begun = self.model.starts[0] if start is None else start
+        first = self.model.starts[0] if start is None else start
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
-            run = simulated(self.reduced, chosen, begun, names)
+            run = simulated(self.reduced, chosen, first, names)
         # A copy would take a twentieth of a short run.
         run.__dict__["method"] = self.method
         if self._lower_rank:
@@ -157,7 +157,7 @@ class ReducedOrderModel(ShortRepr):
 
     @cached_property
     def _range(self) -> InputRange | None:
-        """Inputs that are known, if the method has no ranges of its own."""
+        """Known inputs, if the method does not judge its runs."""
         method: Method = component("method", self.method)
         return method.known_range(self.model, self.settings, lambda: self.input_range)
 
@@ -236,7 +236,7 @@ class ReducedOrderModel(ShortRepr):
         ----------
         with_respect_to
             `state`, `inputs`, or names of the model's parameters, of which each component has a
-            column; a reduced model has them only where it holds the model's own equations.
+            column; a reduced model has them only where its equations are those of the model.
         of
             `rhs` or `outputs`; of a kinematic model `outputs` or `coordinates`.
 
@@ -258,35 +258,36 @@ class ReducedOrderModel(ShortRepr):
     def full_state(self, state: Any, inputs: Any) -> np.ndarray:
         """State (n,) of the full model, or states (samples, n) of as many."""
         states, u, single = self._samples(state, inputs)
-        found = self._stepped.decode(states, u)
-        return found[0] if single else found
+        full = self._stepped.decode(states, u)
+        return full[0] if single else full
 
     def outputs(self, state: Any, inputs: Any) -> np.ndarray:
         """Outputs (outputs,) at a state, or (samples, outputs) along states (samples, dim)."""
         states, u, single = self._samples(state, inputs)
         if hasattr(self._stepped, "outputs"):
-            found = self._stepped.outputs(states, u)
-            return found[0] if single else found
+            outputs = self._stepped.outputs(states, u)
+            return outputs[0] if single else outputs
         full = self._stepped.decode(states, u)
         if not single:
             return self.model.values_at("outputs", full, u)
-        found = np.empty(len(self.model.outputs))
-        self.model.kernels.call("outputs", full[0], u[0], self.model.constants, found)
-        return found
+        outputs = np.empty(len(self.model.outputs))
+        self.model.kernels.call("outputs", full[0], u[0], self.model.constants, outputs)
+        return outputs
 
     def trust(self, state: Any, inputs: Any) -> Trust:
         """How far a state, or states (samples, dim), go in what the model knows.
 
-        A model without ranges of its own knows the inputs that it was trained on, and the full
+        A model that does not judge itself knows the inputs that it was trained on, and the full
         one the ranges of validity of inputs and outputs that it declares.  Where a run came from is
         not in a state.
         """
         states, u, _ = self._samples(state, inputs)
-        found = self._stepped.trust(states, u)
-        if found is None and self._range is not None:
-            found = self._range.trust_of_inputs(self.inputs, u)
-        left = self._left_validity(states, u)
-        return Trust(np.inf, 0.0, left) if left else found or Trust(0.0)
+        if left := self._left_validity(states, u):
+            return Trust(np.inf, 0.0, left)
+        trust = self._stepped.trust(states, u)
+        if trust is None and self._range is not None:
+            trust = self._range.trust_of_inputs(self.inputs, u)
+        return trust or Trust(0.0)
 
     def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:
         """Which input or output is beyond what the full model declares, if one is."""

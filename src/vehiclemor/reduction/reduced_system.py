@@ -27,7 +27,7 @@ from vehiclemor.simulation.stepping import Sensitivity, SteppedSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Run, Solver
 
-# Initial conditions that are kept in reduced states.
+# Initial conditions whose reduced states are cached.
 MOST_STARTS = 64
 
 
@@ -35,7 +35,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
     """Base of systems in reduced states of a full-order model, with the ways there and back.
 
     A subclass is a dataclass that has the attributes below, as fields or cached properties, and
-    overrides what is another than in the model's own states: `states`, `encode`, `decode`,
+    overrides what differs from the model's states: `states`, `encode`, `decode`,
     `decoder_slopes`, `trust`.
 
     Attributes
@@ -73,7 +73,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         return np.eye(len(state)), np.zeros((len(state), len(inputs)))
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
-        """How far states (samples, dim) go in what the model knows, if it has ranges of its own."""
+        """How far states (samples, dim) go in what the model knows, if it judges itself."""
         del states, inputs
 
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
@@ -81,15 +81,15 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         return self.projected(self.known(start, inputs), inputs).copy()
 
     def known(self, start: Start, inputs: np.ndarray) -> Any:
-        """What `prepared` gives of a start at inputs; kept by its name or its numbers."""
+        """What `prepared` gives of a start at inputs; cached by its name or its numbers."""
         name = start if isinstance(start, str) else self.model.start(start).tobytes()
         key = name, inputs.tobytes()
-        found = self._starts.get(key)
-        if found is None:
+        prepared = self._starts.get(key)
+        if prepared is None:
             if len(self._starts) >= MOST_STARTS:
                 self._starts.clear()
-            found = self._starts[key] = self.prepared(self.model.start(start), inputs)
-        return found
+            prepared = self._starts[key] = self.prepared(self.model.start(start), inputs)
+        return prepared
 
     def prepared(self, state: np.ndarray, inputs: np.ndarray) -> Any:
         """What runs from a full state (2 n,) need of it: the state that is stepped."""
@@ -111,7 +111,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         else:
             raise InputError(
                 f"the reduced equations of {self.model.name} don't know {', '.join(names)}: "
-                f"reduce a model that is made with another value"
+                f"reduce a model with another value"
             )
         if function == "derivative":
             return self.rate_sensitivities(state, inputs, time, sensitivity)
@@ -120,8 +120,8 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         by_state = self.model.jacobian_of(function, full, inputs, "state")
         if sensitivity.argument == STATE:
             return by_state @ slopes[STATE]
-        found = self.model.jacobian_of(function, full, inputs, by)
-        return found + by_state @ slopes[INPUTS] if sensitivity.argument == INPUTS else found
+        direct = self.model.jacobian_of(function, full, inputs, by)
+        return direct + by_state @ slopes[INPUTS] if sensitivity.argument == INPUTS else direct
 
     def run(
         self,
@@ -142,9 +142,9 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         inputs = maneuver.recorded_inputs[1]
         run = self.run(maneuver, self.known(start, inputs[0]))
         states = self.decode(run.recorded_states, inputs)
-        found = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)
+        trajectory = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)
         run.give_back()
-        return found
+        return trajectory
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """There is no subspace."""
@@ -188,10 +188,10 @@ class ReducedMechanism(ShortRepr):
     ) -> np.ndarray:
         """Coordinates at the end of the step."""
         ends = inputs if next_inputs is None else next_inputs
-        found = self.solved(time + dt, ends[None], state)
-        if found.status == "diverged":
-            raise ConvergenceError(f"{self.model.name}: {found.message}", found)
-        return found.coordinates[0].copy()
+        solution = self.solved(time + dt, ends[None], state)
+        if solution.status == "diverged":
+            raise ConvergenceError(f"{self.model.name}: {solution.message}", solution)
+        return solution.coordinates[0].copy()
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """There are none."""
@@ -212,10 +212,13 @@ class ReducedMechanism(ShortRepr):
         return states
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
-        """How far the inputs go in what the model knows, if it has ranges of its own."""
-        found = [self.solved(0.0, u[None], q).trust for q, u in zip(states, inputs, strict=True)]
-        known = [trust for trust in found if trust is not None]
-        return max(known, key=lambda trust: trust.indicator, default=None)
+        """How far the inputs go in what the model knows, if it judges itself."""
+        judged: list[Trust] = []
+        for state, u in zip(states, inputs, strict=True):
+            trust = self.solved(0.0, u[None], state).trust
+            if trust is not None:
+                judged.append(trust)
+        return max(judged, key=lambda trust: trust.indicator, default=None)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """There is no subspace."""

@@ -24,11 +24,13 @@ class Settings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
     # Former name of a setting -> its name.
     renamed: ClassVar[Mapping[str, str]] = {}
+    # Settings that `fit` only hands on: the reduced model, a dataclass, has fields of these names.
+    integration: ClassVar[tuple[str, ...]] = ()
 
     @field_validator("*", mode="before")
     @classmethod
     def _plain_number(cls, value: object) -> object:
-        """NumPy's numbers as Python's, and 3.0 as 3: the field's own type decides what it is."""
+        """NumPy's numbers as Python's, and 3.0 as 3: the type of the field decides what it is."""
         if isinstance(value, np.integer | np.floating):
             value = value.item()
         if isinstance(value, int | float) and LARGEST_NUMBER < abs(value) < np.inf:
@@ -78,6 +80,7 @@ Tolerance = Annotated[
 class OnlineSettings(Settings):
     """How a reduced system is integrated."""
 
+    integration = ("solver", "tolerance")
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 1e-3
 

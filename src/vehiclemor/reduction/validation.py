@@ -76,13 +76,13 @@ def fitted(method: Method, model: Model, training: Training, settings: Any) -> F
 
 def for_model(method: Method, reduced: FittedModel, model: Model, settings: Any) -> FittedModel:
     """What a method gives of a model with other parameters; `InputError` if it learns from runs."""
-    remade, own = getattr(reduced, "for_model", None), getattr(reduced, "model", model)
-    if method.learns_from == "runs" and (remade is None or difference(own, model)):
+    remade, before = getattr(reduced, "for_model", None), getattr(reduced, "model", model)
+    if method.learns_from == "runs" and (remade is None or difference(before, model)):
         raise InputError(
             f"{method.name} is trained on runs of one model: reduce that with the other parameters"
         )
     # Of a model with online parameters the others ask for a new fit.
-    if remade is not None and not (model.definition.online and difference(own, model)):
+    if remade is not None and not (model.definition.online and difference(before, model)):
         with blamed(f"method {method.name!r}: for_model", remade):
             return checked_fit(method.name, remade(model))
     return fitted(method, model, (), settings)
@@ -113,9 +113,10 @@ def checked_run(model: Model, maneuver: Excitation, start: Start, reduced: Any) 
     columns = {name: (len(getattr(model, name)),) for name in ("coordinates", "speeds", "outputs")}
     for name, size in {"times": (), **columns}.items():
         shape = (maneuver.samples, *size)
-        found = np.asarray(getattr(run, name))
-        if found.shape != shape or found.dtype != float:
-            raise PlugInError(f"{whose} {name} {found.shape} of {found.dtype}, not {shape} floats")
+        values = np.asarray(getattr(run, name))
+        if values.shape != shape or values.dtype != float:
+            of_type = f"{values.shape} of {values.dtype}"
+            raise PlugInError(f"{whose} {name} {of_type}, not {shape} floats")
     if run.status not in STATUSES or not isinstance(run.seconds, float | int):
         raise PlugInError(f"{whose} status {run.status!r} and seconds {quoted(run.seconds)}")
     if not isinstance(run.counts, Mapping):

@@ -8,16 +8,21 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
+import vehiclemor.report.criteria  # noqa: F401 - fills CRITERIA
 from vehiclemor.arguments import count, file_path
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component, names, unknown
-from vehiclemor.report.criteria import CRITERIA
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.findings import Criterion, Finding, Results, judged
+from vehiclemor.report.findings import CRITERIA, Criterion, Finding, Results, judged
 from vehiclemor.report.frames import frame, grid_rows
 from vehiclemor.report.labels import of_kind, timing_cases
-from vehiclemor.report.printed_numbers import CLAIMS, TIMING, compared, number_criterion
+from vehiclemor.report.printed_numbers import (
+    TIMING,
+    number_criterion,
+    printed_errors_and_savings,
+)
 from vehiclemor.report.published import Claim, Number, load_published
+from vehiclemor.report.result_selection import result_kind
 from vehiclemor.report.sizes import size_rows
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.resources import data_names
@@ -86,17 +91,17 @@ def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
     """Every number and claim of the paper, by model, with verdict and reason; see `compare`."""
     results = dict(run_studies(PAPER, folder, jobs))
     results |= {timing: timing_of(model, folder) for model, timing in TIMING.items()}
-    models = [*dict.fromkeys(number.model for number in compared()), ALL_MODELS]
+    models = [*dict.fromkeys(number.model for number in printed_errors_and_savings()), ALL_MODELS]
     return pd.DataFrame(sorted(published_rows(results), key=lambda row: models.index(row["model"])))
 
 
 def published_rows(results: Results) -> Iterator[Row]:
     """Numbers, then claims of the paper, by the results of its studies and timings by name."""
-    results = {name: of_published_start(dataset) for name, dataset in results.items()}
-    judged_by = [(number, number_criterion(number)) for number in compared()]
-    judged_by += [(c, claim_criterion(c)) for c in load_published().claim if c.kind != "setup"]
-    for entry, criterion in judged_by:
-        yield from rows_of(entry, criterion, results)
+    results = {name: at_published_start(dataset) for name, dataset in results.items()}
+    for number in printed_errors_and_savings():
+        yield from rows_of(number, number_criterion(number), results)
+    for claim in load_published().claim:
+        yield from rows_of(claim, claim_criterion(claim), results)
 
 
 def stored_rows(results: Path) -> Iterator[Row]:
@@ -109,31 +114,37 @@ def stored_rows(results: Path) -> Iterator[Row]:
 
 def claim_criterion(claim: Claim) -> Criterion:
     """The criterion of a claim; without one nothing is measured."""
-    if found := (CRITERIA | CLAIMS).get(claim.id):
-        return found
+    if claim.id in CRITERIA:
+        return CRITERIA[claim.id]
     finding = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-")
-    return Criterion(lambda *_: finding, variants={"": ""}, of_replay=False)
+    return Criterion(lambda *_: finding, variants={"": ""}, applies_to_replay=False)
 
 
-def of_published_start(dataset: xr.Dataset) -> xr.Dataset:
+def at_published_start(dataset: xr.Dataset) -> xr.Dataset:
     """A study or timing from the start that what is published is judged by."""
-    several = PUBLISHED_START in dataset.indexes.get("start", ())
-    return dataset.sel(start=PUBLISHED_START) if several else dataset
+    if PUBLISHED_START in dataset.indexes.get("start", ()):
+        return dataset.sel(start=PUBLISHED_START)
+    return dataset
 
 
 def rows_of(entry: Number | Claim, criterion: Criterion, results: Results) -> Iterator[Row]:
     """A row for each variant of the method."""
-    head: Row = {"id": entry.id, "model": entry.model or ALL_MODELS}
+    published = replay = math.nan
     if isinstance(entry, Number):
-        head["item"] = f"{entry.item} (figure {entry.figure})" if entry.figure else entry.item
+        item, published = entry.item, entry.value
+        if entry.figure:
+            item = f"{item} (figure {entry.figure})"
     else:
-        head["item"] = f"figure {entry.figure}: " * bool(entry.figure) + entry.statement
-    head["published"] = entry.value if isinstance(entry, Number) else math.nan
-    replay = criterion.judge(results, "replay").reproduced if criterion.of_replay else math.nan
+        item = entry.statement
+        if entry.figure:
+            item = f"figure {entry.figure}: {item}"
+    head = {"id": entry.id, "model": entry.model or ALL_MODELS, "item": item}
+    if criterion.applies_to_replay:
+        replay = criterion.judge(results, "replay").reproduced
     for label, variant in criterion.variants.items():
         finding = criterion.judge(results, label)
-        own = {"variant": variant, "verdict": judged(finding.within), "replay": replay}
-        yield head | own | finding._asdict()
+        outcome = {"variant": variant, "verdict": judged(finding.within), "replay": replay}
+        yield head | {"published": published} | outcome | finding._asdict()
 
 
 def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
@@ -164,9 +175,12 @@ def study_comparison(
 
 def result_rows(dataset: xr.Dataset) -> Sequence[Row]:
     """Rows of one study, by what it is."""
-    if "mesh" in dataset.dims:
-        return list(size_rows(dataset))
-    return protocol_rows(dataset) if "scenario_set" in dataset.coords else grid_rows(dataset)
+    match result_kind(dataset):
+        case "size study":
+            return list(size_rows(dataset))
+        case "protocol":
+            return protocol_rows(dataset)
+    return grid_rows(dataset)
 
 
 def timing_of(model: str, folder: Path) -> xr.Dataset:
@@ -204,8 +218,8 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
         "quartile_spread": (spread / seconds).where(seconds > 0.0, 0.0),
         "loop_us": 1e6 * runs["loop_seconds"],
         "offline_us": 1e6 * offline,
-        "break_even": _break_even(runs, "speed_up"),
-        "break_even_strongest": _break_even(runs, "speed_up_strongest"),
+        "break_even": break_even(runs, "speed_up"),
+        "break_even_strongest": break_even(runs, "speed_up_strongest"),
     }
     speed_ups = ["speed_up", "speed_up_strongest"]
     columns = ["start", "case", "label", "status", "rank", "us_per_run", "ns_per_sample", *counts]
@@ -216,7 +230,7 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
     return runs.assign(**derived).rename(columns=renamed)[columns]
 
 
-def _break_even(runs: Any, speed_up: str) -> Any:
+def break_even(runs: Any, speed_up: str) -> Any:
     """Runs that earn the training, by a column of speed-ups; missing where none saves time."""
     # A run that has failed saves nothing.
     saved = (runs["seconds"] * (runs[speed_up] - 1.0)).where(runs["status"] == "ok", 0.0)

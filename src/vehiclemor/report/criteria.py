@@ -1,6 +1,5 @@
 """The paper's claims as criteria that can fail: figures 3, 6, 10 to 14, and statements."""
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,11 +17,10 @@ from vehiclemor.report.findings import (
     INDISTINGUISHABLE,
     SMALLEST_CHANGE,
     VISIBLE,
-    Criterion,
     Finding,
     Results,
-    agree,
     at_point,
+    criterion,
     largest_deviation,
     not_visible,
     worst_of,
@@ -50,20 +48,47 @@ NOMINAL = {
     "figures-9-10": (1, HIGH_FIDELITY_OUTPUTS),
 }
 FIGURE_13 = ("figure-13-frequency", "figure-13-amplitude")
+# Variants of criteria that compare subspaces: both have the same.
+OF_SUBSPACES = {"pod": "default, literal"}
+# Rank 6 of snapshots of rank 4: the default settings would cut it.
+UNCUT = {"pod_uncut": "default, no rank cut", "pod_literal": "literal"}
+DEVIATION = "largest deviation of the angle, as a share of its range"
+TWICE = "largest deviation of the suspension's angle at twice the frequency, as of figure 14"
+
+
+@criterion("gv_fig3_closely_matches", study="figures-2-4", outputs=OUTPUTS)
+@criterion(
+    "hfv_fig10_one_state_excellent", study="figures-9-10", outputs=HIGH_FIDELITY_OUTPUTS, rank=1
+)
+@criterion("dw_fig6_nearly_identical", study="figures-6-7", outputs=BOTH, bound=INDISTINGUISHABLE)
+@criterion("dw_fig11_displacement_unaffected", study="figure-11", outputs=(DISPLACEMENT,))
+@criterion("dw_fig12_no_divergence", study="figure-12", outputs=BOTH)
+def agrees(
+    results: Results,
+    label: str,
+    study: str,
+    outputs: tuple[str, ...],
+    bound: float = VISIBLE,
+    rank: int = 3,
+) -> Finding:
+    """No output deviates by more than a share of its range in a study."""
+    return not_visible(at_point(results[study], label, rank=rank), outputs, bound)
 
 
 # The vehicle with independent suspensions.
 
 
+@criterion("gv_three_states_suffice", applies_to_replay=False)
 def three_states_suffice(results: Results, label: str) -> Finding:
     """Text: three states hold most of the information, by the best approximation in them."""
     chosen = at_point(results["figures-2-4"], label, rank=3)
     shares = chosen["floor_rms_error"] / chosen["signal_range"]
     worst, where = worst_of({output: float(shares.sel(output=output)) for output in OUTPUTS})
     text = "RMS error of the best approximation of an output, as a share of its range"
-    return Finding(worst, VISIBLE, worst < VISIBLE, text, f"of {where}")
+    return Finding.below(worst, VISIBLE, measure=text, reason=f"of {where}")
 
 
+@criterion("gv_control_periods_sharpen_basis", applies_to_replay=False)
 def shorter_periods_sharpen_basis(results: Results, label: str) -> Finding:
     """Text: a subspace for each control period is more accurate than one for a longer time."""
     study = at_point(results["vehicle-control-period"], label, rank=3)
@@ -74,10 +99,13 @@ def shorter_periods_sharpen_basis(results: Results, label: str) -> Finding:
         f"RMS error of the best approximation with {PERIOD:g} s as a multiple of that with 5 s, "
         "worse of pitch and yaw"
     )
-    return Finding(worst, bound, worst < bound, text, f"the better: {float(ratios.min()):.2g}")
+    better = f"the better: {float(ratios.min()):.2g}"
+    return Finding.below(worst, bound, measure=text, reason=better)
 
 
-def longer_periods_save_time(bound: float, results: Results, label: str) -> Finding:
+@criterion("gv_longer_period_saves_time", applies_to_replay=False, bound=1.0 - SUBSTANTIAL)
+@criterion("all_accuracy_buys_time", applies_to_replay=False, bound=1.0 - SMALLEST_CHANGE)
+def longer_periods_save_time(results: Results, label: str, bound: float) -> Finding:
     """Text: longer control periods save time, at the price of some deviation."""
     study = at_point(results["vehicle-control-period"], label, rank=3)
     ratio = study.sel(control_period=LONGER_PERIOD)[["rhs_calls", "rms_error"]]
@@ -85,14 +113,16 @@ def longer_periods_save_time(bound: float, results: Results, label: str) -> Find
     calls = float(ratio["rhs_calls"])
     finished = bool((study["status"].sel(control_period=[PERIOD, LONGER_PERIOD]) == "ok").all())
     text = f"evaluations with {LONGER_PERIOD:g} s as a multiple of those with {PERIOD:g} s"
-    grows = f"the yaw error grows {float(ratio['rms_error']):.2g} times"
-    seen = grows if finished else "a run diverges"
-    return Finding(calls, bound, finished and calls < bound, text, seen)
+    seen = f"the yaw error grows {float(ratio['rms_error']):.2g} times"
+    if not finished:
+        seen = "a run diverges"
+    return Finding.below(calls, bound, measure=text, reason=seen, valid=finished)
 
 
 # The suspension.
 
 
+@criterion("dw_fig11_angle_diverges_at_end")
 def angle_diverges_at_end(results: Results, label: str) -> Finding:
     """Figure 11: the largest error of the angle is visible and lies at the end of the run."""
     point = at_point(results["figure-11"], label, rank=3).sel(output=ANGLE)
@@ -102,21 +132,25 @@ def angle_diverges_at_end(results: Results, label: str) -> Finding:
     before = float(error.sel(time=slice(0.0, end)).max())
     text = "largest deviation of the angle, as a share of its range"
     seen = f"at t = {moment:.2f} s; before {end:g} s it stays below {before:.2g}"
-    return Finding(largest, VISIBLE, largest > VISIBLE and moment > end, text, seen)
+    return Finding.above(largest, VISIBLE, measure=text, reason=seen, valid=moment > end)
 
 
+@criterion("dw_fig11_shorter_period_reduces_deviation")
 def shorter_period_reduces_deviation(results: Results, label: str) -> Finding:
     """Figure 11: a control period of a tenth of the length reduces the angle's deviation."""
     data = at_point(results["figure-11-control-period"], label).sel(output=ANGLE)
     errors: Any = (data["rms_error"] / data["rms_error"].sel(control_period=5.0)).to_series()
-    longer, counts = errors[(errors.index > PERIOD) & (errors.index < 5.0)], data["iterations"]
-    listed = ", ".join(f"{ratio:.3g} at {period:g} s" for period, ratio in longer.items())
-    iterations = ", ".join(f"{n:.0f} at {period:g} s" for period, n in counts.to_series().items())
+    longer: Any = errors[(errors.index > PERIOD) & (errors.index < 5.0)]
+    counts = data["iterations"].to_series()
+    others = ", ".join(f"{ratio:.3g} at {period:g} s" for period, ratio in longer.items())
+    iterations = ", ".join(f"{n:.0f} at {period:g} s" for period, n in counts.items())
     value, bound = float(errors[PERIOD]), 1.0 - SMALLEST_CHANGE
     text = f"RMS error of the angle with {PERIOD:g} s as a multiple of that with 5 s"
-    return Finding(value, bound, value < bound, text, f"{listed}; iterations: {iterations}")
+    seen = f"{others}; iterations: {iterations}"
+    return Finding.below(value, bound, measure=text, reason=seen)
 
 
+@criterion("dw_fig12_basis_insensitive_to_amplitude", OF_SUBSPACES, applies_to_replay=False)
 def basis_insensitive_to_amplitude(*_: object) -> Finding:
     """Figure 12: training at amplitude +20 % gives nearly the same subspaces."""
     nominal = trained(1.0, 1.0).bases
@@ -131,7 +165,7 @@ def basis_insensitive_to_amplitude(*_: object) -> Finding:
         "at the larger amplitude"
     )
     seen = f"for frequency +20 % it is {angle(1.2, 1.0):.2g}"
-    return Finding(largest, SIMILAR_SUBSPACES, largest < SIMILAR_SUBSPACES, text, seen)
+    return Finding.below(largest, SIMILAR_SUBSPACES, measure=text, reason=seen)
 
 
 def trained(frequency: float, amplitude: float) -> AlgebraicProjection:
@@ -145,7 +179,9 @@ def trained(frequency: float, amplitude: float) -> AlgebraicProjection:
     return fit_windows(model, [TrainingRun(model, run, model.starts[0])], edges, settings)
 
 
-def not_monotone(quantity: str, results: Results, label: str) -> Finding:
+@criterion("dw_fig13_not_monotone_frequency", quantity="frequency")
+@criterion("dw_fig13_not_monotone_amplitude", quantity="amplitude")
+def not_monotone(results: Results, label: str, quantity: str) -> Finding:
     """Figure 13: a larger perturbation of the input need not give a larger error."""
     study = results[f"figure-13-{quantity}"]
     factors = study[f"{quantity}_factor"].values
@@ -159,19 +195,21 @@ def not_monotone(quantity: str, results: Results, label: str) -> Finding:
     largest = max(falls.values())
     text = "largest fall of an RMS error over a step away from the nominal input, as a share of it"
     seen = f"displacement {falls[DISPLACEMENT]:.2g}, angle {falls[ANGLE]:.2g}"
-    return Finding(largest, SMALLEST_CHANGE, largest > SMALLEST_CHANGE, text, seen)
+    return Finding.above(largest, SMALLEST_CHANGE, measure=text, reason=seen)
 
 
 def _relative(results: Results, label: str) -> list[xr.DataArray]:
     """RMS errors over the range of the signal, by `factor`: of the frequency, of the amplitude."""
-    points = [at_point(results[study], label) for study in FIGURE_13]
-    shares = [(point["rms_error"] / point["signal_range"]).sel(output=[*BOTH]) for point in points]
-    return [
-        share.rename({f"{study.removeprefix('figure-13-')}_factor": "factor"})
-        for study, share in zip(FIGURE_13, shares, strict=True)
-    ]
+    shares: list[xr.DataArray] = []
+    for study in FIGURE_13:
+        point = at_point(results[study], label)
+        share = (point["rms_error"] / point["signal_range"]).sel(output=[*BOTH])
+        quantity = study.removeprefix("figure-13-")
+        shares.append(share.rename({f"{quantity}_factor": "factor"}))
+    return shares
 
 
+@criterion("dw_fig13_angle_more_sensitive")
 def angle_more_sensitive(results: Results, label: str) -> Finding:
     """Figure 13: the angle's error, as a share of its range, is the larger one mostly."""
     errors = xr.concat(_relative(results, label), "factor")
@@ -179,24 +217,28 @@ def angle_more_sensitive(results: Results, label: str) -> Finding:
     text = (
         "share of perturbations at which the angle's RMS error / range exceeds the displacement's"
     )
-    return Finding(share, 0.5, share > 0.5, text)
+    return Finding.above(share, 0.5, measure=text)
 
 
+@criterion("dw_more_robust_to_amplitude")
 def more_robust_to_amplitude(results: Results, label: str) -> Finding:
     """Conclusion: at equal perturbations the error is smaller for amplitude than for frequency."""
     frequency, amplitude = xr.align(*_relative(results, label), join="inner")
     smaller = (amplitude < frequency)[{"factor": amplitude["factor"].values != 1.0}]
     share = float(smaller.mean())
     text = "share of the pairs of equal perturbations at which amplitude hurts less"
-    return Finding(share, 0.5, share > 0.5, text, f"{smaller.size} pairs")
+    return Finding.above(share, 0.5, measure=text, reason=f"{smaller.size} pairs")
 
 
-def leaves_full_model(text: str, results: Results, label: str) -> Finding:
+@criterion("dw_fig14_three_states_fail", measure=DEVIATION)
+@criterion("all_may_deviate", measure=TWICE)
+def leaves_full_model(results: Results, label: str, measure: str) -> Finding:
     """Figure 14: at frequency +100 % the angle deviates visibly with r = 3."""
     largest = largest_deviation(at_point(results["figure-14"], label, rank=3), ANGLE)
-    return Finding(largest, VISIBLE, largest > VISIBLE, text)
+    return Finding.above(largest, VISIBLE, measure=measure)
 
 
+@criterion("dw_fig14_dropped_modes_excited", OF_SUBSPACES, applies_to_replay=False)
 def dropped_modes_excited(*_: object) -> Finding:
     """Figure 14: at frequency +100 % three modes no longer hold most of the energy (eq. 5-8)."""
     fitted = trained(1.0, 1.0)
@@ -210,9 +252,10 @@ def dropped_modes_excited(*_: object) -> Finding:
     share, more = 1.0 - left_out[1], left_out[1] / left_out[0]
     text = "share of the energy of the run at twice the frequency that three modes hold"
     seen = f"they leave out {left_out[1]:.2g} of it, {more:.2g} times as much as of the nominal run"
-    return Finding(share, 0.5, share < 0.5, text, seen, IN_WORDS)
+    return Finding.below(share, 0.5, measure=text, reason=seen, source=IN_WORDS)
 
 
+@criterion("dw_fig14_six_states_follow", UNCUT)
 def six_states_follow(results: Results, label: str) -> Finding:
     """Figure 14: with r = 6 it follows, whichever two of the six directions rounding chooses."""
     if label == "replay":
@@ -228,13 +271,15 @@ def six_states_follow(results: Results, label: str) -> Finding:
     # Missing where a run has diverged.
     worst, diverged = float(np.max(six)), int(np.sum(~np.isfinite(six)))
     seen = f"least {six.min():.2g}; r = 4: {four.max():.2g}"
-    seen = f"{diverged} of {len(six)} diverged" if diverged else seen
-    return Finding(worst, VISIBLE, worst < VISIBLE, text, seen)
+    if diverged:
+        seen = f"{diverged} of {len(six)} diverged"
+    return Finding.below(worst, VISIBLE, measure=text, reason=seen)
 
 
 # All three models.
 
 
+@criterion("all_three_equation_kinds", applies_to_replay=False)
 def all_kinds_reduced(results: Results, label: str) -> Finding:
     """Conclusion: ordinary differential, algebraic and differential-algebraic equations."""
     ended = [
@@ -248,50 +293,14 @@ def all_kinds_reduced(results: Results, label: str) -> Finding:
     return Finding(float(len(kinds)), 3.0, len(kinds) == 3, text, seen, IN_WORDS)
 
 
+@criterion("all_follow_precisely")
 def precisely_followed(results: Results, label: str) -> Finding:
     """Conclusion: the error plots show that trajectories are followed precisely."""
-    found = {
-        study: not_visible(at_point(results[study], label, rank=rank), outputs)
-        for study, (rank, outputs) in NOMINAL.items()
-    }
-    worst, where = worst_of({study: finding.reproduced for study, finding in found.items()})
+    findings: dict[str, Finding] = {}
+    for study, (rank, outputs) in NOMINAL.items():
+        findings[study] = agrees(results, label, study, outputs, rank=rank)
+    worst, study = worst_of({name: finding.reproduced for name, finding in findings.items()})
     text = "largest deviation of an output in any nominal run, as a share of its range"
-    seen = f"{where}: {found[where].reason}"
-    return Finding(worst, VISIBLE, all(f.within for f in found.values()), text, seen)
-
-
-OF_SUBSPACES = {"pod": "default, literal"}
-# Rank 6 of snapshots of rank 4: the default settings would cut it.
-UNCUT = {"pod_uncut": "default, no rank cut", "pod_literal": "literal"}
-DEVIATION = "largest deviation of the angle, as a share of its range"
-TWICE = "largest deviation of the suspension's angle at twice the frequency, as of figure 14"
-of_reduction = partial(Criterion, of_replay=False)
-of_subspaces = partial(of_reduction, variants=OF_SUBSPACES)
-CRITERIA = {
-    "gv_fig3_closely_matches": agree("figures-2-4", OUTPUTS),
-    "gv_three_states_suffice": of_reduction(three_states_suffice),
-    "gv_control_periods_sharpen_basis": of_reduction(shorter_periods_sharpen_basis),
-    "gv_longer_period_saves_time": of_reduction(
-        partial(longer_periods_save_time, 1.0 - SUBSTANTIAL)
-    ),
-    "hfv_fig10_one_state_excellent": agree("figures-9-10", HIGH_FIDELITY_OUTPUTS, rank=1),
-    "dw_fig6_nearly_identical": agree("figures-6-7", BOTH, INDISTINGUISHABLE),
-    "dw_fig11_displacement_unaffected": agree("figure-11", (DISPLACEMENT,)),
-    "dw_fig11_angle_diverges_at_end": Criterion(angle_diverges_at_end),
-    "dw_fig11_shorter_period_reduces_deviation": Criterion(shorter_period_reduces_deviation),
-    "dw_fig12_no_divergence": agree("figure-12", BOTH),
-    "dw_fig12_basis_insensitive_to_amplitude": of_subspaces(basis_insensitive_to_amplitude),
-    "dw_fig13_not_monotone_frequency": Criterion(partial(not_monotone, "frequency")),
-    "dw_fig13_not_monotone_amplitude": Criterion(partial(not_monotone, "amplitude")),
-    "dw_fig13_angle_more_sensitive": Criterion(angle_more_sensitive),
-    "dw_fig14_three_states_fail": Criterion(partial(leaves_full_model, DEVIATION)),
-    "dw_fig14_dropped_modes_excited": of_subspaces(dropped_modes_excited),
-    "dw_fig14_six_states_follow": Criterion(six_states_follow, UNCUT),
-    "dw_more_robust_to_amplitude": Criterion(more_robust_to_amplitude),
-    "all_may_deviate": Criterion(partial(leaves_full_model, TWICE)),
-    "all_three_equation_kinds": of_reduction(all_kinds_reduced),
-    "all_follow_precisely": Criterion(precisely_followed),
-    "all_accuracy_buys_time": of_reduction(
-        partial(longer_periods_save_time, 1.0 - SMALLEST_CHANGE)
-    ),
-}
+    seen = f"{study}: {findings[study].reason}"
+    valid = all(finding.within for finding in findings.values())
+    return Finding.below(worst, VISIBLE, measure=text, reason=seen, valid=valid)

@@ -20,7 +20,7 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import default_settings
 from vehiclemor.study.plans.loading import load_studies, write_study
 from vehiclemor.study.plans.protocol import PREFIX, protocol_names
-from vehiclemor.study.plans.study_file import study_from
+from vehiclemor.study.plans.study_file import schema_of
 
 FACTORS = (0.8, 0.9, 1.0, 1.1, 1.2)
 TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)
@@ -120,7 +120,7 @@ def _study(name: str, kind: str, results: Path, further: dict[str, Any]) -> str:
 
 def _written(results: Path, study: str, content: dict[str, Any]) -> str:
     path = results / "studies" / f"{study}.toml"
-    return str(write_study(study_from(content), path))
+    return str(write_study(schema_of(content).model_validate(content), path))
 
 
 def smaller_rank(model: Model, method: str) -> dict[str, int]:

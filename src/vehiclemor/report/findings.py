@@ -6,9 +6,11 @@ ones, from equilibrium: the paper says nothing of another start.
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -53,24 +55,73 @@ class Finding(NamedTuple):
     signal_rms: float = math.nan
     strongest: float = math.nan
 
+    @classmethod
+    def below(
+        cls,
+        value: float,
+        bound: float,
+        *,
+        measure: str,
+        reason: str = "",
+        valid: bool = True,
+        source: str = OWN,
+    ) -> Self:
+        """A value that must stay below its bound; a run that has failed is not `valid`."""
+        return cls(value, bound, valid and value < bound, measure, reason, source)
+
+    @classmethod
+    def above(
+        cls,
+        value: float,
+        bound: float,
+        *,
+        measure: str,
+        reason: str = "",
+        valid: bool = True,
+        source: str = OWN,
+    ) -> Self:
+        """A value that must exceed its bound, where what else is asked for is `valid`."""
+        return cls(value, bound, valid and value > bound, measure, reason, source)
+
 
 @dataclass(frozen=True)
 class Criterion:
     """A number or claim of the paper as a number that can miss its bound.
 
     It gets the results of studies and timings by name, and the label of a method; `variants` are
-    what the rows of labels are called.  Replay has no subspaces, and integrates nothing: it is not
-    judged by all of them.
+    what the rows of labels are called.  Replay has no subspaces, and integrates nothing: some
+    criteria do not apply to it.
     """
 
     judge: Callable[[Results, str], Finding]
-    variants: Mapping[str, str] = field(default_factory=lambda: VARIANTS)
-    of_replay: bool = True
+    variants: Mapping[str, str]
+    applies_to_replay: bool = True
 
 
-def at_point(dataset: xr.Dataset, label: str, **place: object) -> xr.Dataset:
-    """One method at one place of the grid, without dimensions that have one value."""
-    chosen = dataset.sel({"label": label, **place})
+# Id of a claim -> its criterion; filled by `criterion`.
+CRITERIA: dict[str, Criterion] = {}
+Judge = Callable[..., Finding]
+
+
+def criterion(
+    claim: str,
+    variants: Mapping[str, str] = VARIANTS,
+    *,
+    applies_to_replay: bool = True,
+    **arguments: Any,
+) -> Callable[[Judge], Judge]:
+    """Make a function of results, label and further arguments the criterion of a claim."""
+
+    def register(judge: Judge) -> Judge:
+        CRITERIA[claim] = Criterion(partial(judge, **arguments), variants, applies_to_replay)
+        return judge
+
+    return register
+
+
+def at_point(dataset: xr.Dataset, label: str, **point: object) -> xr.Dataset:
+    """One method at one point of the grid, without dimensions that have one value."""
+    chosen = dataset.sel({"label": label, **point})
     single = [d for d in chosen["status"].dims if chosen.sizes[d] == 1]
     return chosen.squeeze(single, drop=True)
 
@@ -87,22 +138,13 @@ def not_visible(point: xr.Dataset, outputs: tuple[str, ...], bound: float = VISI
     status = str(point["status"].item())
     seen = f"of {where}" if status == "ok" else f"{status}: {point['message'].item()}"
     text = "largest deviation of an output, as a share of its range"
-    return Finding(worst, bound, worst < bound and status == "ok", text, seen)
+    return Finding.below(worst, bound, measure=text, reason=seen, valid=status == "ok")
 
 
 def worst_of(values: Mapping[str, float]) -> tuple[float, str]:
     """Largest value and where it is; missing if any is missing."""
     name = list(values)[int(np.argmax(list(values.values())))]
     return values[name], name
-
-
-def agree(study: str, outputs: tuple[str, ...], bound: float = VISIBLE, rank: int = 3) -> Criterion:
-    """Criterion that no output deviates by more than a share of its range in a study."""
-
-    def judge(results: Results, label: str) -> Finding:
-        return not_visible(at_point(results[study], label, rank=rank), outputs, bound)
-
-    return Criterion(judge)
 
 
 def judged(within: bool | None) -> str:
@@ -123,5 +165,5 @@ def scatter(spreads: Mapping[str, float]) -> str:
 
 def counted(verdicts: Iterable[str]) -> str:
     """How many rows there are of each verdict, as text."""
-    found = list(verdicts)
-    return ", ".join(f"{found.count(v)} {text}" for v, text in VERDICTS.items() if v in found)
+    number = Counter(verdicts)
+    return ", ".join(f"{number[v]} {text}" for v, text in VERDICTS.items() if v in number)

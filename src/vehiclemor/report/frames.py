@@ -11,7 +11,7 @@ import xarray as xr
 
 from vehiclemor.registry import component
 from vehiclemor.report.labels import trained_runs
-from vehiclemor.report.printing import ends_text, shown
+from vehiclemor.report.printing import ends_text, format_value
 from vehiclemor.simulation.trajectory import EVALUATIONS, FINISHED
 
 # Kind of the rows of a grid in a comparison, and of what they have the median.
@@ -28,41 +28,46 @@ def frame(dataset: xr.Dataset, variables: Iterable[str] = ()) -> pd.DataFrame:
     """
     like, wanted = dataset["status"], set(variables)
     columns: dict[str, np.ndarray] = {}
-    for name, rest in sorted(_further(dataset).items(), key=lambda e: e[0] not in dataset.coords):
-        if not wanted or name in wanted or name in dataset.coords:
-            whole = xr.broadcast(dataset[name], like)[0].transpose(*like.dims, *rest)
-            values = whole.values.reshape(like.size, -1)
-            names = _names(dataset, name, rest)
-            columns |= {column: values[:, place] for place, column in enumerate(names)}
+    dimensions = _further_dimensions(dataset)
+    coordinates = [name for name in dimensions if name in dataset.coords]
+    variables = [name for name in dimensions if name not in dataset.coords]
+    if wanted:
+        variables = [name for name in variables if name in wanted]
+    for name in (*coordinates, *variables):
+        further = dimensions[name]
+        complete, _ = xr.broadcast(dataset[name], like)
+        values = complete.transpose(*like.dims, *further).values.reshape(like.size, -1)
+        columns |= zip(_names(dataset, name, further), values.T, strict=True)
     return pd.DataFrame(columns)
 
 
-def _further(dataset: xr.Dataset) -> dict[str, list[str]]:
+def _further_dimensions(dataset: xr.Dataset) -> dict[str, list[str]]:
     """Variable of a frame -> its dimensions beyond the runs'."""
     runs = set(dataset["status"].dims)
-    found: dict[str, list[str]] = {}
+    dimensions: dict[str, list[str]] = {}
     for name, variable in dataset.variables.items():
-        rest = [str(d) for d in variable.dims if d not in runs]
-        inside = name not in dataset.coords or (not rest and variable.dims)
-        if inside and not {"time", "input"} & set(rest):
-            found[str(name)] = rest
-    return found
+        further = [str(d) for d in variable.dims if d not in runs]
+        is_shown = name not in dataset.coords or (not further and variable.dims)
+        if is_shown and not {"time", "input"} & set(further):
+            dimensions[str(name)] = further
+    return dimensions
 
 
-def _names(dataset: xr.Dataset, name: str, rest: list[str]) -> list[str]:
-    labels = itertools.product(*(dataset[d].values.astype(str).tolist() for d in rest))
+def _names(dataset: xr.Dataset, name: str, further: list[str]) -> list[str]:
+    labels = itertools.product(*(dataset[d].values.astype(str).tolist() for d in further))
     return [".".join((name, *label)) for label in labels]
 
 
 def column_meanings(dataset: xr.Dataset) -> pd.DataFrame:
     """Name, unit and meaning of every column of a dataset's frame."""
     rows: list[dict[str, str]] = []
-    for name, rest in _further(dataset).items():
-        attributes, names = dataset[name].attrs, _names(dataset, name, rest)
+    for name, further in _further_dimensions(dataset).items():
+        attributes, names = dataset[name].attrs, _names(dataset, name, further)
         units = [attributes.get("units", "")] * len(names)
-        # Of outputs that do not share one unit each has its own.
-        if "units" not in attributes and len(rest) == 1 and f"{rest[0]}_unit" in dataset.coords:
-            units = dataset[f"{rest[0]}_unit"].values.tolist()
+        # Outputs may have different units.
+        if "units" not in attributes and len(further) == 1:
+            unit_of_each = dataset.coords.get(f"{further[0]}_unit")
+            units = units if unit_of_each is None else unit_of_each.values.tolist()
         meaning = str(attributes.get("long_name", ""))
         pairs = zip(names, units, strict=True)
         rows += [{"column": column, "unit": unit, "meaning": meaning} for column, unit in pairs]
@@ -74,7 +79,7 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
     `runs` are different ones; `failures` says how those that have `failed` ended, `reason` why.  Of
     those that have ended there are `median` and `largest` RMS errors over the grid, and at the
-    place of the largest that of the best approximation (`floor`).  Seconds (of the compiled loop)
+    point of the largest that of the best approximation (`floor`).  Seconds (of the compiled loop)
     and evaluations are medians.  `saturates_at` is the largest rank that the training allows, where
     more is asked for; else 0.
     """
@@ -82,21 +87,21 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     head = {"kind": ERRORS, **attributes, "grid": _grid_text(dataset)}
     count = EVALUATIONS[component("model", head["model"]).kind]
     extended = dataset.assign(trained=trained_runs(dataset), evaluations=dataset[count])
-    kept = ["rms_error", "floor_rms_error", "cell_key", "status", "message"]
-    runs: Any = frame(extended, [*kept, *MEDIANS, "effective_rank", "warned", "trained"])
+    wanted = ["rms_error", "floor_rms_error", "cell_key", "status", "message"]
+    runs: Any = frame(extended, [*wanted, *MEDIANS, "effective_rank", "warned", "trained"])
+    # Points of the grid that a method does not depend on are one run.
+    runs = runs.drop_duplicates(["start", "label", "cell_key"])
     saturated = saturated_ranks(dataset)
     rows: list[dict[str, Any]] = []
     for start, label in itertools.product(dataset["start"].values, dataset["label"].values):
-        own = runs[(runs["start"] == start) & (runs["label"] == label)]
-        # Points of the grid that a method does not depend on are one run.
-        own = own.drop_duplicates("cell_key")
-        place = head | {"start": str(start), "label": str(label)} | _counts(own)
-        place["saturates_at"] = saturated.get(str(label), 0)
-        varied = [str(d) for d in dataset["status"].dims if len(set(own[d])) > 1]
-        ended = own[own["status"].isin(FINISHED)]
+        group = runs[(runs["start"] == start) & (runs["label"] == label)]
+        about = head | {"start": str(start), "label": str(label)} | _counts(group)
+        about["saturates_at"] = saturated.get(str(label), 0)
+        varied = [str(d) for d in dataset["status"].dims if len(set(group[d])) > 1]
+        ended = group[group["status"].isin(FINISHED)]
         for output, unit in dataset["output_unit"].to_series().items():
-            about = {"output": str(output), "unit": unit}
-            rows.append(place | about | _errors(ended, str(output), varied))
+            errors = _errors(ended, str(output), varied)
+            rows.append(about | {"output": str(output), "unit": unit} | errors)
     return rows
 
 
@@ -119,15 +124,18 @@ def _counts(runs: Any) -> dict[str, Any]:
     failed = runs[~runs["status"].isin(FINISHED)]
     ended = runs.drop(failed.index).astype(dict.fromkeys(MEDIANS, float))
     ends = Counter(map(str, failed["status"])).most_common()
-    return {
+    counts: dict[str, Any] = {
         "effective_rank": int(runs["effective_rank"].max()),
         "runs": len(runs),
         "failed": len(failed),
         "failures": ", ".join(f"{n} {status}" for status, n in ends),
         "reason": next(iter(failed["message"]), ""),
-        **{name: int(runs[name].sum()) for name in ("warned", "trained")},
-        **{name: float(ended[name][np.isfinite(ended[name])].median()) for name in MEDIANS},
+        "warned": int(runs["warned"].sum()),
+        "trained": int(runs["trained"].sum()),
     }
+    for name in MEDIANS:
+        counts[name] = float(ended[name][np.isfinite(ended[name])].median())
+    return counts
 
 
 def _errors(ended: Any, output: str, varied: list[str]) -> dict[str, Any]:
@@ -137,19 +145,21 @@ def _errors(ended: Any, output: str, varied: list[str]) -> dict[str, Any]:
     if errors.empty:
         return {"median": np.nan, "largest": np.nan, "largest_at": "", "floor": np.nan}
     worst, largest = ended.loc[errors.idxmax()], float(errors.max())
-    places = [f"{d} {shown(worst[d], '.4g')}" for d in varied]
+    point = [f"{d} {format_value(worst[d], '.4g')}" for d in varied]
     return {
         "median": float(errors.median()),
         "largest": largest,
-        "largest_at": ", ".join(places) if largest > 0.0 else "",
+        "largest_at": ", ".join(point) if largest > 0.0 else "",
         "floor": float(worst[f"floor_rms_error.{output}"]),
     }
 
 
 def _grid_text(dataset: xr.Dataset) -> str:
     """The grid's dimensions with their values, and the ranges of a sample."""
-    parts = []
-    for name in (d for d in map(str, dataset["status"].dims) if d not in ("label", "start")):
+    parts: list[str] = []
+    for name in map(str, dataset["status"].dims):
+        if name in ("label", "start"):
+            continue
         values = [f"{v:g}" if isinstance(v, float) else str(v) for v in dataset[name].values]
         if len(values) > 8:
             parts.append(f"{name} {values[0]} to {values[-1]} ({len(values)})")
@@ -165,8 +175,9 @@ def counted_ends(dataset: xr.Dataset) -> str:
     """How the runs of a study have ended; a run that stands at several points counts once."""
     extended = dataset.assign(trained=trained_runs(dataset))
     runs: Any = frame(extended, ["status", "cell_key", "warned", "trained"])
-    # A protocol's runs have no files of their own.
-    runs = runs.drop_duplicates("cell_key") if "cell_key" in runs else runs
+    # Runs of a protocol have no such files.
+    if "cell_key" in runs:
+        runs = runs.drop_duplicates("cell_key")
     trained, warned = int(runs["trained"].sum()), runs["warned"] & (runs["status"] == "ok")
     note = f"; {trained} trained on the tested run" if trained else ""
     return ends_text(runs["status"], int(warned.sum())) + note

@@ -88,43 +88,56 @@ def write_report(
     left_out: dict[str, str] = {}
     sections: list[Section] = []
     if studies:
-        chosen: list[str] = []
-        for name in studies:
-            of_model = (kind(name, folder) for kind in (nominal, perturbed, unseen))
-            chosen += of_model if name in names("model") else [name]
         jobs = count("jobs", jobs, most=MOST_JOBS)
-        refuse_doubles(chosen)
-        every = [d for n in chosen for d in run_studies(n, folder, jobs).values()]
-        # Two studies may have one name, but not one file.
-        found = {Path(d.encoding.get("source", d.attrs["study"])).stem: d for d in every}
+        datasets = _run_studies(studies, folder, jobs)
     else:
-        found = _stored(folder, left_out)
+        datasets = _stored(folder, left_out)
     if "paper" in studies:
-        made = partial(_paper, folder, jobs)
-        sections += attempt_apart("comparison with the paper", left_out, made)
-    for name, dataset in found.items():
-        made = attempt_apart(name, left_out, partial(_section, name, dataset, left_out))
-        sections += made
-        if not made and not studies:
+        draw = partial(_paper, folder, jobs)
+        sections += attempt_apart("comparison with the paper", left_out, draw)
+    for name, dataset in datasets.items():
+        section = attempt_apart(name, left_out, partial(_section, name, dataset, left_out))
+        sections += section
+        if not section and not studies:
             left_out[name] += "; if other source has stored it, vehiclemor run makes it again"
     if not sections:
         raise InputError("; ".join(f"{name}: {why}" for name, why in left_out.items()))
     return write_text(path, _page(sections, left_out))
 
 
+def _run_studies(wanted: Sequence[str], folder: Path, jobs: int) -> dict[str, xr.Dataset]:
+    """Datasets of studies, and of the default studies of models, run where they are missing."""
+    chosen: list[str] = []
+    for name in wanted:
+        if name in names("model"):
+            chosen += (default(name, folder) for default in (nominal, perturbed, unseen))
+        else:
+            chosen.append(name)
+    refuse_doubles(chosen)
+    datasets: dict[str, xr.Dataset] = {}
+    for name in chosen:
+        for dataset in run_studies(name, folder, jobs).values():
+            # Two studies may have one name, but not one file.
+            file = Path(dataset.encoding.get("source", dataset.attrs["study"]))
+            datasets[file.stem] = dataset
+    return datasets
+
+
 def _stored(folder: Path, left_out: dict[str, str]) -> dict[str, xr.Dataset]:
     """All combined datasets of studies that are stored; in `left_out` what can't be read."""
-    found: dict[str, xr.Dataset] = {}
+    datasets: dict[str, xr.Dataset] = {}
     for path in sorted((folder / "studies").glob("*.nc")):
         try:
-            found[path.stem] = read_dataset(path, "source", "vehiclemor", stored=True)
+            dataset = read_dataset(path, "source", "vehiclemor", stored=True)
         except FileError as error:
             left_out[str(path)] = str(error).removeprefix(f"{path}: ")
-    # Timings and references have no study file.
-    found = {name: dataset for name, dataset in found.items() if "configuration" in dataset.attrs}
-    if not found:
+            continue
+        # Timings and references have no study file.
+        if "configuration" in dataset.attrs:
+            datasets[path.stem] = dataset
+    if not datasets:
         raise InputError(f"{folder}: no results of a study; vehiclemor run STUDY makes them")
-    return found
+    return datasets
 
 
 def _page(sections: Sequence[Section], left_out: Mapping[str, str]) -> str:
@@ -164,13 +177,11 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
             part, point = select_point(dataset, kind, {"start": start} if start else {})
             where = f"{caption} at {point}" if point else caption
             pictures[where] = partial(plot_result, part, None, kind)
-    made = [
-        picture
-        for caption, draw in pictures.items()
-        for picture in attempt_apart(f"{caption}, {name}", left_out, partial(_svg, caption, draw))
-    ]
+    drawn: list[tuple[str, str]] = []
+    for caption, draw in pictures.items():
+        drawn += attempt_apart(f"{caption}, {name}", left_out, partial(_svg, caption, draw))
     parts = study_parts(pd.DataFrame(result_rows(dataset))) + parts
-    return Section(name, str(dataset.attrs["title"]), parts, made, dataset.attrs)
+    return Section(name, str(dataset.attrs["title"]), parts, drawn, dataset.attrs)
 
 
 def error_table(dataset: xr.Dataset) -> pd.DataFrame:

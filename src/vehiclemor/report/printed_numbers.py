@@ -16,6 +16,7 @@ from vehiclemor.report.findings import (
     Finding,
     Results,
     at_point,
+    criterion,
     scatter,
 )
 from vehiclemor.report.labels import timing_cases
@@ -30,22 +31,22 @@ PRESETS = {"pod": "recommended", "pod_literal": "literal"}
 TIMING = {model: f"timing-{model}" for model in get_args(Model)}
 
 
-def compared() -> list[Number]:
+def printed_errors_and_savings() -> list[Number]:
     """Printed errors, then savings of time."""
     numbers = load_published().numbers.values()
-    kept = [n for n in numbers if n.kind in ("rms_error", "time_reduction")]
-    return sorted(kept, key=lambda number: number.kind)
+    judged = [n for n in numbers if n.kind in ("rms_error", "time_reduction")]
+    return sorted(judged, key=lambda number: number.kind)
 
 
 def number_criterion(number: Number) -> Criterion:
     """The criterion that a printed number is."""
     if number.kind == "rms_error":
-        return Criterion(partial(error, number))
+        return Criterion(partial(judge_rms_error, number), VARIANTS)
     timed = {label: variant for label, variant in VARIANTS.items() if case_of(number, label)}
-    return Criterion(partial(time_saved, number), timed, of_replay=False)
+    return Criterion(partial(time_saved, number), timed, applies_to_replay=False)
 
 
-def error(number: Number, results: Results, label: str) -> Finding:
+def judge_rms_error(number: Number, results: Results, label: str) -> Finding:
     """RMS error of the nominal run, with the paper's number of states."""
     study = results[of_paper(number.model)].sel(rank=number.states, output=number.quantity)
     point = at_point(study, label)
@@ -106,9 +107,10 @@ def time_saved(number: Number, results: Results, label: str) -> Finding:
 def case_of(number: Number, label: str) -> str:
     """Timing case of control-period POD with the number's states and nothing else set; or none."""
     wanted = "pod", PRESETS[label], {"rank": number.states or 3}
-    cases = timing_cases(component("model", number.model))
-    found = (case.id for case in cases if (case.method, case.preset, case.settings) == wanted)
-    return next(found, "")
+    for case in timing_cases(component("model", number.model)):
+        if (case.method, case.preset, case.settings) == wanted:
+            return case.id
+    return ""
 
 
 def _missed_errors(model: str, run: xr.Dataset) -> str:
@@ -116,11 +118,11 @@ def _missed_errors(model: str, run: xr.Dataset) -> str:
     status = run["status"].item()
     if status != "ok":
         return f"no time is saved by a run that has {status}"
-    missed = [
-        f"{output} {error:.2g} of {number.value:.3g} {number.unit}"
-        for output, number in rms_numbers(model).items()
-        if not (error := float(run["rms_error"].sel(output=output))) <= number.value
-    ]
+    missed: list[str] = []
+    for output, number in rms_numbers(model).items():
+        error = float(run["rms_error"].sel(output=output))
+        if not error <= number.value:
+            missed.append(f"{output} {error:.2g} of {number.value:.3g} {number.unit}")
     return f"counts only with errors that are met: {', '.join(missed)}" if missed else ""
 
 
@@ -129,6 +131,7 @@ def _scatter(timing: xr.Dataset, *cases: str) -> str:
     return scatter({case: float(spread.sel(case=case)) for case in cases})
 
 
+@criterion("dw_fig14_six_slower_than_three", {"pod_literal": "literal"}, applies_to_replay=False)
 def six_slower(results: Results, label: str) -> Finding:
     """Figure 14: six states take more time than three, but less than the full model."""
     timing = results[TIMING["double_wishbone"]]
@@ -148,10 +151,11 @@ def six_slower(results: Results, label: str) -> Finding:
     return Finding(slower, 1.0, met, text, reason, IN_WORDS)
 
 
+@criterion("all_close_agreement_less_time", applies_to_replay=False)
 def agree_and_save(results: Results, label: str) -> Finding:
     """Conclusion: reduced models agree closely and take substantially less time."""
-    numbers = compared()
-    agree = all(error(n, results, label).within for n in numbers if n.kind == "rms_error")
+    numbers = printed_errors_and_savings()
+    agree = all(judge_rms_error(n, results, label).within for n in numbers if n.kind == "rms_error")
     timed = [n for n in numbers if n.kind == "time_reduction" and case_of(n, label)]
     saved = [time_saved(n, results, label) for n in timed]
     number, least = min(zip(timed, saved, strict=True), key=lambda pair: pair[1].reproduced)
@@ -161,9 +165,3 @@ def agree_and_save(results: Results, label: str) -> Finding:
     scattered = [f.reason for f in saved if f.within is None and agree]
     met = None if scattered else agree and least.reproduced >= bound
     return Finding(least.reproduced, bound, met, text, next(iter(scattered), seen), PRINTED)
-
-
-CLAIMS = {
-    "dw_fig14_six_slower_than_three": Criterion(six_slower, {"pod_literal": "literal"}, False),
-    "all_close_agreement_less_time": Criterion(agree_and_save, of_replay=False),
-}

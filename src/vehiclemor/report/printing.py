@@ -1,4 +1,4 @@
-"""Tables and texts: rows in the terminal and in HTML, by one place."""
+"""Tables and texts: rows in the terminal and in HTML."""
 
 from __future__ import annotations
 
@@ -26,8 +26,13 @@ WIDTH, WIDEST = 80, 120
 NARROWEST = 12
 # Indent of a note.
 NOTE = 4
-# What is printed of each output of a simulation.
-ERRORS = ("rms_error", "floor_rms_error", "max_error", "signal_range")
+# Column that is printed of each output of a simulation -> variable.
+ERRORS = {
+    "rms_error": "rms_error",
+    "floor": "floor_rms_error",
+    "max_error": "max_error",
+    "signal_range": "signal_range",
+}
 
 
 @dataclass(frozen=True)
@@ -35,8 +40,8 @@ class Table:
     """Rows as a table: text within the width of the terminal by `str`, HTML for a template.
 
     `columns` are names of those that are shown, by default all, or how each of them is printed, by
-    default as `labels.column` has it.  Values of `group` and `note` stand in lines of their own,
-    above their rows and below each; meanings of the columns below the table, if it is to `explain`.
+    default as `labels.column` has it.  Values of `group` stand above their rows, those of `note`
+    below each row; meanings of the columns below the table, if it is to `explain`.
     """
 
     rows: pd.DataFrame | Rows
@@ -53,8 +58,8 @@ class Table:
         records: Rows = rows if isinstance(rows, Sequence) else rows.to_dict("records")  # type: ignore[assignment]
         if not self.group:
             return records
-        places = list(dict.fromkeys(row[self.group] for row in records))
-        return sorted(records, key=lambda row: places.index(row[self.group]))
+        groups = list(dict.fromkeys(row[self.group] for row in records))
+        return sorted(records, key=lambda row: groups.index(row[self.group]))
 
     def _kinds(self, records: Rows) -> tuple[Mapping[str, Column], str]:
         """How each column is printed, and what the columns mean."""
@@ -63,6 +68,9 @@ class Table:
             kinds = {name: column(name) for name in kinds or (records[0] if records else ())}
         meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds.values() if kind.meaning]
         return kinds, f"({'; '.join(meanings)}.)" if meanings and self.explain else ""
+
+    def _texts(self, row: Mapping[str, Any], kinds: Mapping[str, Column]) -> list[str]:
+        return [format_value(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
 
     def __html__(self) -> str:
         records = self._records()
@@ -85,11 +93,8 @@ class Table:
     def __str__(self) -> str:
         records = self._records()
         kinds, meanings = self._kinds(records)
-        cells = [
-            [shown(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
-            for row in records
-        ]
-        numbers = [all(isinstance(row.get(name), int | float) for row in records) for name in kinds]
+        cells = [self._texts(row, kinds) for row in records]
+        numbers = [_are_numbers(row.get(name) for row in records) for name in kinds]
         heads = [kind.heading for kind in kinds.values()]
         widths, last = _widths(heads, cells, numbers), None
         # Headings stand at the bottom of their lines.
@@ -101,15 +106,18 @@ class Table:
             lines += _in_columns(line, widths, numbers)
             if self.note and row[self.note]:
                 lines.append(wrapped(str(row[self.note]), NOTE, NOTE))
-        return "\n".join(
-            filter(None, [*lines, *(wrapped(t, 0, 1) for t in (meanings, self.below))])
-        )
+        lines += [wrapped(text, 0, 1) for text in (meanings, self.below)]
+        return "\n".join(filter(None, lines))
 
 
-def shown(value: object, form: str = ".6g", scale: float = 1.0) -> str:
+def _are_numbers(values: Iterable[object]) -> bool:
+    return all(isinstance(value, int | float) for value in values)
+
+
+def format_value(value: object, form: str = ".6g", scale: float = 1.0) -> str:
     """A value as text: a dash for a missing number, `0` for exactly zero, nothing for none."""
     if isinstance(value, list):
-        return ", ".join(shown(part, form) for part in value)
+        return ", ".join(format_value(part, form) for part in value)
     if isinstance(value, float):
         if value != value:
             return "-"
@@ -119,7 +127,7 @@ def shown(value: object, form: str = ".6g", scale: float = 1.0) -> str:
 
 def _cell(value: object, kind: Column) -> str:
     """A value in HTML; a number with all its digits."""
-    text = escape(shown(value, kind.form, kind.scale))
+    text = escape(format_value(value, kind.form, kind.scale))
     if isinstance(value, float) and value == value:
         return f'<data value="{value}">{text}</data>'
     verdict = f' class="{text}"' if text in ("met", "missed") else ""
@@ -130,26 +138,25 @@ def _in_columns(
     cells: Sequence[str], widths: list[int], numbers: list[bool], order: int = 1
 ) -> list[str]:
     """Lines of a row whose texts are wrapped within their columns."""
-    texts = [
-        # The rest of a point in a list stands below its text.
-        textwrap.wrap(
-            text, width, break_on_hyphens=False, subsequent_indent="  " * text.startswith("- ")
-        )[::order]
-        for text, width in zip(cells, widths, strict=True)
-    ]
-    lines = [
-        " ".join(
-            part.rjust(width) if number else part.ljust(width)
-            for part, width, number in zip(line, widths, numbers, strict=True)
-        ).rstrip()
-        for line in zip_longest(*texts, fillvalue="")
-    ]
+    texts: list[list[str]] = []
+    for text, width in zip(cells, widths, strict=True):
+        # Further lines of a point in a list stand below its text.
+        indent = "  " if text.startswith("- ") else ""
+        parts = textwrap.wrap(text, width, break_on_hyphens=False, subsequent_indent=indent)
+        texts.append(parts[::order])
+    aligned = [str.rjust if number else str.ljust for number in numbers]
+    lines: list[str] = []
+    for line in zip_longest(*texts, fillvalue=""):
+        padded = [
+            align(part, width) for align, part, width in zip(aligned, line, widths, strict=True)
+        ]
+        lines.append(" ".join(padded).rstrip())
     return lines[::order]
 
 
 def _widths(heads: list[str], cells: list[list[str]], numbers: list[bool]) -> list[int]:
     """Widths of columns: headings are wrapped by words, then the widest texts."""
-    widths = []
+    widths: list[int] = []
     for index, head in enumerate(heads):
         longest = max((len(word) for word in head.split()), default=1)
         widths.append(max(longest, *(len(row[index]) for row in cells), 1))
@@ -160,8 +167,8 @@ def _widths(heads: list[str], cells: list[list[str]], numbers: list[bool]) -> li
             break
         widths[widest] -= 1
     # A heading in one line where there is room for all.
-    whole = [max(w, len(head)) for w, head in zip(widths, heads, strict=True)]
-    return whole if sum(whole) + len(whole) <= width() else widths
+    wider = [max(w, len(head)) for w, head in zip(widths, heads, strict=True)]
+    return wider if sum(wider) + len(wider) <= width() else widths
 
 
 def simulation_text(dataset: xr.Dataset, shown: Sequence[str], counts: Iterable[str]) -> str:
@@ -170,9 +177,11 @@ def simulation_text(dataset: xr.Dataset, shown: Sequence[str], counts: Iterable[
     ended = f"{dataset['status'].item()} {dataset['message'].item()}"
     rows = []
     for output in shown:
-        own = dataset.sel(output=output)
-        errors = {name.replace("floor_rms_error", "floor"): own[name].item() for name in ERRORS}
-        rows.append({"output": str(output), **errors, "unit": str(own["output_unit"].item())})
+        errors = dataset.sel(output=output)
+        row: dict[str, object] = {"output": str(output)}
+        for column_name, name in ERRORS.items():
+            row[column_name] = errors[name].item()
+        rows.append(row | {"unit": str(errors["output_unit"].item())})
     further = dataset.sizes["output"] - len(shown)
     seconds, clock = float(dataset["seconds"]), dataset["seconds"].attrs["clock"]
     parts = [
@@ -195,8 +204,10 @@ def json_text(rows: pd.DataFrame) -> str:
     def finite(value: object) -> object:
         return None if isinstance(value, float) and not math.isfinite(value) else value
 
-    plain = [{key: finite(value) for key, value in row.items()} for row in rows.to_dict("records")]
-    return json.dumps(plain, indent=2)
+    def plain(row: Mapping[Any, Any]) -> dict[str, object]:
+        return {key: finite(value) for key, value in row.items()}
+
+    return json.dumps([plain(row) for row in rows.to_dict("records")], indent=2)
 
 
 def ends_text(statuses: Iterable[str], warned: int = 0) -> str:
@@ -211,6 +222,6 @@ def width() -> int:
 
 
 def wrapped(text: str, first: int = 0, rest: int = 0) -> str:
-    """A paragraph in lines of the width of a table, indented; a path stays whole."""
+    """A paragraph in lines of the width of a table, indented; a path is not broken."""
     indents: dict[str, Any] = {"initial_indent": " " * first, "subsequent_indent": " " * rest}
     return textwrap.fill(text, width(), **indents, break_long_words=False, break_on_hyphens=False)

@@ -1,4 +1,4 @@
-"""What the paper prints: its numbers and claims, each with its place; and how to cite."""
+"""What the paper prints: its numbers and claims, each with its page; and how to cite."""
 
 from functools import cache
 from importlib.metadata import version
@@ -8,7 +8,7 @@ from vehiclemor.registry import component, names
 from vehiclemor.resources import data_folder
 from vehiclemor.toml_files import FileSchema, Line, read_toml
 
-# The paper's own models: the registry may hold others, about which it says nothing.
+# Models of the paper: it says nothing about others in the registry.
 Model = Literal["independent_suspension_vehicle", "double_wishbone", "high_fidelity_vehicle"]
 
 
@@ -43,12 +43,11 @@ class Number(Printed):
 class Claim(Printed):
     """A printed statement in our words; without a model it is about all three.
 
-    A `setup` says how something was made, a `result` what the paper says it saw, an `expectation`
-    what it explains without showing it.
+    A `result` is what the paper says it saw, an `expectation` what it explains without showing it.
     """
 
     model: Model | None = None
-    kind: Literal["setup", "result", "expectation"]
+    kind: Literal["result", "expectation"]
     statement: Line
 
 
@@ -77,7 +76,7 @@ class FixedSets(FileSchema):
 
 @cache
 def load_published() -> Published:
-    """What the paper prints, from the package's own file."""
+    """What the paper prints, from the file of the package."""
     return read_toml(data_folder() / "published" / "masoudi2015.toml", Published)
 
 

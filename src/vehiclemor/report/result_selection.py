@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import xarray as xr
@@ -20,13 +20,21 @@ from vehiclemor.study.plans.study_runs import FACTORS
 from vehiclemor.study.store import combined_path, result_path
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from vehiclemor.simulation.trajectory import Trajectory
 
+# Kinds of pictures of a run, or of a point of a grid.
 KINDS: tuple[str, ...] = get_args(Kind)
 # Values of a dimension that an error lists.
 MOST_NAMED = 12
+
+
+def result_kind(dataset: xr.Dataset) -> Literal["size study", "protocol", "grid", "other"]:
+    """What a result is of; `other` is a timing, or a run without errors and outputs."""
+    if "mesh" in dataset.dims:
+        return "size study"
+    if "scenario_set" in dataset.coords:
+        return "protocol"
+    return "grid" if dataset.sizes.get("output") else "other"
 
 
 def stored_result(name: str, results: Path) -> xr.Dataset:
@@ -40,11 +48,11 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
             if len(members) > 1:
                 raise InputError(f"{name} is a collection: name one of {', '.join(members)}")
             ((study, definition),) = members.items()
-            found = result_path(results, study, content_hash(definition))
-            if found is None:
+            stored_path = result_path(results, study, content_hash(definition))
+            if stored_path is None:
                 path = combined_path(results, study)
                 raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
-            path = found
+            path = stored_path
     return read_dataset(path, "source", "vehiclemor", stored)
 
 
@@ -56,30 +64,15 @@ def select_point(
     A dimension that is not chosen is at its nominal or first value, but errors are drawn over it.
     The point stands in the title.
     """
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise unknown("kind of plot", kind, KINDS)
-    if "status" not in dataset:
-        raise InputError("neither a run nor a study that can be drawn")
-    grid = [str(d) for d in dataset["status"].dims]
-    for key in chosen:
-        if not grid:
-            raise InputError(f"a single run has no dimension to choose, such as {quoted(key)}")
-        if key not in grid:
-            raise unknown("dimension of the result", key, grid)
-    parts = []
-    # A grid has methods; what has none, such as a timing, is refused where it is drawn.
-    for dimension in grid if "label" in grid else ():
+    grid = check_point(dataset, kind, chosen)
+    parts: list[str] = []
+    for dimension in grid:
         values = dataset[dimension].values.tolist()
         if dimension not in chosen and (dimension == "label" or kind == "errors"):
             continue
         default = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
         value: Any = chosen.get(dimension, default)
-        # An array equals no value.
-        places = [k for k, known in enumerate(values) if np.array_equal([known], [value])]
-        if not places:
-            known = ", ".join(map(str, values[:MOST_NAMED])) + ", ..." * (len(values) > MOST_NAMED)
-            raise InputError(f"{dimension} is {quoted(value)}, not one of {known}")
-        dataset = dataset.isel({dimension: places[0]})
+        dataset = dataset.isel({dimension: _index_of(dimension, values, value)})
         if len(values) > 1:
             parts.append(f"{dimension} {value}")
     point = ", ".join(parts)
@@ -89,19 +82,31 @@ def select_point(
     return dataset, point
 
 
-@xr.register_dataset_accessor("vehiclemor")
-class ResultAccessor:
-    """What a result of this package can do beyond xarray."""
+def check_point(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> list[str]:
+    """Dimensions of a grid of methods, if this kind can be drawn where it is `chosen`."""
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise unknown("kind of plot", kind, KINDS)
+    if "status" not in dataset:
+        raise InputError("neither a run nor a study that can be drawn")
+    dimensions = [str(name) for name in dataset["status"].dims]
+    for key in chosen:
+        if not dimensions:
+            raise InputError(f"a single run has no dimension to choose, such as {quoted(key)}")
+        if key not in dimensions:
+            raise unknown("dimension of the result", key, dimensions)
+    # What has no methods, such as a timing, is refused where it is drawn.
+    return dimensions if "label" in dimensions else []
 
-    def __init__(self, dataset: xr.Dataset) -> None:
-        self._dataset = dataset
 
-    def plot(self, kind: str = "histories", out: str | Path | None = None, **at: object) -> Figure:
-        """Draw the result; see `vehiclemor.plot`."""
-        from vehiclemor.report.figures.result_plot import plot_result
-
-        dataset, _ = select_point(self._dataset, kind, at)
-        return plot_result(dataset, None if out is None else file_path("out", out), kind)
+def _index_of(dimension: str, values: list[Any], value: Any) -> int:
+    for index, known in enumerate(values):
+        # An array equals no value.
+        if np.array_equal([known], [value]):
+            return index
+    listed = ", ".join(map(str, values[:MOST_NAMED]))
+    if len(values) > MOST_NAMED:
+        listed += ", ..."
+    raise InputError(f"{dimension} is {quoted(value)}, not one of {listed}")
 
 
 def dataset_of(run: Trajectory, full: Trajectory | None = None) -> xr.Dataset:
@@ -109,6 +114,5 @@ def dataset_of(run: Trajectory, full: Trajectory | None = None) -> xr.Dataset:
     dataset = run.dataset()
     if full is None:
         return dataset
-    found = errors(run, full)
-    of_full = {"reference_outputs": (("time", "output"), full.chosen(run.names).outputs)}
-    return dataset.assign(of_full).assign(found.data_vars)
+    reference = {"reference_outputs": (("time", "output"), full.chosen(run.names).outputs)}
+    return dataset.assign(reference).assign(errors(run, full).data_vars)

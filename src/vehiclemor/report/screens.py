@@ -1,7 +1,10 @@
 """Comparisons as paragraphs and tables, for the terminal and for the page of a report."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +24,7 @@ from vehiclemor.report.findings import (
 )
 from vehiclemor.report.frames import ERRORS
 from vehiclemor.report.labels import ERROR, Column, column, declared, main_outputs, of_kind
-from vehiclemor.report.printing import Table, shown, wrapped
+from vehiclemor.report.printing import Table, format_value, wrapped
 from vehiclemor.report.sizes import EXPLAINED, KIND, growth_text
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
@@ -31,11 +34,11 @@ Part = str | Table
 MEASURES = {"max": "largest", "rms": "RMS", "relative": "RMS of its range"}
 
 
-def comparison_text(what: str, rows: pd.DataFrame, folder: Path, every: bool = False) -> str:
-    """A comparison as text; of that with the paper `every` claim with its reason, and costs."""
+def comparison_text(what: str, rows: pd.DataFrame, folder: Path, show_all: bool = False) -> str:
+    """A comparison as text; of that with the paper all claims with reasons, and costs."""
     if what == PAPER:
         parts = paper_parts(rows)
-        if every:
+        if show_all:
             parts += claim_parts(rows)
             *models, last = [model for model in rows["model"].unique() if model != ALL_MODELS]
             parts += [cost_text(model, folder, brief=True) for model in models]
@@ -49,12 +52,12 @@ def comparison_text(what: str, rows: pd.DataFrame, folder: Path, every: bool = F
     return "\n\n".join(map(str, parts))
 
 
-def _by(rows: Sequence[Row], key: str) -> dict[Any, list[Row]]:
-    """Rows by the value of a column."""
-    found: dict[Any, list[Row]] = {}
-    for row in rows:
-        found.setdefault(row[key], []).append(row)
-    return found
+def _groups(rows: Iterable[Row], key: str) -> dict[Any, list[Row]]:
+    """Rows by the value of a column, in the order of the first of each."""
+    table = list(rows)
+    order = list(dict.fromkeys(row[key] for row in table))
+    table.sort(key=lambda row: order.index(row[key]))
+    return {value: list(group) for value, group in groupby(table, itemgetter(key))}
 
 
 # The paper.
@@ -67,11 +70,10 @@ def paper_parts(rows: pd.DataFrame) -> list[Part]:
     times = [row for row in records if "_time_reduction" in row["id"]]
     claims = [row for row in records if row not in errors and row not in times]
     title = "Masoudi, Uchida, McPhee (2015), doi:10.1115/1.4029390, beside this suite"
-    counts = []
-    for model, own in _by(claims, "model").items():
-        verdicts = [row["verdict"] for row in own]
-        found = {kind: verdicts.count(kind) for kind in VERDICTS}
-        counts.append({"claims": model.replace("_", " ")} | found)
+    counts: list[Row] = []
+    for model, group in _groups(claims, "model").items():
+        number = Counter(row["verdict"] for row in group)
+        counts.append({"claims": model.replace("_", " ")} | {v: number[v] for v in VERDICTS})
     return [
         wrapped(f"{title}: {counted(rows['verdict'])}."),
         _errors(errors),
@@ -83,21 +85,24 @@ def paper_parts(rows: pd.DataFrame) -> list[Part]:
 
 def _printed(rows: list[Row], text: Callable[[Row], str]) -> list[Row]:
     """A line of each printed number: default and literal settings side by side."""
-    lines = []
-    for own in _by(rows, "id").values():
-        found = {f"pod_{r['variant']}": f"{text(r)} {VERDICTS[r['verdict']]}" for r in own}
-        lines.append(own[0] | found | {"of": own[0]["model"].replace("_", " ")})
+    lines: list[Row] = []
+    for group in _groups(rows, "id").values():
+        line = group[0] | {"of": group[0]["model"].replace("_", " ")}
+        for row in group:
+            line[f"pod_{row['variant']}"] = f"{text(row)} {VERDICTS[row['verdict']]}"
+        lines.append(line)
     return lines
 
 
 def _errors(rows: list[Row]) -> Table:
-    lines = _printed(rows, lambda row: shown(row["reproduced"], ERROR))
+    lines = _printed(rows, lambda row: format_value(row["reproduced"], ERROR))
     for line in lines:
         item = line["item"].removeprefix("RMS error of the ").partition(" (figure")[0]
         line["paper_error"] = item
     empty = [f"{r['paper_error']} ({r['of']})" for r in lines if r["signal_rms"] <= r["published"]]
     note = f"signal: {column('signal_rms').meaning}; literal: settings by the paper's words"
-    note += f".  Empty bounds, which zero would meet: {', '.join(empty)}" if empty else ""
+    if empty:
+        note += f".  Empty bounds, which zero would meet: {', '.join(empty)}"
     columns = ("paper_error", "published", "signal_rms", "pod_default", "pod_literal", "unit")
     return Table(lines, columns, group="of", explain=False, below=f"({note}.)")
 
@@ -115,15 +120,17 @@ def _times(rows: list[Row]) -> Table:
 
 def _missed(rows: list[Row]) -> Table:
     """What is missed and by how much, for each claim."""
-    lines = []
-    for own in _by([row for row in rows if row["verdict"] == MISSED], "id").values():
-        first = own[0]
-        values = ", ".join(f"{shown(r['reproduced'], '.3g')} ({r['variant']})" for r in own)
-        measure, bound = first["measure"].split("; ")[0], shown(first["bound"], ".3g")
+    lines: list[Row] = []
+    missed = (row for row in rows if row["verdict"] == MISSED)
+    for group in _groups(missed, "id").values():
+        first = group[0]
         # A claim without a threshold is explained by what was seen.
-        by_claim = first["threshold_source"] == IN_WORDS
-        found = first["reason"] if by_claim else f"{measure}: {values}; bound {bound}"
-        lines.append({"missed_claims": f"- {first['item']}: {found}"})
+        text = first["reason"]
+        if first["threshold_source"] != IN_WORDS:
+            values = [f"{format_value(r['reproduced'], '.3g')} ({r['variant']})" for r in group]
+            measure, bound = first["measure"].split("; ")[0], format_value(first["bound"], ".3g")
+            text = f"{measure}: {', '.join(values)}; bound {bound}"
+        lines.append({"missed_claims": f"- {first['item']}: {text}"})
     return Table(lines)
 
 
@@ -140,21 +147,24 @@ def claim_parts(rows: pd.DataFrame) -> list[Part]:
     )
     columns = ("variant", "limit", "reproduced", "best", "replay", "word")
     parts: list[Part] = [wrapped(note)]
-    for model, own in _by(rows.to_dict("records"), "model").items():
-        lines = []
-        for row in own:
+    for model, group in _groups(rows.to_dict("records"), "model").items():
+        lines: list[Row] = []
+        for row in group:
             unit = "" if row["unit"] in ("1", "-") else f", {row['unit']}"
             measure = f" ({row['measure']})" if row["measure"] else ""
             about = {"of": f"{row['item']}{unit}{measure}", "best": row["floor"]}
-            lines.append(row | _judged(row) | about)
+            lines.append(row | _verdict(row) | about)
         parts.append(Table(lines, columns, model.replace("_", " "), group="of", note="reason"))
     return parts
 
 
-def _judged(row: Row) -> Row:
+def _verdict(row: Row) -> Row:
     """Bound, with a mark if it is added here, and verdict of a row as they are printed."""
     mark = "*" if row["threshold_source"] == OWN else ""
-    return {"limit": shown(float(row["bound"]), ".3g") + mark, "word": VERDICTS[row["verdict"]]}
+    return {
+        "limit": format_value(float(row["bound"]), ".3g") + mark,
+        "word": VERDICTS[row["verdict"]],
+    }
 
 
 # A model.
@@ -173,7 +183,8 @@ def cost_text(model: str, folder: Path, brief: bool = False) -> str:
     rows["from"] = "start " + rows["start"]
     ended = rows["status"].where(rows["status"] != "ok", "")
     rows["label"] += ended.map(lambda status: f" ({status})" if status else "")
-    rows = rows[rows["start"] == rows["start"].iloc[0]] if brief else rows
+    if brief:
+        rows = rows[rows["start"] == rows["start"].iloc[0]]
     times = ["label", "us_per_run", "spread", "speed_up", "speed_up_strongest", "offline_us"]
     times += ["break_even", "break_even_strongest"]
     title = f"Cost on {data.attrs['title'].removeprefix('timing of ')} ({data.attrs['machine']})"
@@ -190,28 +201,31 @@ def cost_text(model: str, folder: Path, brief: bool = False) -> str:
 
 def _model_parts(name: str, rows: pd.DataFrame, folder: Path) -> list[Part]:
     """Errors of every method in nominal and perturbed runs, costs, unseen inputs."""
-    kinds = _by(rows.to_dict("records"), "kind")
-    nominal, perturbed = _by(kinds[ERRORS], "study").values()
-    key = ("start", "label", "output")
-    largest = {tuple(row[k] for k in key): row for row in perturbed}
-    lines = []
+    kinds = _groups(rows.to_dict("records"), "kind")
+    nominal, perturbed = _groups(kinds[ERRORS], "study").values()
+    key = itemgetter("start", "label", "output")
+    largest = {key(row): row for row in perturbed}
+    lines: list[Row] = []
     for output in main_outputs(component("model", name)):
         for row in (row for row in nominal if row["output"] == output):
             of = f"start {row['start']}: {output.replace('_', ' ')}"
-            other = largest.get(tuple(row[k] for k in key))
-            lines.append(row | {"of": of, "nominal": _ended(row), "perturbed": _ended(other)})
+            other = largest.get(key(row))
+            errors = {"nominal": _largest_error(row), "perturbed": _largest_error(other)}
+            lines.append(row | {"of": of} | errors)
     reasons = dict.fromkeys(f"{r['label']}: {r['reason']}" for r in nominal if r["reason"])
     columns = ("label", "effective_rank", "nominal", "perturbed")
     title = f"{name}: RMS errors, SI units"
     parts: list[Part] = [Table(lines, columns, title, group="of", below="; ".join(reasons))]
     parts.append(cost_text(name, folder))
-    judged = [row for kind in ("method", "target", "bound") for row in kinds.get(kind, ())]
-    return parts + _unseen_parts(judged)
+    unseen = [*kinds["method"], *kinds.get("target", ()), *kinds.get("bound", ())]
+    return parts + _unseen_parts(unseen)
 
 
-def _ended(row: Row | None) -> float | str:
+def _largest_error(row: Row | None) -> float | str:
     """The largest error; a run that has failed leaves none."""
-    return math.nan if row is None else "failed" if row["failed"] else row["largest"]
+    if row is None:
+        return math.nan
+    return "failed" if row["failed"] else row["largest"]
 
 
 # Studies.
@@ -221,15 +235,19 @@ def study_parts(rows: pd.DataFrame) -> list[Part]:
     """Grids, then protocols."""
     records: list[Row] = rows.to_dict("records")
     grids = [row for row in records if row["kind"] == ERRORS]
-    parts = [part for own in _by(grids, "study").values() for part in _grid_parts(own)]
     sized = [row for row in records if row["kind"] == KIND]
-    for own in _by(sized, "study").values():
-        title = f"{own[0]['study']}: what a reduced model gains"
-        parts.append(Table(own, declared().sizes["costs"], title, below=growth_text(own)))
-        compared = [row for row in own if row["error_motion"] == row["error_motion"]]
+    unseen = [row for row in records if row["kind"] not in (ERRORS, KIND)]
+    parts: list[Part] = []
+    for group in _groups(grids, "study").values():
+        parts += _grid_parts(group)
+    for study, group in _groups(sized, "study").items():
+        title = f"{study}: what a reduced model gains"
+        parts.append(Table(group, declared().sizes["costs"], title, below=growth_text(group)))
+        compared = [row for row in group if not math.isnan(row["error_motion"])]
         parts.append(Table(compared, declared().sizes["rivals"], below=EXPLAINED))
-    judged = [row for row in records if row["kind"] not in (ERRORS, KIND)]
-    return parts + (_unseen_parts(judged) if judged else [])
+    if unseen:
+        parts += _unseen_parts(unseen)
+    return parts
 
 
 def _grid_parts(rows: list[Row]) -> list[Part]:
@@ -237,10 +255,11 @@ def _grid_parts(rows: list[Row]) -> list[Part]:
     first = rows[0]
     about = (first["model"], f"training {first['training']}", first["grid"])
     outputs = main_outputs(component("model", first["model"]))
-    lines, runs = [], []
-    for start, own in _by(rows, "start").items():
+    lines: list[Row] = []
+    runs: list[Row] = []
+    for start, group in _groups(rows, "start").items():
         for output in outputs:
-            for row in (row for row in own if row["output"] == output):
+            for row in (row for row in group if row["output"] == output):
                 of = f"start {start}: {output.replace('_', ' ')}, {row['unit']}"
                 lines.append(row | {"of": of})
                 if output == outputs[0]:
@@ -264,37 +283,37 @@ def _unseen_parts(rows: list[Row]) -> list[Part]:
     title = "Reduced models on inputs that they were not trained on"
     title += f": of their targets {counted(targets)}" if targets else ""
     parts: list[Part] = [wrapped(f"{title}.")]
-    protocols = list(_by(rows, "study").values())
-    for own in protocols:
-        parts += _protocol_parts(_by(own, "kind"), explain=own is protocols[-1])
+    protocols = list(_groups(rows, "study").values())
+    for group in protocols:
+        parts += _protocol_parts(_groups(group, "kind"), explain=group is protocols[-1])
     return parts
 
 
 def _protocol_parts(rows: Mapping[str, list[Row]], explain: bool) -> list[Part]:
     methods = rows["method"]
     first, winner = methods[0], next((row for row in methods if row["winner"]), None)
-    known = first["study"].removeprefix("predictive-")
-    of_model = "" if known == first["model"] else f" ({first['model']})"
-    head = f"{known}{of_model}: {first['runs']:.0f} runs (test set {first['test_set']})"
+    head = first["study"].removeprefix("predictive-")
+    if head != first["model"]:
+        head += f" ({first['model']})"
+    head += f": {first['runs']:.0f} runs (test set {first['test_set']})"
     if first["apart"]:
         head += f", {first['apart']:.0f} more not judged: full order fails or is sensitive there"
     parts: list[Part] = [] if winner else [wrapped(head)]
     if winner:
         parts += _winner_parts(head, winner, rows["target"], rows["bound"], explain)
     against = {*winner["equal_rows"].split(", "), winner["within"]} if winner else set()
-    named = [
-        row | {"label": row["label"] + " (chosen)" * bool(row["winner"])}
-        for row in sorted(methods, key=lambda row: row["role"] != FULL_ORDER)
-        if row["role"] != FULL_ORDER or row["label"] in against
-    ]
-    for row in named:
+    named: list[Row] = []
+    for row in sorted(methods, key=lambda row: row["role"] != FULL_ORDER):
+        if row["role"] == FULL_ORDER and row["label"] not in against:
+            continue
+        label = f"{row['label']} (chosen)" if row["winner"] else row["label"]
         ends = f"{100 * row['stable_share']:.0f} % of the runs end, {row['failure']}"
-        row["ends"] = ends if row["failure"] else ""
+        named.append(row | {"label": label, "ends": ends if row["failure"] else ""})
     errors = ("label", "misses", "misses_at_ten", "silent", "flagged", "validation_score", "score")
     units = ("label", "median_m", "worst_m", "median_deg", "worst_deg")
     costs = ["label", "seconds", "loop_seconds", "ratio_equal", "ratio_equal_loop"]
     parts.append(Table(named, errors, note="ends", explain=explain))
-    if any(row[unit] == row[unit] for row in named for unit in units[1:]):
+    if pd.DataFrame(named)[[*units[1:]]].notna().to_numpy().any():
         parts.append(Table(named, units, explain=explain))
     parts.append(Table(named, [*costs, "offline_seconds"], explain=explain))
     chosen = [row for row in named if row["role"] != FULL_ORDER and row["chosen_settings"]]
@@ -307,7 +326,7 @@ def _winner_parts(
     head: str, winner: Row, targets: list[Row], bounds: list[Row], explain: bool
 ) -> list[Part]:
     """What validation has chosen: its targets, and its errors beside their bounds."""
-    reached = [row | _judged(row) | {"target": row["item"]} for row in targets]
+    outcomes = [row | _verdict(row) | {"target": row["item"]} for row in targets]
     for row in bounds:
         kind = MEASURES[row["measure"]]
         row["output"] = f"{row['item'].replace('_', ' ')}, {kind}"
@@ -317,4 +336,4 @@ def _winner_parts(
     errors |= {name: column(name) for name in ("bound", "worst", "most")}
     errors["reason"] = Column("bound from")
     below = "*: bound added here" if explain else ""
-    return [Table(reached, columns, head, below=below), Table(bounds, errors)]
+    return [Table(outcomes, columns, head, below=below), Table(bounds, errors)]

@@ -28,54 +28,51 @@ def size_rows(dataset: xr.Dataset) -> Iterator[Row]:
     """
     seconds, n = dataset["seconds_median"], dataset["coordinates_of_mesh"].values
     full = seconds.sel(label=FULL).values
-    for place in range(dataset.sizes["mesh"]):
+    for mesh in range(dataset.sizes["mesh"]):
+        kind = str(dataset["kind"].values[mesh])
         for label in dataset["label"].values.tolist()[1:]:
-            own = dataset.isel(mesh=place).sel(label=label)
-            time = float(own["seconds_median"])
+            reduced = dataset.isel(mesh=mesh).sel(label=label)
+            time, offline = float(reduced["seconds_median"]), float(reduced["offline_seconds"])
             if not np.isfinite(time):
                 continue
-            saved = full[place] - time
+            saved = full[mesh] - time
             row: Row = {
                 "kind": KIND,
                 "study": dataset.attrs["study"],
-                "mesh": mesh_text(dataset, place),
-                "mesh_kind": str(dataset["kind"].values[place]),
-                "coordinates": int(n[place]),
-                "label": "chosen by its protocol" if _is_vehicle(dataset, place) else label,
-                "order": float(own["effective_rank"]),
-                "full_seconds": float(full[place]),
+                "mesh": mesh_text(dataset, mesh),
+                "mesh_kind": kind,
+                "coordinates": int(n[mesh]),
+                "label": "chosen by its protocol" if kind == "vehicle" else label,
+                "order": float(reduced["effective_rank"]),
+                "full_seconds": float(full[mesh]),
                 "seconds": time,
-                "gain_mesh": float(full[place] / time),
-                "offline_seconds": float(own["offline_seconds"]),
-                "growth_full": growth(dataset, str(dataset["kind"].values[place]), FULL),
-                "growth": growth(dataset, str(dataset["kind"].values[place]), label),
-                "break_even": float(own["offline_seconds"] / saved) if saved > 0.0 else np.nan,
+                "gain_mesh": float(full[mesh] / time),
+                "offline_seconds": offline,
+                "growth_full": growth(dataset, kind, FULL),
+                "growth": growth(dataset, kind, label),
+                "break_even": float(offline / saved) if saved > 0.0 else np.nan,
             }
             for group in GROUPS:
-                row |= _against(dataset, group, float(own["relative_error"].sel(group=group)), time)
+                error = float(reduced["relative_error"].sel(group=group))
+                row |= _cheapest_rival(dataset, group, error, time)
             yield row
 
 
-def _is_vehicle(dataset: xr.Dataset, place: int) -> bool:
-    return str(dataset["kind"].values[place]) == "vehicle"
-
-
-def _against(dataset: xr.Dataset, group: str, error: float, seconds: float) -> Row:
+def _cheapest_rival(dataset: xr.Dataset, group: str, error: float, seconds: float) -> Row:
     """The cheapest full model whose error in a group of outputs is no larger."""
     full = dataset.sel(label=FULL)
     errors = full["relative_error"].sel(group=group).values
     times = np.where(errors <= error, full["seconds_median"].values, np.inf)
-    found, place = np.isfinite(times).any(), int(times.argmin())
-    return {
-        f"error_{group}": error,
-        f"rival_{group}": mesh_text(dataset, place) if found else "",
-        f"gain_{group}": float(times[place] / seconds) if found else np.nan,
-    }
+    rival, gain = "", np.nan
+    if np.isfinite(times).any():
+        fastest = int(times.argmin())
+        rival, gain = mesh_text(dataset, fastest), float(times[fastest] / seconds)
+    return {f"error_{group}": error, f"rival_{group}": rival, f"gain_{group}": gain}
 
 
-def mesh_text(dataset: xr.Dataset, place: int) -> str:
+def mesh_text(dataset: xr.Dataset, mesh: int) -> str:
     """A mesh in words: `shells, 0.25 m`; of a vehicle its name."""
-    name, kind = str(dataset["mesh"].values[place]), str(dataset["kind"].values[place])
+    name, kind = str(dataset["mesh"].values[mesh]), str(dataset["kind"].values[mesh])
     if kind == "vehicle":
         return name.replace("_", " ")
     word, unit = KINDS.get(kind, (kind, ""))
@@ -94,14 +91,15 @@ def growth(dataset: xr.Dataset, kind: str, label: str) -> float:
 
 def growth_text(rows: Sequence[Row]) -> str:
     """Growth of the times with the number of coordinates, by kind of mesh, in one sentence."""
-    found = {
-        row["mesh_kind"]: row for row in reversed(rows) if row["growth_full"] == row["growth_full"]
-    }
-    parts = [
-        f"{KINDS.get(kind, (kind,))[0]}: full n^{row['growth_full']:.2f}, "
-        f"{row['label']} n^{row['growth']:.2f}"
-        for kind, row in sorted(found.items())
-    ]
+    first_of_kind: dict[str, Row] = {}
+    for row in rows:
+        if not np.isnan(row["growth_full"]):
+            first_of_kind.setdefault(row["mesh_kind"], row)
+    parts: list[str] = []
+    for kind, row in sorted(first_of_kind.items()):
+        word, *_ = KINDS.get(kind, (kind,))
+        reduced = f"{row['label']} n^{row['growth']:.2f}"
+        parts.append(f"{word}: full n^{row['growth_full']:.2f}, {reduced}")
     return f"Times grow with the number n of coordinates ({'; '.join(parts)})." if parts else ""
 
 

@@ -32,7 +32,7 @@ CLOCKS = {"seconds": "ratio_equal", "loop_seconds": "ratio_equal_loop"}
 CONFIDENCE = 0.95
 # SI unit of a bounded output -> the unit in which errors are printed, and its factor.
 PRINTED_UNITS = {"m": ("m", 1.0), "rad": ("deg", 180.0 / math.pi)}
-# Smallest part of the error of its last row to which a ladder is continued.
+# A work-precision curve is continued to this part of the error of its last row.
 CONTINUED = 0.5
 
 
@@ -63,22 +63,22 @@ def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
     `chosen_settings` are those of the candidate that validation chose.  `seconds` is the mean of
     whole calls, `loop_seconds` of their compiled loops, with the `spread` of the rounds
     (interquartile range over median).
-    `ratio_equal` and `ratio_equal_loop` are against the full order interpolated at the row's own
+    `ratio_equal` and `ratio_equal_loop` are against the full order interpolated at the row's
     score on the rows `equal_rows`, `ratio_within` against `within`, the fastest full-order row
     within the bounds.
     """
     part = judged_part(dataset)
     rows = [_method_row(dataset, part, str(label), protocol) for label in part["label"].values]
     full = [row for row in rows if row["role"] == FULL_ORDER and math.isfinite(row["score"])]
-    ladders = [list(own) for _, own in groupby(full, key=lambda row: row["series"])]
-    return [row | _against(row, full, ladders) for row in rows]
+    curves = [list(group) for _, group in groupby(full, key=lambda row: row["series"])]
+    return [row | _ratios_to_full_order(row, full, curves) for row in rows]
 
 
 def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: ProtocolFile) -> Row:
     part, every = judged.sel(label=label), dataset.sel(label=label)
     sets = dataset["scenario_set"].values
     outside = outcomes(every.isel(scenario=np.isin(sets, OUTSIDE)), protocol.bounds)
-    found = outcomes(part, protocol.bounds)
+    tested = outcomes(part, protocol.bounds)
     row: Row = {
         "kind": "method",
         "label": label,
@@ -88,13 +88,13 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
         "test_set": str(dataset.attrs["test_set"]),
         "runs": part.sizes["scenario"],
         "apart": int((sets == judged_set(set(sets))).sum()) - part.sizes["scenario"],
-        "misses": int(found.missed.sum()),
-        "misses_at_ten": int((found.scores > 10.0).sum()),
-        "silent": int(found.undetected.sum()),
-        "flagged": int(found.warned.sum()),
-        "score": float(found.scores.max()),
+        "misses": int(tested.missed.sum()),
+        "misses_at_ten": int((tested.scores > 10.0).sum()),
+        "silent": int(tested.undetected.sum()),
+        "flagged": int(tested.warned.sum()),
+        "score": float(tested.scores.max()),
         # What has come to its end, trusted or not.
-        "stable_share": float(np.isfinite(found.scores).mean()),
+        "stable_share": float(np.isfinite(tested.scores).mean()),
         "failure": _failure(part),
         "outside_runs": len(outside.scores),
         "outside_misses": int(outside.missed.sum()),
@@ -155,23 +155,18 @@ def _failure(part: xr.Dataset) -> str:
     return f"{run['status'].item()} in ({run['scenario'].item()}): {run['message'].item()}"
 
 
-def _against(row: Row, full: list[Row], ladders: list[list[Row]]) -> Row:
+def _ratios_to_full_order(row: Row, full: list[Row], curves: list[list[Row]]) -> Row:
     """Ratios of a row to the full order."""
     within = (other for other in full if other["misses"] == 0)
     best = min(within, key=lambda other: other["seconds"], default=None)
-    equal = {clock: at_error(ladders, row["score"], clock) for clock in CLOCKS}
-    # A recording that is played again is no solution of anything.
-    solves = row["method"] != "replay"
-    ratios = {
-        CLOCKS[clock]: found.seconds / row[clock] if solves and row[clock] else math.nan
-        for clock, found in equal.items()
-    }
-    return {
-        "equal_rows": ", ".join(equal["seconds"].rows),
-        "within": best["label"] if best else "",
-        "ratio_within": ratio(best, row),
-        **ratios,
-    }
+    equal = {clock: at_error(curves, row["score"], clock) for clock in CLOCKS}
+    ratios: Row = {"equal_rows": ", ".join(equal["seconds"].rows)}
+    ratios |= {"within": best["label"] if best else "", "ratio_within": ratio(best, row)}
+    for clock, name in CLOCKS.items():
+        # A recording that is played again is no solution of anything.
+        solves = row["method"] != "replay" and row[clock]
+        ratios[name] = equal[clock].seconds / row[clock] if solves else math.nan
+    return ratios
 
 
 def ratio(other: Row | None, row: Row) -> float:
@@ -182,36 +177,48 @@ def ratio(other: Row | None, row: Row) -> float:
 class Equal(NamedTuple):
     """The fastest full order at an error: seconds of a run, and the rows between which it lies.
 
-    The seconds are NaN if no ladder reaches the error.
+    The seconds are NaN if no curve reaches the error.
     """
 
     seconds: float
     rows: tuple[str, ...] = ()
 
 
-def at_error(ladders: Iterable[Sequence[Row]], error: float, clock: str) -> Equal:
-    """The fastest of all ladders at an error (a score), by a column of seconds."""
-    found = [_on(_useful(ladder, clock), error, clock) for ladder in ladders]
-    reached = [equal for equal in found if not math.isnan(equal.seconds)]
+def at_error(curves: Iterable[Sequence[Row]], error: float, clock: str) -> Equal:
+    """The fastest of all work-precision curves at an error (a score), by a column of seconds."""
+    equals = [_on_curve(_useful(curve, clock), error, clock) for curve in curves]
+    reached = [equal for equal in equals if not math.isnan(equal.seconds)]
     return min(reached, key=lambda equal: equal.seconds, default=Equal(math.nan))
 
 
-def _useful(ladder: Sequence[Row], clock: str) -> list[Row]:
-    """Rows of which none of the ladder is both faster and more accurate, least accurate first."""
-    kept: list[Row] = []
-    for row in sorted(ladder, key=lambda row: (row[clock], row["score"])):
-        if row[clock] > 0.0 and (not kept or row["score"] < kept[-1]["score"]):
-            kept.append(row)
-    return kept
+def _useful(curve: Sequence[Row], clock: str) -> list[Row]:
+    """Rows of which none of the curve is both faster and more accurate, least accurate first."""
+    useful: list[Row] = []
+    for row in sorted(curve, key=lambda row: (row[clock], row["score"])):
+        if row[clock] > 0.0 and (not useful or row["score"] < useful[-1]["score"]):
+            useful.append(row)
+    return useful
 
 
-def _on(curve: Sequence[Row], error: float, clock: str) -> Equal:
-    if not curve or not error >= curve[-1]["score"] * (CONTINUED if len(curve) > 1 else 1.0):
+def _on_curve(curve: Sequence[Row], error: float, clock: str) -> Equal:
+    """Seconds at an error: looser than all rows, between two of them, or just beyond the last."""
+    # A row that has failed has the error NaN, and is nowhere on a curve.
+    if not curve or math.isnan(error):
         return Equal(math.nan)
-    if error >= curve[0]["score"]:
-        return Equal(curve[0][clock], (curve[0]["label"],))
-    further = (pair for pair in pairwise(curve) if error >= pair[1]["score"])
-    loose, tight = next(further, (curve[-2], curve[-1]))
+    loosest, tightest = curve[0], curve[-1]
+    if error >= loosest["score"]:
+        return Equal(loosest[clock], (loosest["label"],))
+    if error < tightest["score"]:
+        can_continue = len(curve) > 1 and error >= CONTINUED * tightest["score"]
+        return _interpolated(curve[-2], tightest, error, clock) if can_continue else Equal(math.nan)
+    for loose, tight in pairwise(curve):
+        if error >= tight["score"]:
+            return _interpolated(loose, tight, error, clock)
+    return Equal(math.nan)
+
+
+def _interpolated(loose: Row, tight: Row, error: float, clock: str) -> Equal:
+    """Seconds at an error on the line through two rows in logarithms, also beyond them."""
     if tight["score"] <= 0.0:
         return Equal(tight[clock], (tight["label"],))
     part = math.log(error / loose["score"]) / math.log(tight["score"] / loose["score"])
@@ -295,9 +302,11 @@ def _speed_target(target: SpeedTarget, winner: Row, methods: list[Row]) -> Row:
         name = winner["within"] if target.against == "within bounds" else target.against
         names, beside = [name], ""
         factor = ratio(next((row for row in methods if row["label"] == name), None), winner)
-    found = " and ".join(filter(None, names))
-    reason = f"against {found}" if found else "no full-order row is as accurate"
-    reason += beside + (f"; the aim is {target.aim:g}" if target.aim else "")
+    rivals = " and ".join(filter(None, names))
+    reason = f"against {rivals}" if rivals else "no full-order row is as accurate"
+    reason += beside
+    if target.aim:
+        reason += f"; the aim is {target.aim:g}"
     row = _target(f"speed-up, {target.against}", target.ratio, factor, reason, -1.0)
     timed = [r for r in methods if r["label"] in {winner["label"], *names}]
     scattered = scatter({r["label"]: r["spread"] for r in timed})

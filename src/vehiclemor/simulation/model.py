@@ -203,7 +203,7 @@ class Model(ShortRepr):
     def values_at(
         self, function: str, states: np.ndarray, inputs: np.ndarray, finite: bool = False
     ) -> np.ndarray:
-        """Results (samples, size) of a function along a path; if wanted, finite or `InputError`."""
+        """Results (samples, size) of a function of the equations along a path."""
         self.require(function)
         sizes = len(self.definition.states), len(self.inputs), self.equations.shapes[function][0]
         return at_samples(self.kernels, function, self.constants, (states, inputs), sizes, finite)

@@ -16,7 +16,7 @@ from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.fallback import with_fallback
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
-from vehiclemor.reduction.training import TrainingRun
+from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.trust import InputRange, input_range
 from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
 from vehiclemor.registry import component
@@ -41,10 +41,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# How a fitted model is integrated, and its fallback: experiments that differ in these alone are
-# fitted once.
-SOLVER = ("solver", "tolerance")
-ONLINE = (*SOLVER, "fallback", "fallback_tolerance")
+# Settings that are read after the fit, beside those of the integration.
+FALLBACK = ("fallback", "fallback_tolerance")
 # More than the fits of a study of protocols, some of which take a minute.
 MOST_FITS = 128
 
@@ -172,52 +170,46 @@ _FITS: dict[Fit, Fitted] = {}
 
 def _shared(fit: Fit) -> Fitted:
     """A fit that may be shared; what was not used for the longest time is forgotten."""
-    found = _FITS.pop(fit, None) or Fitted(_made(fit))
+    shared = _FITS.pop(fit, None) or Fitted(_new_fit(fit))
     # A bug may be mended before the next try.
-    if not (isinstance(found.reduced, Failure) and found.reduced.status == "error"):
-        _FITS[fit] = found
+    if not (isinstance(shared.reduced, Failure) and shared.reduced.status == "error"):
+        _FITS[fit] = shared
         if len(_FITS) > MOST_FITS:
             del _FITS[next(iter(_FITS))]
-    return found
+    return shared
 
 
-def _made(fit: Fit) -> FittedModel | Failure:
-    """A fit; those that differ in what does not reach `fit` alone share one result."""
+def _new_fit(fit: Fit) -> FittedModel | Failure:
+    """A fit; those that differ only in settings that are read after it share one result."""
     settings = json.loads(fit.settings)
     method: Method = component("method", fit.method)
     if method.variant_of:
         method = component("method", method.variant_of)
+    integration = method.settings.get(fit.model.kind, Settings).integration
     defaults = default_settings(fit.model, method.name)
-    common = settings | {name: defaults[name] for name in ONLINE if name in settings}
+    read_later = [name for name in (*integration, *FALLBACK) if name in settings]
+    common = settings | {name: defaults[name] for name in read_later}
     first = fit._replace(method=method.name, settings=_text(common), function=method.fit)
     if first == fit:
         return _fit(fit)
     reduced: Any = _shared(first).reduced
     if isinstance(reduced, Failure):
         return reduced
-    online = {name: settings[name] for name in SOLVER if name in settings}
-    if not all(hasattr(reduced, name) for name in online):
-        return _fit(fit)
-    complete = for_method(fit.model, fit.method, settings)
-    return with_fallback(replace(reduced, **online), fit.model, complete)
+    reduced = replace(reduced, **{name: settings[name] for name in integration})
+    return with_fallback(reduced, fit.model, for_method(fit.model, fit.method, settings))
 
 
 def _fit(fit: Fit) -> FittedModel | Failure:
     method: Method = component("method", fit.method)
 
-    def made() -> FittedModel:
-        complete = for_method(fit.model, fit.method, json.loads(fit.settings))
-        return fitted(method, *_given(fit), complete)
+    def fit_model() -> FittedModel:
+        model = with_parameters(fit.model, fit.parameters)
+        runs = [training_run(fit.model, scenario) for scenario in fit.training]
+        settings = for_method(fit.model, fit.method, json.loads(fit.settings))
+        return fitted(method, model, runs, settings)
 
     with one_thread():
-        return attempt(made)
-
-
-def _given(fit: Fit) -> tuple[Model, list[TrainingRun]]:
-    """The model that a method is fitted to, and what it learns from."""
-    return with_parameters(fit.model, fit.parameters), [
-        training_run(fit.model, s) for s in fit.training
-    ]
+        return attempt(fit_model)
 
 
 def _text(content: Mapping[str, object]) -> str:
@@ -266,7 +258,7 @@ def _tested(
     if many:
         return Outcome(judged, reference)
     if judged.status != run.status:
-        # A study shows what a protocol would not trust; the status is the method's own.
+        # A study shows what a protocol would not trust; the status is that of the method.
         remark = "; ".join(filter(None, (run.remark, f"not to be trusted: {judged.message}")))
         judged = replace(judged, status=run.status, message=run.message, remark=remark)
     if reference is None:

@@ -1,12 +1,12 @@
 """The timing pass: runs interleaved in one process, medians of rounds, stored by content.
 
-What counts is a call of `simulate` from outside, with a new input, all states and outputs
-delivered, timed from outside: whatever a model works out about an input is part of its call. Inputs
-arrive as signals, piecewise polynomials: making these of a formula takes milliseconds of Python,
-once, for reduced models and full order alike. The same call repeated, and what a model tells of its
-own loop, are recorded beside it and decide nothing. Between two runs of a comparison other work
-throws code and data out of the processor's caches, so a call that is not timed comes first. Seconds
-stored with the results of a study are measured while others run beside them; a speed-up is quoted
+What counts is a call of `simulate` with a new input, all states and outputs delivered, timed from
+outside: whatever a model works out about an input is part of its call. Inputs arrive as signals,
+piecewise polynomials: making these of a formula takes milliseconds of Python, once, for reduced
+models and full order alike. The same call repeated, and what a model reports of its loop, are
+recorded beside it and decide nothing. Between two runs of a comparison other work throws code and
+data out of the processor's caches, so a call that is not timed comes first. Seconds stored with the
+results of a study are measured while others run beside them; a speed-up is quoted
 from this pass only.
 """
 

@@ -14,7 +14,7 @@ from tests.unit.exporting.programs import in_use, relative, runge_kutta, steerin
 from vehiclemor.exporting import fmu
 from vehiclemor.exporting.c import START_ALONE, c_files
 from vehiclemor.exporting.export import system_of
-from vehiclemor.exporting.fmu import variables
+from vehiclemor.exporting.fmu import variables_of
 from vehiclemor.simulation.constants import hoisted_constants
 
 fmpy = pytest.importorskip("fmpy")
@@ -213,7 +213,7 @@ def test_parameters_are_those_that_rates_or_outputs_change_with(name, rng):
         values[i] += 0.01 * max(abs(values[i]), 1.0)
         if not np.array_equal(found(values), own):
             acting.add(f"parameter.{q.name}")
-    listed = [v.name for v in variables(system).values() if v.causality == "parameter"]
+    listed = [v.name for v in variables_of(system).values() if v.causality == "parameter"]
     # Where on the axis of the rear arms their pivot lies is in the equations, and cancels.
     assert set(listed) - acting <= {"parameter.rear_arm_pivot.y"}
     assert acting <= set(listed)

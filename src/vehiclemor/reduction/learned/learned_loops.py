@@ -102,7 +102,7 @@ def rates(
 ) -> None:
     """Results at a state whose first entries are k coordinates; inputs stand in the arguments.
 
-    What follows the coordinates is turned into rates of heading and place.
+    What follows the coordinates is turned into rates of heading and position.
     """
     v, k = arguments
     for i in range(k):
@@ -113,7 +113,7 @@ def rates(
 
 
 def turn(result: Vector, k: int, heading: float) -> None:
-    """Turn the speeds U, V behind k results and psi' into rates of the place at a heading."""
+    """Turn the speeds U, V behind k results and psi' into rates of the position at a heading."""
     forward, sideward = result[k + 1], result[k + 2]
     cosine, sine = math.cos(heading), math.sin(heading)
     result[k + 1] = forward * cosine - sideward * sine
@@ -124,11 +124,11 @@ def march(
     equations: Equations,
     coordinates: Int,
     step: Float,  # In s.
-    # Whether results are changes of the coordinates in a step (heading and place follow by the
+    # Whether results are changes of the coordinates in a step (heading and position follow by the
     # trapezoidal rule); else they are rates, for the classical Runge-Kutta method.
     discrete_time: Int,
     inputs: Matrix,  # Of all half steps (2 steps + 1, inputs).
-    path: Matrix,  # Coordinates, and heading and place if the equations have them (steps + 1, m).
+    path: Matrix,  # Coordinates; heading and position if the equations have them (steps + 1, m).
     buffer: Vector,
 ) -> Int:
     """A run from the first row of the path; the number of rows that it has reached."""
@@ -149,7 +149,7 @@ def march(
                 v[i + 1] = path[row, i]
             evaluate(equations, v, work, now)
             if size > k:
-                # The heading first: the rates of the place are turned by it.
+                # The heading first: the rates of the position are turned by it.
                 if row > 0:
                     path[row, k] = path[row - 1, k] + 0.5 * step * (before[k] + now[k])
                 turn(now, k, path[row, k])

@@ -58,7 +58,7 @@ def fixed_modes(model: StructuralModel, highest: float) -> tuple[np.ndarray, np.
 def fit(
     model: StructuralModel, training: Training, settings: CraigBamptonSettings
 ) -> ReducedStructure:
-    """Static shapes and modes; no training run is looked at.  `InputError` if no mode is kept."""
+    """Static shapes and modes; no training run is looked at.  `InputError` if no mode is slow."""
     began = time.process_time()
     basis = np.hstack(fixed_modes(model, settings.highest))
     return reduced(model, [basis], settings, began)

@@ -76,11 +76,12 @@ def fit(model: DynamicModel, training: Training, settings: DeimSettings) -> Inte
     scale = np.sqrt((rates**2).mean(axis=0))
     scale = np.maximum(scale, ROUNDING * scale.max())
     # The basis of rates begins with that of the states, so that a state stays what it is.
-    own, _ = np.linalg.qr((trial / scale).T)
-    left = (rates / scale) @ (np.eye(len(scale)) - own @ own.T)
-    _, sizes, rest = np.linalg.svd(left, full_matrices=False)
-    more = rest[: settings.rows - own.shape[1]][sizes[: settings.rows - own.shape[1]] > ROUNDING]
-    basis = np.hstack([own, more.T])
+    of_states, _ = np.linalg.qr((trial / scale).T)
+    remainder = (rates / scale) @ (np.eye(len(scale)) - of_states @ of_states.T)
+    _, sizes, directions = np.linalg.svd(remainder, full_matrices=False)
+    more = settings.rows - of_states.shape[1]
+    of_rates = directions[:more][sizes[:more] > ROUNDING]
+    basis = np.hstack([of_states, of_rates.T])
     with log_levels({"pymor": "ERROR"}):
         rows, *_ = deim(NumpyVectorSpace(len(scale)).make_array(basis), pod=False)
     oblique = np.zeros_like(test)

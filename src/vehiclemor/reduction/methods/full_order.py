@@ -40,6 +40,7 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 class AlgebraicSettings(Settings):
     """How algebraic equations are solved."""
 
+    integration = ("solver", "tolerance")
     solver: Literal["newton", "newton_lanes"] = Field(
         "newton",
         description="newton: fresh Jacobians; newton_lanes: with predictor, eight samples at once",
@@ -61,6 +62,7 @@ class DynamicSettings(OnlineSettings):
 class FullStructureSettings(StructuralSettings):
     """How structures are integrated."""
 
+    integration = ("solver", "tolerance")
     solver: Literal["generalised_alpha"] = Field(
         SOLVER, description="of order 2, one step size a run, damped at infinity"
     )
@@ -87,7 +89,7 @@ def _presets(solver: str, tolerance: float, **others: Mapping[str, Value]) -> Pr
 
 @dataclass(frozen=True, eq=False)
 class FullOrder:
-    """The full-order model in the place of a reduced one."""
+    """The full-order model as if it were a reduced one."""
 
     model: Model
     solver: str
@@ -127,12 +129,12 @@ class FullOrderSystem(FullOrder, ReducedSystem):
 
     @property
     def system(self) -> System:
-        """The model's own."""
+        """The equations of the model."""
         return self.model.system
 
     @cached_property
     def spaces(self) -> ControlPeriods:
-        """The whole space."""
+        """All of the state space."""
         return whole_space(2 * len(self.model.coordinates))
 
 
@@ -154,7 +156,7 @@ class FullOrderMechanism(FullOrder, ReducedMechanism):
 
 @dataclass(frozen=True, eq=False)
 class FullOrderStructure(StructuralRuns, FullOrder):
-    """A structural model; it gives whole runs alone."""
+    """A structural model; it can't be stepped."""
 
     model: StructuralModel
     step_size: float = 0.0

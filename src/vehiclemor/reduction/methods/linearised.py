@@ -8,7 +8,7 @@ Where the inputs contain derivatives of the steering s (a rack that is prescribe
 with d' = A d + B0 s + B1 s' + B2 s'' has none left in the rate of d - K0 s - K1 s', where K1 = B2
 and K0 = B1 + A B2.  What is left drives no stabilised constraint: the eigenvalues at which those
 cluster are no motion.  Speed, heading and position are those of every reduced vehicle: the speed
-stays that of the start, and the dynamics are those of the model's own speed.
+stays that of the start, and the dynamics are those at the speed of the model.
 
 Reductors choose coordinates of the lateral modes, those that steering moves:
 
@@ -172,7 +172,7 @@ def linear_vehicle(model: DynamicModel, settings: Any, reductor: Reductor) -> Re
     listing = FeatureListing(k + 1, inputs)
     terms = [(value,) for value in (listing.number(1.0), *listing.z, *listing.u)]
     odd, even = [*range(1, k + 1), *range(k + 2, k + 2 + inputs)], [0, k + 1]
-    # The vehicle is its own mirror image: the speed moves nothing sideways, steering changes no U.
+    # The vehicle equals its mirror image: the speed moves nothing sideways, steering changes no U.
     groups = ((tuple(odd), (*range(k), k + 1, k + 3)), (tuple(even), (k, k + 2)))
     features = listing.features(terms, groups)
     decoding = np.zeros((len(features.terms), len(linear.a)))

@@ -34,13 +34,12 @@ def operators(data: TrainingData, settings: OperatorInferenceSettings) -> Learne
     library: Any = opinf.models.ContinuousModel(form, solver=solver)
     z, inputs = arguments[:, :r].T, arguments[:, r:].T
     library.fit(states=z, ddts=results[:, :r].T, inputs=inputs)
-    terms: dict[str, list[tuple[int, ...]]] = {
-        "c": [()],
-        "A": [(i,) for i in range(1, r + 1)],
-        "H": [(i, j) for i in range(1, r + 1) for j in range(1, i + 1)],
-        "B": [(r + j,) for j in range(1, len(inputs) + 1)],
-        "N": [(r + j, i) for j in range(1, len(inputs) + 1) for i in range(1, r + 1)],
-    }
+    of_state, of_input = range(1, r + 1), range(r + 1, r + len(inputs) + 1)
+    terms: dict[str, list[tuple[int, ...]]] = {"c": [()]}
+    terms["A"] = [(i,) for i in of_state]
+    terms["H"] = [(i, j) for i in of_state for j in range(1, i + 1)]
+    terms["B"] = [(j,) for j in of_input]
+    terms["N"] = [(j, i) for j in of_input for i in of_state]
     entries = [np.reshape(operator.entries, (r, -1)).T for operator in library.operators]
     listed = [term for name in form for term in terms[name]]
     return data.model(data.with_motion(listed, np.vstack(entries)))

@@ -72,8 +72,8 @@ def map_kernel(moving: tuple[int, ...], degree: int, columns: tuple[int, ...]) -
     for term in monomials(len(moving), degree)[1:]:
         powers[term] = listing.let(powers[term[:-1]] * x[term[-1]])
     values = listing.sums("_coefficients", 0, max(columns) + 1, [*powers.values()])
-    for place, column in enumerate(columns):
-        listing.store(place, values[column])
+    for index, column in enumerate(columns):
+        listing.store(index, values[column])
     return listing.kernel("polynomials", ("_x", "_coefficients", "_result"))
 
 
@@ -171,8 +171,8 @@ class PathMapModel(ReducedMechanism):
         moved = table[: len(self.model.coordinates)]
         if of == "coordinates":
             return moved
-        own, slopes = (self.model.jacobian_of(of, state, inputs, by) for by in ("inputs", "state"))
-        return own + slopes @ moved
+        direct = self.model.jacobian_of(of, state, inputs, "inputs")
+        return direct + self.model.jacobian_of(of, state, inputs, "state") @ moved
 
     def _evaluated(self, times: np.ndarray, inputs: np.ndarray, given: Ready) -> Trajectory:
         """Polynomials at inputs (samples, inputs), also as the loop takes them."""
@@ -221,11 +221,11 @@ class PathMapModel(ReducedMechanism):
 
 def _named(model: AlgebraicModel, values: np.ndarray) -> str:
     """Values or ranges (inputs, 1 or 2) of the inputs by their names and units."""
-    return ", ".join(
-        f"{quantity.name} {' to '.join(f'{v:.5g}' for v in dict.fromkeys(row.tolist()))} "
-        f"{quantity.unit}"
-        for quantity, row in zip(model.definition.inputs, values, strict=True)
-    )
+    texts = []
+    for quantity, row in zip(model.definition.inputs, values, strict=True):
+        ends = " to ".join(f"{value:.5g}" for value in dict.fromkeys(row.tolist()))
+        texts.append(f"{quantity.name} {ends} {quantity.unit}")
+    return ", ".join(texts)
 
 
 def check(model: Model, settings: PathMapSettings) -> None:
@@ -287,39 +287,50 @@ def _mapped(
 
 
 def _distinct(values: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Columns (nodes, columns) that differ, and which of them stands for each that was given."""
-    kept: list[np.ndarray] = []
-    columns = []
+    """Columns (nodes, columns) that differ, and which of them stands for each of the values."""
+    different: list[np.ndarray] = []
+    indices = []
     for column in values.T:
-        same = (k for k, other in enumerate(kept) if np.abs(other - column).max() < SAME)
-        columns.append(next(same, len(kept)))
-        if columns[-1] == len(kept):
-            kept.append(column)
-    return np.column_stack(kept), tuple(columns)
+        same = (k for k, other in enumerate(different) if np.abs(other - column).max() < SAME)
+        index = next(same, len(different))
+        if index == len(different):
+            different.append(column)
+        indices.append(index)
+    return np.column_stack(different), tuple(indices)
 
 
 def _coefficients(values: np.ndarray, moving: int, number: int, degree: int) -> np.ndarray:
     """Coefficients (cells, monomials, quantities) from values (nodes, quantities) of all cells."""
+    size, quantities = degree + 1, values.shape[1]
+    # Along each input cells and, in each of these, nodes.
+    grid = values.reshape(*[number, size] * moving, quantities)
+    grid = np.moveaxis(grid, range(0, 2 * moving, 2), range(moving))
+    cells = grid.reshape(number**moving, *[size] * moving, quantities)
+    coefficients = np.array([_of_cell(cell, moving, degree) for cell in cells])
+    padding = padded(quantities) - quantities
+    return loop_array(np.pad(coefficients, ((0, 0), (0, 0), (0, padding))))
+
+
+def _of_cell(cell: np.ndarray, moving: int, degree: int) -> np.ndarray:
+    """Coefficients (monomials, quantities) from values of one cell (nodes, ..., quantities)."""
     size = degree + 1
-    values = values.reshape(*[number, size] * moving, values.shape[1])
-    values = np.moveaxis(values, range(0, 2 * moving, 2), range(moving))
-    # Series first: they say what to leave out, and are well-conditioned.
-    series = np.linalg.inv(chebyshev.chebvander(chebyshev.chebpts1(degree + 1), degree))
-    for axis in range(moving, 2 * moving):
-        values = _along(series, values, axis)
-    beyond = np.indices([size] * moving).sum(axis=0) > degree
-    values[(slice(None),) * moving + (beyond,)] = 0.0
-    powers = np.zeros((size, size))
+    # Chebyshev series first: they say what to leave out, and are well-conditioned.
+    to_series = np.linalg.inv(chebyshev.chebvander(chebyshev.chebpts1(size), degree))
+    for axis in range(moving):
+        cell = _along(to_series, cell, axis)
+    orders = np.indices([size] * moving).sum(axis=0)
+    cell[orders > degree] = 0.0
+    to_powers = np.zeros((size, size))
     for order in range(size):
-        powers[: order + 1, order] = chebyshev.cheb2poly(np.eye(size)[order, : order + 1])
-    for axis in range(moving, 2 * moving):
-        values = _along(powers, values, axis)
-    values = values.reshape(number**moving, *[size] * moving, -1)
+        to_powers[: order + 1, order] = chebyshev.cheb2poly(np.eye(size)[order, : order + 1])
+    for axis in range(moving):
+        cell = _along(to_powers, cell, axis)
     terms = monomials(moving, degree)
-    chosen = tuple(np.array([[t.count(k) for t in terms] for k in range(moving)]))
-    found = values[(slice(None), *chosen)]
-    padding = padded(found.shape[-1]) - found.shape[-1]
-    return loop_array(np.pad(found, ((0, 0), (0, 0), (0, padding))))
+    powers = np.zeros((moving, len(terms)), dtype=int)
+    for column, term in enumerate(terms):
+        for variable in term:
+            powers[variable, column] += 1
+    return cell[tuple(powers)]
 
 
 def _along(matrix: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:

@@ -61,7 +61,7 @@ class ReplayModel(ShortRepr):
         each condition.  Each is divided by the range of its quantity over the training runs, so
         units do not matter, and what is the same in all of them does not count.
 
-        Runs of the maneuver's own output times come first.  If there are none, inputs are compared
+        Runs with the maneuver's output times come first.  If there are none, inputs are compared
         over the time that a run and the maneuver share, and the run is read at the maneuver's
         times: between samples linearly, after its end its last value.
         """
@@ -96,8 +96,8 @@ class ReplayModel(ShortRepr):
         shared = times <= run.times[-1]
         difference = _resampled(run.times, run.inputs, times[shared]) - inputs[shared]
         of_inputs = np.sqrt(np.mean(difference**2, axis=0))
-        apart = np.append(of_inputs, self.conditions[number] - conditions)
-        return float(np.linalg.norm(apart / self._ranges))
+        differences = np.append(of_inputs, self.conditions[number] - conditions)
+        return float(np.linalg.norm(differences / self._ranges))
 
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""

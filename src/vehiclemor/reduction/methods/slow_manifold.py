@@ -10,7 +10,7 @@ which lie on it, and the lag of the fast modes is learnt with them:
 
 Features phi are z, the inputs, the tire forces of the axles, and products that are chosen one after
 the other.  Heave and pitch, as slow as the lateral modes, are coordinates too if a training run is
-dropped.  The coefficients are improved on whole runs, since a heading that is off is a lateral
+dropped.  The coefficients are improved on complete runs, since a heading that is off is a lateral
 position that is off.
 """
 
@@ -56,7 +56,7 @@ from vehiclemor.reduction.vehicle.slow_features import (
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
-# Speed (m/s), heading (rad) and place (m) below which their errors count absolutely.
+# Speed (m/s), heading (rad) and position (m) below which their errors count absolutely.
 ABSOLUTE = (10.0, 0.03, 10.0, 10.0)
 # Symmetric modes, heave and pitch, that are coordinates where training runs are dropped.
 SYMMETRIC = 2
@@ -123,16 +123,17 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
         modes = slow_modes(shape, settings.fastest, SYMMETRIC)
     settled = [after_transient(modes.symmetric, shape, run) for run in runs]
     samples = shape_samples(shape, settled)
-    made = slow_features(shape, modes, samples, settings.trusted, settings.reversal)
-    reduced = _fitted_on_rates(shape, modes, made, samples, settings)
+    listing = slow_features(shape, modes, samples, settings.trusted, settings.reversal)
+    reduced = _fitted_on_rates(shape, modes, listing, samples, settings)
     if dropped:
         reduced = with_transients(reduced, modes, runs)
     if settings.steps:
         targets = targets_of(reduced, training, runs, settings.heading_error)
         (odd, lateral), (even, symmetric) = reduced.features.groups
         # What heave and pitch do in straight running is exact, and speed is constant there.
-        even = even[2 + made.symmetric :]
-        free = [*((odd, i) for i in lateral), *((even, i) for i in symmetric)]
+        even = even[2 + listing.symmetric :]
+        free = [(odd, i) for i in lateral]
+        free += [(even, i) for i in symmetric]
         reduced = improved(reduced, targets, free, settings.steps, power=1.0)
         reduced = improved(reduced, targets, free, settings.steps)
     reduced = _with_decoding(reduced, training, settled, samples, settings.ridge)
@@ -148,55 +149,59 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
 def _fitted_on_rates(
     shape: VehicleShape,
     modes: SlowModes,
-    made: SlowFeatures,
+    listing: SlowFeatures,
     samples: ShapeSamples,
     settings: SlowManifoldSettings,
 ) -> ReducedVehicle:
     """Equations fitted on the rates of the training runs; nothing is decoded yet."""
-    u, motion, k, n = samples.inputs, samples.motion, made.lateral, made.speed
+    u, motion, k, n = samples.inputs, samples.motion, listing.lateral, listing.speed
     z = modes.coordinates(samples.deviations, u)
     # Inputs are derivatives of the first one.
     rates = samples.rates @ modes.encoding.T - u[:, 1:] @ modes.input_shift[:, :-1].T
     lateral = np.column_stack([rates[:, :k], motion[:, 0], motion[:, 2]])
-    own, forward = modes.rates[k:, k:], shape.linearised.motion_a[1] @ modes.right[:, k:]
-    linear = np.column_stack([z[:, k:n] @ own.T, np.zeros(len(z)), z[:, k:n] @ forward + z[:, n]])
-    symmetric = np.column_stack([rates[:, k:], motion[:, 1] - shape.speed]) - linear
+    # Of heave and pitch in straight running: their rates, and the forward speed.
+    heave, forward = modes.rates[k:, k:], shape.linearised.motion_a[1] @ modes.right[:, k:]
+    speed = z[:, k:n] @ forward + z[:, n]
+    straight_rates = np.column_stack([z[:, k:n] @ heave.T, np.zeros(len(z)), speed])
+    symmetric = np.column_stack([rates[:, k:], motion[:, 1] - shape.speed]) - straight_rates
 
     def chosen(
-        given: Sequence[Names], others: Sequence[Names], values: np.ndarray, more: int
+        fixed: Sequence[Names], others: Sequence[Names], values: np.ndarray, more: int
     ) -> list[Names]:
-        terms = [*given, *(term for term in others if term not in given)]
-        columns = made.columns(terms, z, u)
-        return [terms[i] for i in forward_selection(columns, values, len(given), more)]
+        terms = [*fixed, *(term for term in others if term not in fixed)]
+        columns = listing.columns(terms, z, u)
+        return [terms[i] for i in forward_selection(columns, values, len(fixed), more)]
 
-    given, straight = given_terms(made)
-    others = even_candidates(made)
-    odd = chosen(given, odd_candidates(made), rates[:, :k], settings.terms)
-    even = [*straight, *chosen([], others, symmetric, settings.even_terms)]
+    linear, straight = given_terms(listing)
+    even_others = even_candidates(listing)
+    odd = chosen(linear, odd_candidates(listing), rates[:, :k], settings.terms)
+    even = [*straight, *chosen([], even_others, symmetric, settings.even_terms)]
     terms = [*odd, *even]
+    columns, scale = listing.columns(terms, z, u), largest(z[:, :n])
+    first, last = len(odd), len(odd) + len(straight)
     c = np.zeros((len(terms), n + 1 + PLANAR))
-    columns, first, scale = made.columns(terms, z, u), len(odd), largest(z[:, :n])
-    c[:first, made.odd_columns] = ridge_fit(columns[:, :first], lateral, settings.ridge)
-    # Straight running at any speed is an equilibrium.
-    c[first, n + 2], c[first + 1, n + 2] = shape.speed, 1.0
-    last = first + len(straight)
-    c[first + 2 : last, k:n] = own.T * scale[k:, None]
-    c[first + 2 : last, n + 2] = forward * scale[k:]
-    c[last:, made.even_columns] = ridge_fit(columns[:, last:], symmetric, settings.ridge)
-    decoded = chosen([*given, *straight], [*terms, *others], samples.deviations, DECODED)
+    c[:first, listing.odd_columns] = ridge_fit(columns[:, :first], lateral, settings.ridge)
+    # Straight running at any speed is an equilibrium: the terms 1 and speed make up U.
+    forward_speed = n + 2
+    c[[first, first + 1], forward_speed] = shape.speed, 1.0
+    c[first + 2 : last, k:n] = heave.T * scale[k:, None]
+    c[first + 2 : last, forward_speed] = forward * scale[k:]
+    c[last:, listing.even_columns] = ridge_fit(columns[:, last:], symmetric, settings.ridge)
+    every_term = [*terms, *even_others]
+    decoded = chosen([*linear, *straight], every_term, samples.deviations, DECODED)
     decoded.sort(key=lambda term: term not in odd)
     return ReducedVehicle(
         shape.model,
         shape,
-        made.of_terms(terms, first),
-        np.array(made.values),
-        c,
-        np.zeros((len(decoded), len(shape.names))),
-        modes.encoding,
-        modes.input_shift,
-        np.concatenate([3.0 * scale, ABSOLUTE]),
+        features=listing.of_terms(terms, first),
+        parameters=np.array(listing.values),
+        coefficients=c,
+        decoding=np.zeros((len(decoded), len(shape.names))),
+        encoding=modes.encoding,
+        feedthrough=modes.input_shift,
+        error_scale=np.concatenate([3.0 * scale, ABSOLUTE]),
         transient=modes.symmetric,
-        decoded_features=made.of_terms(decoded, sum(term in odd for term in decoded)),
+        decoded_features=listing.of_terms(decoded, sum(term in odd for term in decoded)),
     )
 
 
@@ -207,10 +212,10 @@ def _with_decoding(
     samples: ShapeSamples,
     ridge: float,
 ) -> ReducedVehicle:
-    """The reduced vehicle whose shapes are fitted to where its own runs are.
+    """The reduced vehicle whose shapes are fitted along its own runs.
 
-    Where one of these fails it is to where the training runs are.  Of what the mirror reverses only
-    odd terms tell, of the rest only even ones.
+    Where one of these fails they are fitted along the training run.  Antisymmetric shapes use odd
+    terms, symmetric ones even terms.
     """
     features, states = reduced.decoded_features, reduced.features.states
     assert features is not None

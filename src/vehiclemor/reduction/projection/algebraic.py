@@ -60,6 +60,7 @@ class AlgebraicPodSettings(Settings):
     reversed_coordinates: str = Field(
         "", description="galerkin: coordinates counted the other way round, separated by commas"
     )
+    integration = ("tolerance",)
     tolerance: StepTolerance = 1e-12
     rounding_seed: int = Field(
         0, ge=0, description="seed of a relative noise of 2^-52 on the snapshots; 0: none"
@@ -101,13 +102,9 @@ class AlgebraicProjection(ReducedMechanism):
             bases[k, : basis.rank] = basis.vectors.T
             if self.tests is not None:
                 tests[k, : basis.rank] = self.tests[k].T
-        subspaces = Windows(
-            first_samples(times, self.edges),
-            np.array([basis.mean for basis in self.bases]),
-            bases,
-            tests,
-            np.array([basis.rank for basis in self.bases]),
-        )
+        means = np.array([basis.mean for basis in self.bases])
+        ranks = np.array([basis.rank for basis in self.bases])
+        subspaces = Windows(first_samples(times, self.edges), means, bases, tests, ranks)
         iteration = Iteration(self.tolerance, ITERATION_LIMIT, np.inf)
         least_squares = int(self.tests is None)
         kernels = model.addresses("jacobian_entries", "jacobian_product")
@@ -139,10 +136,10 @@ def fit_windows(
     """POD subspaces between edges (windows + 1,) in s, of snapshots as in `dynamic.fit_windows`."""
     began = time.process_time()
     count, rank = settings.snapshots, settings.rank
-    moments = [np.linspace(a, b, count) for a, b in pairwise(edges)]
-    histories = [run.at(np.concatenate(moments)) for run in training]
+    snapshot_times = [np.linspace(a, b, count) for a, b in pairwise(edges)]
+    histories = [run.at(np.concatenate(snapshot_times)) for run in training]
     bases = []
-    for k in range(len(moments)):
+    for k in range(len(snapshot_times)):
         part = slice(k * count, (k + 1) * count)
         snapshots = np.concatenate([history.coordinates[part] for history in histories]).T
         if seed := settings.rounding_seed:

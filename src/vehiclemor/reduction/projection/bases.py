@@ -69,12 +69,11 @@ def pod_basis(snapshots: np.ndarray, rank: int, rank_tolerance: float = 0.0) -> 
     """
     mean = snapshots.mean(axis=1)
     vectors, values, _ = np.linalg.svd(snapshots - mean[:, None], full_matrices=False)
-    kept = rank
     if rank_tolerance > 0.0:
-        kept = min(rank, int(np.count_nonzero(values > rank_tolerance * values[0])))
-    vectors = vectors[:, :kept]
+        rank = min(rank, int(np.count_nonzero(values > rank_tolerance * values[0])))
+    vectors = vectors[:, :rank]
     largest = np.abs(vectors).argmax(axis=0)
-    signs = np.sign(vectors[largest, np.arange(kept)])
+    signs = np.sign(vectors[largest, np.arange(rank)])
     return Basis(mean, vectors * signs, values)
 
 

@@ -49,6 +49,7 @@ class DynamicPodSettings(Settings):
     the projected equations keep the model's energy.
     """
 
+    integration = ("solver", "tolerance")
     solver: ProjectedSolver = "dopri5"
     tolerance: Tolerance = 1e-6
     rank: Rank = 3
@@ -109,7 +110,7 @@ class DynamicProjection(ReducedSystem):
 
     @property
     def system(self) -> System:
-        """The model's own."""
+        """The equations of the model."""
         return self.model.system
 
     @property
@@ -149,8 +150,8 @@ class DynamicProjection(ReducedSystem):
             run = self.system.run(maneuver, state, spaces, how)
             states[first:end], failure = run.recorded_states, run.failure
             counts, seconds, first = counts + run.counts, seconds + run.seconds, end
-        found = model.trajectory(times, maneuver.at(times), states, counts, seconds, failure)
-        return found if outputs is None else found.chosen(outputs)
+        run = model.trajectory(times, maneuver.at(times), states, counts, seconds, failure)
+        return run if outputs is None else run.chosen(outputs)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, 2 n) onto the subspaces."""
@@ -177,7 +178,7 @@ class DynamicProjection(ReducedSystem):
         """Largest real part of an eigenvalue of each window's reduced Jacobian (windows,), 1/s.
 
         At the mean of the window's snapshots, without steering.  One far above that of the full
-        model says that the projection has made the system unstable.  NaN where the training was at
+        model says that the projection is unstable.  NaN where the training was at
         rest: a window of rank 0 has no eigenvalue.
         """
         model, spaces = self.model, self.spaces
@@ -185,7 +186,7 @@ class DynamicProjection(ReducedSystem):
         for k in np.flatnonzero(spaces.ranks).tolist():
             y = np.zeros(spaces.ranks[k])
             if spaces.formulation == "coordinates":
-                # Rates are coordinates of their own, and the test basis has nothing of speeds.
+                # Rates are coordinates too, and the test basis has nothing of speeds.
                 rank, no_input = spaces.ranks[k] // 2, np.zeros((1, len(model.inputs)))
                 (of_mean,) = model.rhs_at(spaces.means[k : k + 1], no_input)
                 of_mean[len(model.coordinates) :] = 0.0
@@ -234,9 +235,9 @@ def fit_windows(
         raise InputError(f"windows in time need training runs of one duration, not {lengths} s")
     began = time.process_time()
     count = settings.snapshots
-    moments = np.concatenate([np.linspace(a, b, count) for a, b in pairwise(edges)])
+    snapshot_times = np.concatenate([np.linspace(a, b, count) for a, b in pairwise(edges)])
     # The same time twice, at inner edges, needs one sample.
-    unique, indices = np.unique(moments, return_inverse=True)
+    unique, indices = np.unique(snapshot_times, return_inverse=True)
     histories = [run.at(unique) for run in training]
     states = np.array([history.states[indices] for history in histories])
     weight = _weight(model, settings, states.reshape(-1, states.shape[-1]), edges)
@@ -296,15 +297,15 @@ def _weight(
     length of a window, where M of the speeds follows from the map of rates to speeds there.
     `range` is one over the square of each state's range.
     """
-    n, whole = len(model.coordinates), settings.formulation == "state"
-    states = states if whole else states[:, :n]
+    n, of_states = len(model.coordinates), settings.formulation == "state"
+    states = states if of_states else states[:, :n]
     if settings.inner_product == "euclidean":
         return np.eye(states.shape[1])
     if settings.inner_product == "range":
         ranges = np.ptp(states, axis=0)
         return np.diag(1.0 / np.maximum(ranges, SMALLEST_RANGE * ranges.max()) ** 2)
     mass = model.mass_matrix(model.start())
-    if not whole:
+    if not of_states:
         return mass
     weight = np.zeros((2 * n, 2 * n))
     weight[:n, :n] = mass / float(edges[1] - edges[0]) ** 2

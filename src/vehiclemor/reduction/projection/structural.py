@@ -1,7 +1,7 @@
 """Structures in a basis: Galerkin projection of matrices, ports and outputs; and their modes.
 
-q = V z about the static state: M z'' + (W W' + d K) z' + K z = B f holds with V'MV in the place
-of M and so on; the law of the ports stays what it is.  Coordinates are turned so that V'MV is the
+q = V z about the static state: M z'' + (W W' + d K) z' + K z = B f holds with V'MV instead of M
+and so on; the law of the ports stays what it is.  Coordinates are turned so that V'MV is the
 identity and V'KV diagonal (K.-J. Bathe, Finite Element Procedures, 2014, chapter 10): what is left
 to solve in a step has few entries.
 """
@@ -47,6 +47,7 @@ RESULTS = {"rhs": "rhs", "outputs": "outputs"}
 class StructuralSettings(Settings):
     """What all reductions of structures share."""
 
+    integration = ("tolerance",)
     tolerance: float = Field(
         USUAL,
         gt=0.0,
@@ -106,12 +107,12 @@ def projected(structure: Structure, modes: np.ndarray) -> Structure:
 
 
 class StructuralRuns(ShortRepr):
-    """Base of what gives whole runs of a structure: dataclasses with the fields below."""
+    """Base of what runs like a structure: dataclasses with the fields below."""
 
     if TYPE_CHECKING:
         model: StructuralModel
         tolerance: float
-        step_size: float  # In s, in the place of the tolerance; 0: by that.
+        step_size: float  # In s, instead of the tolerance; 0: by that.
 
     @property
     def solved(self) -> tuple[StructuralModel, Periods | None]:
@@ -145,7 +146,7 @@ class ReducedStructure(StructuralRuns):
     # Cost of making it; error by the step size, as of the full model.
     offline: OfflineCost
     tolerance: float
-    step_size: float = 0.0  # In s, in the place of the tolerance; 0: by that.
+    step_size: float = 0.0  # In s, instead of the tolerance; 0: by that.
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if there is no basis of the model's coordinates for each period."""
@@ -262,14 +263,16 @@ class SteppedStructure(ReducedStructure):
         if parameter_names(by):
             raise InputError(f"the reduced equations of {self.model.name} have no parameters")
         a, b, c, d, ports = self._linear
-        own, through = (a, b) if function == "rhs" else (c, d)
+        direct, by_force = (a, b) if function == "rhs" else (c, d)
         if by == "state":
             slopes = self._forces(state, inputs)
-            return own + through @ np.hstack([slopes[:, [1]] * ports.T, slopes[:, [2]] * ports.T])
+            return direct + by_force @ np.hstack(
+                [slopes[:, [1]] * ports.T, slopes[:, [2]] * ports.T]
+            )
         law, (deflections, rates) = self._first.law, state.reshape(2, -1) @ ports
         arrays = np.concatenate([law.static[0] + deflections, rates]), inputs, law.constants
-        found = partial(law.kernels, "port_forces", arrays, 3 * len(rates), PLACES["inputs"])
-        return through @ found.reshape(len(rates), 3, -1)[:, 0]
+        forces = partial(law.kernels, "port_forces", arrays, 3 * len(rates), PLACES["inputs"])
+        return by_force @ forces.reshape(len(rates), 3, -1)[:, 0]
 
     def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Coordinates (samples, n) about the static state of states (samples, 2 r)."""
@@ -344,7 +347,7 @@ def _hertz(square: float) -> float:
 
 
 class StructuralPodSettings(StructuralSettings):
-    """POD of the motion about the static state, which takes the place of the mean."""
+    """POD of the motion about the static state, which replaces the mean."""
 
     rank: int = Field(21, ge=1, description="basis vectors in each control period")
     rank_tolerance: RankTolerance = 1e-10
@@ -375,6 +378,6 @@ def fit_windows(
     for first, last in pairwise(edges):
         within = [q[(t >= first - 1e-9) & (t <= last + 1e-9)] for t, q in parts]
         vectors, values, _ = np.linalg.svd(np.vstack(within).T, full_matrices=False)
-        kept = values[: settings.rank] > settings.rank_tolerance * values[0]
-        bases.append(vectors[:, : settings.rank][:, kept])
+        large = values[: settings.rank] > settings.rank_tolerance * values[0]
+        bases.append(vectors[:, : settings.rank][:, large])
     return reduced(model, bases, settings, began, evaluations, edges[1:-1])

@@ -91,8 +91,8 @@ def car(h: Values, p: Values, magnify: float) -> np.ndarray:
             hub = line((x, sign * p["front_track"], radius + rise))
             parts += [hub + turned(wheel(radius), "Z", steer)]
             parts += [chained(hub, body[:, [first + corner]])]
-    place = line((h["longitudinal_position"], h["lateral_position"], 0.0))
-    return turned(joined(parts), "Z", h["yaw"]) + place
+    position = line((h["longitudinal_position"], h["lateral_position"], 0.0))
+    return turned(joined(parts), "Z", h["yaw"]) + position
 
 
 def truck(h: Values, p: Values, magnify: float) -> np.ndarray:
@@ -103,9 +103,8 @@ def truck(h: Values, p: Values, magnify: float) -> np.ndarray:
     for end, x in (("front", 0.0), ("rear", -p["wheelbase"])):
         names = [f"{end[0].upper()}{side}" for side in "LR"]
         texts = ("Fz_{}", "road_{}", "deflection_{}", "platform_{}_height")
-        load, road, bent, plate = (
-            magnify * np.array([h[text.format(name)] for name in names]) for text in texts
-        )
+        moving = [[h[text.format(name)] for name in names] for text in texts]
+        load, road, bent, plate = magnify * np.array(moving)
         axle = road - (load - load[:, :1]) / p["tire_stiffness"]
         # Springs stand on the axle inside of the wheels.
         inside = p[f"{end}_spring_offset"] / p["wheel_offset"]
@@ -120,7 +119,8 @@ def truck(h: Values, p: Values, magnify: float) -> np.ndarray:
             along, y = -p[f"platform_{end}"], side * p["platform_width"] / 2.0
             plates[end, k] = along, y, PLATFORM + plate[k]
     around = (("front", 0), ("front", 1), ("rear", 1), ("rear", 0), ("front", 0))
-    return joined([*parts, *(line(*(c[key] for key in around)) for c in (rails, plates))])
+    parts += [line(*(corners[key] for key in around)) for corners in (rails, plates)]
+    return joined(parts)
 
 
 def suspension(h: Values, p: Values, magnify: float) -> np.ndarray:
@@ -198,8 +198,12 @@ def animate(
         raise InputError(f"out is {quoted(str(path))}; a film ends with .gif")
     replaceable(path, "film as GIF", begins_with(b"GIF8"))
     seconds = within("duration", number("duration", duration), DURATIONS, " s")
-    named = [pair for each in (run, *beside) for pair in _histories(each)]
-    methods, runs = [name for name, _ in named], [quantities for _, quantities in named]
+    methods: list[str] = []
+    runs: list[dict[str, np.ndarray]] = []
+    for each in (run, *beside):
+        for method, quantities in _histories(each):
+            methods.append(method)
+            runs.append(quantities)
     texts = list(labels) or [method_text(name) for name in methods]
     if not labels and beside:
         texts[-1] = FULL_ORDER
@@ -229,9 +233,11 @@ def animate(
 def _styles(methods: Sequence[str]) -> list[Style]:
     """Style of each run: the colour of its method, the last one of several in grey."""
     numbered = {str(k): method for k, method in enumerate(methods)}
-    found = styles(numbered, numbered)
-    looks = [found[key] | {"linestyle": "-", "linewidth": 1.2} for key in numbered]
-    return [*looks[:-1], FULL | {"zorder": 1.5, "linewidth": 3.5}] if len(looks) > 1 else looks
+    solid: Style = {"linestyle": "-", "linewidth": 1.2}
+    looks = [look | solid for look in styles(numbered, numbered).values()]
+    if len(looks) > 1:
+        looks[-1] = FULL | {"zorder": 1.5, "linewidth": 3.5}
+    return looks
 
 
 def _film(
@@ -240,9 +246,9 @@ def _film(
     """Two views, and in each of them a line a run that moves, behind a car its path so far."""
     followed, moves = runs[-1], scene.draw is car
     times = followed["time"]
-    place, yaw = np.zeros((len(times), 1, 3)), 0.0 * times
+    position, yaw = np.zeros((len(times), 1, 3)), 0.0 * times
     if moves:
-        place, yaw = line((*(followed[name] for name in PLACE[:2]), 0.0)), followed["yaw"]
+        position, yaw = line((*(followed[name] for name in PLACE[:2]), 0.0)), followed["yaw"]
     figure, grid = panels(2, 1, (5.6, 4.4)) if moves else panels(1, 2, (5.6, 3.2))
     FigureCanvasAgg(figure)
     side, back = grid.ravel()
@@ -250,7 +256,7 @@ def _film(
     spaces = [scene.draw(h, *values) for h in runs]
     moving, paths = [], []
     for axis, title, columns in views:
-        relative = [turned(s - place, "Z", -yaw) for s in spaces] if axis is back else spaces
+        relative = [turned(s - position, "Z", -yaw) for s in spaces] if axis is back else spaces
         shown = [space[..., columns] for space in relative]
         for lines, look, name in zip(shown, looks, names, strict=True):
             moving.append((axis.plot(*lines[0].T, **look, label=name)[0], lines))
@@ -278,7 +284,7 @@ def _film(
             path.set_data(*driven[:, : frame + 1])
         figure.suptitle(f"t = {times[frame]:.1f} s")
         if moves:
-            (x, y, _) = place[frame, 0]
+            (x, y, _) = position[frame, 0]
             side.set(xlim=(x - ALONG, x + ALONG), ylim=(y - ACROSS, y + ACROSS))
 
     show(0)
@@ -298,33 +304,35 @@ def _histories(run: Any) -> list[tuple[str, dict[str, np.ndarray]]]:
     dataset = by_method(dataset, "reduced")
     known = [str(label) for label in dataset["label"].values]
     reduced = [label for label in known if not label.startswith("full_order")] or known[:1]
-    found = [(name, _quantities(dataset.sel(label=name), "outputs")) for name in reduced]
+    histories = [(name, _quantities(dataset.sel(label=name), "outputs")) for name in reduced]
     if "reference_outputs" in dataset and not reduced[0].startswith("full_order"):
-        found += [("full_order", _quantities(dataset.isel(label=0), "reference_outputs"))]
-    return found
+        full = _quantities(dataset.isel(label=0), "reference_outputs")
+        histories.append(("full_order", full))
+    return histories
 
 
 def _quantities(dataset: xr.Dataset, outputs: str) -> dict[str, np.ndarray]:
     """Histories (samples,) by name; of the full order in a dataset no coordinates are stored."""
-    found = {"time": dataset["time"].values}
+    quantities = {"time": dataset["time"].values}
     kinds = {"inputs": "input", "coordinates": "coordinate", outputs: "output"}
     for variable, kind in kinds.items():
         if variable in dataset and (kind != "coordinate" or outputs == "outputs"):
             columns = dataset[variable].transpose(kind, "time").values
-            found |= dict(zip(map(str, dataset[kind].values), columns, strict=True))
-    return found
+            quantities |= zip(map(str, dataset[kind].values), columns, strict=True)
+    return quantities
 
 
 def _scene(runs: Sequence[Values]) -> Scene:
     """What can be drawn of all runs; `InputError` names what is missing."""
-    lacks = {n: [q for q in s.needed if any(q not in r for r in runs)] for n, s in SCENES.items()}
-    fitting = [SCENES[name] for name, missing in lacks.items() if not missing]
-    if not fitting:
-        name, missing = min(
-            lacks.items(), key=lambda item: len(item[1]) / len(SCENES[item[0]].needed)
-        )
-        raise InputError(f"no film of these runs: to draw {name} it lacks {', '.join(missing)}")
-    return fitting[0]
+    common = set.intersection(*map(set, runs))
+    lacking: dict[str, list[str]] = {}
+    for name, scene in SCENES.items():
+        lacking[name] = [quantity for quantity in scene.needed if quantity not in common]
+        if not lacking[name]:
+            return scene
+    nearest = min(lacking, key=lambda name: len(lacking[name]) / len(SCENES[name].needed))
+    missing = ", ".join(lacking[nearest])
+    raise InputError(f"no film of these runs: to draw {nearest} it lacks {missing}")
 
 
 def _parameters(run: Any) -> dict[str, Any]:

@@ -5,20 +5,18 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import xarray as xr
 from matplotlib.figure import Figure
 
 from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
 from vehiclemor.exceptions import InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder
-from vehiclemor.registry import component, names, unknown
+from vehiclemor.registry import names, unknown
 from vehiclemor.report import default_studies
-from vehiclemor.report.figures import result_plot, runs, theme
-from vehiclemor.report.result_selection import KINDS, select_point
-from vehiclemor.resources import data_folder, data_names
-from vehiclemor.study.plans.loading import is_study, refuse_doubles, studies_and_files
-from vehiclemor.study.plans.study_file import GridFile, ProtocolFile, StudyFile
+from vehiclemor.report.figures import theme
+from vehiclemor.report.figures.result_plot import draw, pictures_of
+from vehiclemor.resources import data_names
+from vehiclemor.study.plans.loading import is_study, refuse_doubles
 from vehiclemor.study.run import run_studies
 
 # Figures that every model has, of all registered methods: study, what is drawn of it.
@@ -30,51 +28,27 @@ OF_A_MODEL: Mapping[str, tuple[Callable[[str, Path], str], str]] = {
 }
 
 
-class Entry(NamedTuple):
-    """One figure: its name, what is drawn, of which study (name or path), and of which result."""
+class Request(NamedTuple):
+    """Figures of a study or collection (name or path): all kinds, or one under another name."""
 
-    name: str
-    kind: str
     study: str
-    result: str
-
-    def draw(self, dataset: xr.Dataset) -> Figure:
-        """Draw a study at its nominal or first point, its errors over the whole grid."""
-        if self.kind not in KINDS:
-            return result_plot.PICTURES[self.kind].draw(dataset)
-        return result_plot.figure_of(select_point(dataset, self.kind, {})[0], self.kind)
+    kind: str = ""
+    name: str = ""
 
 
-def find(name: str, results: Path) -> list[Entry]:
-    """The figure of a name such as `histories-<model>`, or all figures of a study or collection.
+def find(name: str, results: Path) -> Request:
+    """What a name such as `histories-<model>`, or that of a study, asks for.
 
     Studies of a model that declares none are written to the results folder.
     """
     if is_study(name):
-        members = studies_and_files(name).items()
-        return [entry for member, found in members for entry in _of_a_study(member, *found)]
+        return Request(name)
     kind, _, model = name.partition("-")
     if kind not in OF_A_MODEL or model not in names("model"):
         known = [f"{kind}-{model}" for kind in OF_A_MODEL for model in names("model")]
         raise unknown("figure", name, [*known, *data_names("studies"), "FILE.toml"])
-    study, drawing = OF_A_MODEL[kind]
-    (entry,) = (entry for entry in find(study(model, results), results) if entry.kind == drawing)
-    return [entry._replace(name=name)]
-
-
-def _of_a_study(name: str, path: Path, study: StudyFile) -> list[Entry]:
-    """What a study lets be drawn: of a protocol the errors over the times."""
-    if isinstance(study, GridFile):
-        kinds = ["errors"]
-        if study.keep == "trajectories":
-            kinds.append("histories")
-            outputs = {output.name for output in component("model", study.model).outputs}
-            if outputs >= set(runs.PATH):
-                kinds.append("paths")
-    else:
-        kinds = ["pareto" if isinstance(study, ProtocolFile) else "size"]
-    of = path.stem if data_folder() in path.parents else str(path)
-    return [Entry(f"{name}-{kind}", kind, of, name) for kind in kinds]
+    study, picture = OF_A_MODEL[kind]
+    return Request(study(model, results), picture, name)
 
 
 def figures(
@@ -124,20 +98,22 @@ def figures(
     jobs = count("jobs", jobs, most=MOST_JOBS)
     wanted = only or ["paper"]
     refuse_doubles(name for name in wanted if is_study(name))
-    chosen = {entry.name: entry for name in wanted for entry in find(name, folder)}
+    requests = [find(name, folder) for name in wanted]
     make_folder(target)
-    data: dict[str, xr.Dataset] = {}
-    for entry in chosen.values():
-        if entry.result not in data:
-            (data[entry.result],) = run_studies(entry.study, folder, jobs).values()
+    drawings: dict[str, Callable[[], Figure]] = {}
+    for request in requests:
+        for study, dataset in run_studies(request.study, folder, jobs).items():
+            for kind in [request.kind] if request.kind else pictures_of(dataset):
+                name = request.name or f"{study}-{kind}"
+                drawings[name] = partial(draw, dataset, kind)
     written: list[Path] = []
     wrong: dict[str, str] = {}
-    for name, entry in chosen.items():
+    for name, drawing in drawings.items():
         stem = name if name.startswith("figure") else f"figure-{name}"
         files = [target / f"{stem}.{suffix}" for suffix in theme.FORMATS]
         with theme.styled(style, dpi):
-            draw = partial(_draw, entry, data[entry.result], files)
-            written += [file for found in attempt_apart(name, wrong, draw) for file in found]
+            save = partial(_save, drawing, files)
+            written += [file for group in attempt_apart(name, wrong, save) for file in group]
     if failed is not None:
         failed.update(wrong)
     elif wrong:
@@ -145,6 +121,6 @@ def figures(
     return written
 
 
-def _draw(entry: Entry, dataset: xr.Dataset, files: list[Path]) -> list[Path]:
-    figure = entry.draw(dataset)
+def _save(drawing: Callable[[], Figure], files: list[Path]) -> list[Path]:
+    figure = drawing()
     return [theme.save_figure(figure, path) for path in files]

@@ -26,7 +26,7 @@ GREYS: list[Style] = [
     for line, marker in (("-", "o"), ("--", "*"), (":", "X"))
     for color in ("#000000", "#777777", "#AAAAAA", "#444444")
 ]
-# Of meshes of one kind; and places of names beside marks, in points.
+# Of meshes of one kind; and offsets of names from their marks, in points.
 LOOKS: tuple[Style, ...] = (
     {"color": "#0072B2", "marker": "o"},
     {"color": "#D55E00", "marker": "s"},
@@ -47,11 +47,11 @@ def figure_pareto(dataset: xr.Dataset) -> Figure:
     rows["time"] = 1e6 * rows["seconds"]
     rows["bar"] = 0.5 * rows["spread"] * rows["time"]
     rows["tolerance"] = [json.loads(text).get("tolerance", 0.0) for text in rows["settings"]]
-    known = rows[np.isfinite(rows["score"]) & (rows["score"] > 0.0)]
-    top = 10.0 ** np.ceil(np.log10(max([1.0, *known["score"]])) + 0.5)
+    visible = rows[np.isfinite(rows["score"]) & (rows["score"] > 0.0)]
+    top = 10.0 ** np.ceil(np.log10(max([1.0, *visible["score"]])) + 0.5)
     figure, axes = theme.panels(1, 1, (6.7, 4.2))
     axis = axes[0, 0]
-    full = known[known["role"] == FULL_ORDER].sort_values("tolerance")
+    full = visible[visible["role"] == FULL_ORDER].sort_values("tolerance")
     for (name, line), look in zip(full.groupby("series", sort=False), cycle(GREYS)):
         bars: Style = {"xerr": line["bar"], "elinewidth": 0.8, "capsize": 1.5, **look}
         label = f"full order, {str(name).removeprefix('full order')}".removesuffix(", ")
@@ -74,7 +74,7 @@ def figure_pareto(dataset: xr.Dataset) -> Figure:
     axis.text(0.99, 1.08, "bounds", fontsize=7, ha="right", transform=axis.get_yaxis_transform())
     axis.set_yscale("log")
     axis.set_xscale("log")
-    axis.set_ylim(0.5 * min([1.0, *known["score"]]), top)
+    axis.set_ylim(0.5 * min([1.0, *visible["score"]]), top)
     axis.set_xlabel("mean CPU time of a whole call, all outputs delivered, in µs")
     axis.set_ylabel("worst error / bound, judged runs")
     theme.tick_decades(axis.xaxis, *axis.get_xlim())
@@ -86,7 +86,7 @@ def figure_pareto(dataset: xr.Dataset) -> Figure:
 
 
 def figure_size(dataset: xr.Dataset) -> Figure:
-    """CPU time of a whole run over the number of coordinates, and how many times reduction gains.
+    """CPU time of a run over the number of coordinates, and how many times reduction gains.
 
     The three models of the paper stand beside the truck.  Hollow marks: the reduced model, the
     first of the study.
@@ -99,23 +99,25 @@ def figure_size(dataset: xr.Dataset) -> Figure:
     reduced = dataset["seconds_median"].sel(label=name).values
     meshes = [kind for kind in dict.fromkeys(kinds.tolist()) if kind != "vehicle"]
     for kind, look in zip(meshes, LOOKS, strict=False):
-        own, word = kinds == kind, KINDS.get(kind, (kind, ""))[0]
+        of_kind, word = kinds == kind, KINDS.get(kind, (kind, ""))[0]
+        sizes, times, reduced_times = n[of_kind], full[of_kind], reduced[of_kind]
         exponent = growth(dataset, kind, FULL)
         slope = raised(f": n^{exponent:.1f}") if np.isfinite(exponent) else ""
-        left.plot(n[own], full[own], label=f"{word}, full{slope}", **look)
+        left.plot(sizes, times, label=f"{word}, full{slope}", **look)
         hollow: Style = look | {"markerfacecolor": "none", "linestyle": "--"}
-        left.plot(n[own], reduced[own], label=f"{word}, {name}", **hollow)
-        right.plot(n[own], full[own] / reduced[own], label=f"{word}, the same mesh", **look)
+        left.plot(sizes, reduced_times, label=f"{word}, {name}", **hollow)
+        right.plot(sizes, times / reduced_times, label=f"{word}, the same mesh", **look)
     cars = kinds == "vehicle"
     black: Style = {"color": "black", "linestyle": "none", "marker": "D", "markersize": 4}
     left.plot(n[cars], full[cars], label="the paper's models, full", **black)
     left.plot(n[cars], reduced[cars], markerfacecolor="none", label="reduced", **black)
     right.plot(n[cars], full[cars] / reduced[cars], label="the paper's models", **black)
-    for car, place in zip(dataset["mesh"].values[cars], np.flatnonzero(cars), strict=True):
-        at = n[place], full[place] / reduced[place]
-        text = VEHICLES.get(str(car), str(car))
+    for index in np.flatnonzero(cars):
+        car = str(dataset["mesh"].values[index])
+        at = n[index], full[index] / reduced[index]
+        text = VEHICLES.get(car, car)
         # So that neither marks nor the line of no gain cross a name.
-        beside = OFFSETS[sum(n[cars] < n[place]) % len(OFFSETS)]
+        beside = OFFSETS[sum(n[cars] < n[index]) % len(OFFSETS)]
         right.annotate(text, at, beside, textcoords="offset points", fontsize=7)
     rivals = [row for row in size_rows(dataset) if row["label"] == name]
     for group, marker in (("motion", "x"), ("strain", "+")):

@@ -6,7 +6,9 @@ has: curves over one, a map over two where more varies, clouds over samples.
 
 import itertools
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from math import ceil
+from typing import Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,7 +21,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.runs import legend_of
-from vehiclemor.report.figures.theme import Places, Style, places_of, tick_decades
+from vehiclemor.report.figures.theme import Style, Ticks, tick_decades, ticks_of
 from vehiclemor.report.findings import at_point
 from vehiclemor.report.frames import saturated_ranks
 from vehiclemor.report.published import rms_numbers
@@ -32,10 +34,10 @@ LINES, SAMPLED = 8, 3
 LETTERS = 38
 # Between marks of two lines above the axes, as a share of their height.
 SHIFT = 0.025
-# What a logarithmic axis can't show: its mark, its height as a share of the axes, its text.
-OFF: tuple[tuple[Style, float, str], ...] = (
-    (theme.CROSS, 1.0, "a run has failed"),
-    (theme.ZERO, 0.0, "error 0, off the log axis"),
+# What a logarithmic axis can't show: mark, height as a share of the axes, text, which errors.
+OFF: tuple[tuple[Style, float, str, Callable[[np.ndarray], np.ndarray]], ...] = (
+    (theme.CROSS, 1.0, "a run has failed", lambda errors: ~np.isfinite(errors)),
+    (theme.ZERO, 0.0, "error 0, off the log axis", lambda errors: errors == 0.0),
 )
 # Of samples that have no quantity.
 SORTED = "sorted by error"
@@ -48,60 +50,91 @@ LEAST, DARK = 2.0, 120 / 256
 Lines = Mapping[str, tuple[str, xr.DataArray]]
 
 
+class Picture(NamedTuple):
+    """How errors of a study are drawn: the kind, the dimensions on axes, and those left over."""
+
+    kind: Literal["curves", "cloud", "map"]
+    axes: Sequence[str]
+    rest: Sequence[str]
+
+
 def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
     """RMS errors of a study over all that it varies; of full order where there is nothing else."""
     if not {"rms_error", "signal_range"} <= set(dataset):
         raise InputError("no errors in this result: it was not compared with full order")
-    known = {str(label): labels.method_text(str(label)) for label in dataset["label"].values}
-    reduced = {m: text for m, text in known.items() if not m.startswith("full_order")}
-    if not _varied(dataset):
+    methods = {str(label): labels.method_text(str(label)) for label in dataset["label"].values}
+    reduced = {m: text for m, text in methods.items() if not m.startswith("full_order")}
+    varied = _varied(dataset)
+    if not varied:
         return _of_a_point(dataset, reduced)
-    methods = reduced or known
+    methods = reduced or methods
     saturated = saturated_ranks(dataset)
-    axis, *others = _varied(dataset)
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
-    lines = _lines(errors, methods, others, saturated)
-    if _is_sample(axis):
-        picture, shown = "cloud", [axis]
-    elif set(FACTORS) <= {axis, *others}:
-        picture, shown = "map", list(FACTORS)
-    elif len(lines) > max(LINES, len(methods)):
-        picture, shown = "map", [axis, others[0]]
-    else:
-        picture, shown = "curves", [axis]
-    notes = [f"{dataset.sizes[axis]} samples"] if picture == "cloud" else []
-    rest = [name for name in others if name not in shown]
-    if picture != "curves":
-        errors = errors.max(rest)
+    lines = _lines(errors, methods, varied[1:], saturated)
+    picture = choose_picture(varied, len(lines), len(methods))
+    if picture.kind != "curves":
+        errors = errors.max(picture.rest)
         lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
-        notes += [f"the largest error over {_listed(rest)}"] if rest else []
-    if picture == "map":
-        notes += ["a cross where a run has failed"] if bool(np.isinf(errors).any()) else []
-        figure = _map(dataset, errors, methods, outputs, shown)
-    else:
-        places = _sampled(dataset, axis) if picture == "cloud" else [places_of(dataset, axis)]
-        figure = _panels(dataset, axis, places, outputs, lines)
-    reached = [f"{methods[label]} saturates at {rank}" for label, rank in saturated.items()]
-    for panel in figure.axes if reached else ():
-        for ranks in (panel.xaxis, panel.yaxis):
-            if ranks.get_label_text() == "rank":
-                ranks.set_label_text(textwrap.fill(f"rank; {', '.join(reached)}", LETTERS))
-    # A line above the panels, how many runs were trained on, and the legend.
-    held = labels.trained_runs(dataset).sel(label=list(methods))
-    count = int(held.sum())
-    trained = f"{count} of {held.size} runs were in their own training" if count else ""
-    if text := "\n".join(filter(None, (", ".join(notes), trained))):
-        figure.suptitle(text, fontsize="medium")
+    axis = varied[0]
+    match picture.kind:
+        case "map":
+            figure = _map(dataset, errors, methods, outputs, picture.axes)
+        case "cloud":
+            figure = _panels(dataset, axis, _sampled(dataset, axis), outputs, lines)
+        case "curves":
+            figure = _panels(dataset, axis, [ticks_of(dataset, axis)], outputs, lines)
+    _mark_saturation(figure, [f"{methods[m]} saturates at {r}" for m, r in saturated.items()])
+    if notes := _notes(dataset, picture, errors, methods):
+        figure.suptitle(notes, fontsize="medium")
     theme.legend_below(figure, figure.axes)
     return figure
 
 
+def choose_picture(varied: Sequence[str], lines: int, methods: int) -> Picture:
+    """Clouds over samples, a map over both factors or of many lines, else curves."""
+    axis, *others = varied
+    kind, axes = "curves", [axis]
+    if _is_sample(axis):
+        kind = "cloud"
+    elif set(FACTORS) <= set(varied):
+        kind, axes = "map", list(FACTORS)
+    elif lines > max(LINES, methods):
+        kind, axes = "map", [axis, others[0]]
+    return Picture(kind, axes, [name for name in others if name not in axes])
+
+
+def _notes(
+    dataset: xr.Dataset, picture: Picture, errors: xr.DataArray, methods: Mapping[str, str]
+) -> str:
+    """Lines above the panels: what is drawn, and how many runs were trained on."""
+    notes: list[str] = []
+    if picture.kind == "cloud":
+        notes.append(f"{dataset.sizes[picture.axes[0]]} samples")
+    if picture.kind != "curves" and picture.rest:
+        notes.append(f"the largest error over {_listed(picture.rest)}")
+    if picture.kind == "map" and bool(np.isinf(errors).any()):
+        notes.append("a cross where a run has failed")
+    lines = [", ".join(notes)]
+    trained = labels.trained_runs(dataset).sel(label=list(methods))
+    if count := int(trained.sum()):
+        lines.append(f"{count} of {trained.size} runs were in their own training")
+    return "\n".join(filter(None, lines))
+
+
+def _mark_saturation(figure: Figure, texts: Sequence[str]) -> None:
+    """Say beside axes of ranks which methods reach their largest rank."""
+    for panel in figure.axes if texts else ():
+        for axis in (panel.xaxis, panel.yaxis):
+            if axis.get_label_text() == "rank":
+                axis.set_label_text(textwrap.fill(f"rank; {', '.join(texts)}", LETTERS))
+
+
 def _panels(
-    dataset: xr.Dataset, axis: str, places: Sequence[Places], outputs: Sequence[str], lines: Lines
+    dataset: xr.Dataset, axis: str, ticks: Sequence[Ticks], outputs: Sequence[str], lines: Lines
 ) -> Figure:
-    """A panel for each output, or a row of them where there are several places."""
-    cells = list(itertools.product(outputs, places))
-    columns = len(places) if len(places) > 1 else len(outputs)
+    """A panel for each output, or a row of them where there are several axes."""
+    cells = list(itertools.product(outputs, ticks))
+    columns = len(ticks) if len(ticks) > 1 else len(outputs)
     rows = len(cells) // columns
     size = (6.7 if columns < 3 else 8.5, 2.5 * rows + 0.8)
     figure, grid = theme.panels(rows, columns, size)
@@ -116,7 +149,7 @@ def _panels(
 
 
 def _is_sample(dimension: str) -> bool:
-    """Whether places of a dimension have no order."""
+    """Whether values of a dimension have no order."""
     return dimension == "sample" or dimension.endswith("_seed")
 
 
@@ -145,41 +178,45 @@ def _lines(
     saturated: Mapping[str, int],
 ) -> Lines:
     """A line for each combination of what a method's errors depend on."""
-    found: dict[str, tuple[str, xr.DataArray]] = {}
+    lines: dict[str, tuple[str, xr.DataArray]] = {}
     for label, text in methods.items():
         line = errors.sel(label=label)
-        own = [d for d in others if not bool((line == line.isel({d: 0})).all())]
-        line = line.isel({d: 0 for d in others if d not in own}, drop=True)
-        for place in itertools.product(*(line[d].values.tolist() for d in own)):
-            parts = []
-            for name, value in zip(own, place, strict=True):
+        followed = [d for d in others if not bool((line == line.isel({d: 0})).all())]
+        line = line.isel({d: 0 for d in others if d not in followed}, drop=True)
+        for values in itertools.product(*(line[d].values.tolist() for d in followed)):
+            point = dict(zip(followed, values, strict=True))
+            parts: list[str] = []
+            for name, value in point.items():
                 unit = str(errors[name].attrs.get("units", "")).removesuffix("1")
                 shown = value if isinstance(value, str) else f"{value:g}"
                 if name == "rank" and float(value) > saturated.get(label, np.inf):
                     shown += f" (saturates at {saturated[label]})"
                 parts.append(f"{_listed([name])} {shown} {unit}".rstrip())
-            chosen = line.sel(dict(zip(own, place, strict=True)))
-            found[", ".join([label, *parts])] = ", ".join([text, *parts]), chosen
-    return found
+            lines[", ".join([label, *parts])] = ", ".join([text, *parts]), line.sel(point)
+    return lines
 
 
-def _sampled(dataset: xr.Dataset, sample: str) -> list[Places]:
+def _sampled(dataset: xr.Dataset, sample: str) -> list[Ticks]:
     """Sampled quantities, those first that the errors follow most (rank correlation)."""
-    every = {n: v for n, v in dataset.coords.items() if v.dims == (sample,) and n != sample}
-    names = [str(n) for n, v in every.items() if v.dtype.kind == "f" and np.ptp(v.values) > 0.0]
+    names: list[str] = []
+    for name, values in dataset.coords.items():
+        is_number = name != sample and values.dims == (sample,) and values.dtype.kind == "f"
+        if is_number and np.ptp(values.values) > 0.0:
+            names.append(str(name))
     errors = dataset["rms_error"]
     ranks = pd.Series(errors.mean([d for d in errors.dims if d != sample])).rank()
 
     def follows(name: str) -> float:
         return abs(ranks.corr(pd.Series(dataset[name].values).rank()))
 
-    names = sorted(names, key=follows, reverse=True)[:SAMPLED]
-    found = [places_of(dataset, name) for name in names]
-    return found or [Places(np.arange(len(ranks)), f"{_listed([sample])}, {SORTED}")]
+    if names:
+        names = sorted(names, key=follows, reverse=True)[:SAMPLED]
+        return [ticks_of(dataset, name) for name in names]
+    return [Ticks(np.arange(len(ranks)), f"{_listed([sample])}, {SORTED}")]
 
 
 def _draw_panel(
-    axis: Axes, dataset: xr.Dataset, output: str, dimension: str, places: Places, lines: Lines
+    axis: Axes, dataset: xr.Dataset, output: str, dimension: str, ticks: Ticks, lines: Lines
 ) -> None:
     """Lines of one output; over perturbations the published error."""
     cloud = _is_sample(dimension)
@@ -189,32 +226,39 @@ def _draw_panel(
         values = errors.sel(output=output).values.ravel()
         look: Style = {**looks[name], "marker": marks[name], "markersize": 3.5}
         # Names and samples have no order that a line could follow.
-        look |= {"linestyle": "none"} if places.names or cloud else {}
+        if ticks.names or cloud:
+            look["linestyle"] = "none"
         if cloud:
-            look |= {"alpha": 0.6, "markeredgewidth": 0.0, "rasterized": len(places.at) > 1000}
-        if places.label.endswith(SORTED):
+            look |= {"alpha": 0.6, "markeredgewidth": 0.0, "rasterized": len(ticks.at) > 1000}
+        if ticks.label.endswith(SORTED):
             values = np.sort(values)
-        known = np.isfinite(values) & (values > 0.0)
-        axis.plot(places.at, np.where(known, values, np.nan), label=text, **look)
-        for (mark, height, _), found in zip(
-            OFF, (~np.isfinite(values), values == 0.0), strict=True
-        ):
-            # Above those of other lines.
-            others = sum(line.get_marker() == mark["marker"] for line in axis.lines)
-            heights = np.full(np.sum(found), height + SHIFT * others)
-            edge: Style = {"transform": axis.get_xaxis_transform(), "clip_on": False, **mark}
-            if found.any():
-                axis.plot(np.compress(found, places.at), heights, color=look["color"], **edge)
+        visible = np.isfinite(values) & (values > 0.0)
+        axis.plot(ticks.at, np.where(visible, values, np.nan), label=text, **look)
+        for mark, height, _, is_off in OFF:
+            off = np.compress(is_off(values), ticks.at)
+            _draw_off(axis, off, mark, height, look["color"])
     published = rms_numbers(str(dataset.attrs["model"])).get(output)
     if published and dimension in FACTORS:
         axis.axhline(published.value, label="published, nominal", **theme.THIN)
     axis.set_yscale("log")
     tick_decades(axis.yaxis, *axis.get_ylim())
     # Last in the legend what the axis can't show.
-    for mark, _, text in OFF:
-        if any(line.get_marker() == mark["marker"] for line in axis.lines):
+    for mark, _, text, _ in OFF:
+        if _count_marked(axis, mark):
             axis.plot([], [], color="black", label=text, **mark)
     axis.set_ylabel(labels.error_label(dataset, "RMS error", output))
+
+
+def _draw_off(axis: Axes, at: np.ndarray, mark: Style, height: float, color: str) -> None:
+    """Marks at the edge of the axes, above those of other lines."""
+    if len(at):
+        heights = np.full(len(at), height + SHIFT * _count_marked(axis, mark))
+        transform = axis.get_xaxis_transform()
+        axis.plot(at, heights, color=color, transform=transform, clip_on=False, **mark)
+
+
+def _count_marked(axis: Axes, mark: Style) -> int:
+    return sum(line.get_marker() == mark["marker"] for line in axis.lines)
 
 
 def _map(
@@ -231,25 +275,26 @@ def _map(
     """
     errors = errors.squeeze([d for d in errors.dims if d not in ("output", "label", *axes)])
     errors = errors.transpose("output", "label", *reversed(axes))
-    each = -(-len(methods) // COLUMNS)
-    columns = -(-len(methods) // each)
+    each = ceil(len(methods) / COLUMNS)
+    columns = ceil(len(methods) / each)
     size = 3.35 * columns, 2.8 * each * len(outputs) + 0.3
     figure, grid = theme.panels(each * len(outputs), columns, size, sharex=True, sharey=True)
-    across, up = (places_of(dataset, name).even() for name in axes)
+    across, up = (ticks_of(dataset, name).even() for name in axes)
     written = across.at.size * up.at.size <= WRITTEN
     for row, output in enumerate(outputs):
         block = grid[row * each : (row + 1) * each]
-        found = errors.sel(output=output, label=list(methods)).values
+        values = errors.sel(output=output, label=list(methods)).values
+        colored = values[np.isfinite(values) & (values > 0.0)]
         # A map on which nothing differs from zero, or nothing has come to its end, is still one.
-        colored = found[np.isfinite(found) & (found > 0.0)]
-        colored = colored if colored.size else np.array([1.0, 10.0])
+        if not colored.size:
+            colored = np.array([1.0, 10.0])
         factor, unit = 1.0, labels.unit_of(dataset, output)
         if written:
             factor, unit = labels.readable_unit(float(np.median(colored)), unit)
         low, high = factor * np.percentile(colored, (LEAST, 100.0), method="higher")
         norm = LogNorm(low, high, clip=True)
         for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):
-            _draw_cells(axis, across.at, up.at, factor * found[number], norm, written=written)
+            _draw_cells(axis, across.at, up.at, factor * values[number], norm, written=written)
             axis.set_title(theme.letter(row * len(methods) + number, text))
         label = labels.error_label(dataset, "RMS error", output, unit)
         extend = "min" if factor * colored.min() < low else None
@@ -299,18 +344,18 @@ def _of_a_point(dataset: xr.Dataset, methods: Mapping[str, str]) -> Figure:
         raise InputError("full order alone: no errors to draw")
     names = [str(output) for output in dataset["output"].values]
     figure, grid = theme.panels(1, 1, (6.7, 1.6 + 0.19 * len(names)))
-    axis, places = grid[0, 0], np.arange(len(names))
-    texts, known = legend_of(dataset, methods), theme.methods_of(dataset)
-    looks, marks = theme.styles(methods, known), theme.marks(methods, known)
-    for label, text in texts.items():
+    axis, heights = grid[0, 0], np.arange(len(names))
+    drawn = theme.methods_of(dataset)
+    looks, marks = theme.styles(methods, drawn), theme.marks(methods, drawn)
+    for label, text in legend_of(dataset, methods).items():
         run = at_point(dataset, label)
         share = 100.0 * (run["rms_error"] / run["signal_range"])
         share = share.where(np.isfinite(share) & (share > 0.0))
         look: Style = {"color": looks[label]["color"], "marker": marks[label], "markersize": 5}
         exact = " (error 0)" if bool((run["rms_error"] == 0.0).all()) else ""
-        axis.semilogx(share, places, label=text + exact, linestyle="none", **look)
+        axis.semilogx(share, heights, label=text + exact, linestyle="none", **look)
     tick_decades(axis.xaxis, *axis.get_xlim())
-    axis.set_yticks(places, map(labels.full_label, names), fontsize=7)
+    axis.set_yticks(heights, map(labels.full_label, names), fontsize=7)
     axis.set_ylim(len(names) - 0.5, -0.5)
     axis.set_xlabel("RMS error (% of the output's range)")
     theme.legend_below(figure, [axis])

@@ -16,6 +16,7 @@ from vehiclemor.report.figures.errors import figure_errors
 from vehiclemor.report.figures.runs import PATH, figure_histories, figure_paths
 from vehiclemor.report.figures.theme import save_figure, styled, tell_empty
 from vehiclemor.report.labels import main_outputs, tabled_outputs
+from vehiclemor.report.result_selection import KINDS, result_kind, select_point
 
 # At most so many outputs have panels.
 PANELS = 3
@@ -45,14 +46,25 @@ PICTURES = {
 
 def pictures_of(dataset: xr.Dataset) -> list[str]:
     """Kinds of pictures that the result of a study has the data for."""
-    if "mesh" in dataset.dims:
-        return ["size"]
-    if "scenario_set" in dataset.coords:
-        return ["pareto"]
-    if not dataset.sizes.get("time"):
-        return ["errors"]
-    path = ["paths"] if set(PATH) <= set(dataset["output"].values) else []
-    return ["histories", *path, "errors"]
+    match result_kind(dataset):
+        case "size study":
+            return ["size"]
+        case "protocol":
+            return ["pareto"]
+    kinds = ["errors"]
+    if dataset.sizes.get("time"):
+        kinds.append("histories")
+        if set(PATH) <= set(dataset["output"].values):
+            kinds.append("paths")
+    return kinds
+
+
+def draw(dataset: xr.Dataset, kind: str) -> Figure:
+    """A picture of a study: at its nominal or first point, or of the study as it is."""
+    if kind in KINDS:
+        point, _ = select_point(dataset, kind, {})
+        return figure_of(point, kind)
+    return PICTURES[kind].draw(dataset)
 
 
 def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "histories") -> Figure:
@@ -71,10 +83,12 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
 
 def figure_of(dataset: xr.Dataset, kind: str) -> Figure:
     """The picture that `plot_result` draws, in the style that holds."""
-    if "scenario_set" in dataset.coords:
-        raise InputError("a protocol has no grid to draw over; vehiclemor figures --only draws it")
-    if not dataset.sizes.get("output"):
-        raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
+    match result_kind(dataset):
+        case "protocol":
+            text = "a protocol has no grid to draw over; vehiclemor figures --only draws it"
+            raise InputError(text)
+        case "size study" | "other":
+            raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     dataset = by_method(dataset)
     figure = PICTURES[kind].draw(dataset)
     lines = filter(None, (_title(dataset), figure.get_suptitle()))

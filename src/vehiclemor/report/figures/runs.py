@@ -2,7 +2,7 @@
 
 import itertools
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -101,7 +101,7 @@ def figure_histories(
     """
     texts = legend_of(dataset)
     runs = runs_of(dataset, texts)
-    rows = [draw_history]
+    rows: list[Callable[[Axes, Runs, str], object]] = [draw_history]
     if runs.compared:
         rows.append(draw_largest_errors if len(texts) > 1 else draw_errors)
     heights = [HISTORY, ERROR][: len(rows)]
@@ -150,8 +150,8 @@ def draw_history(axis: Axes, runs: Runs, output: str) -> str:
     histories = [curve.run["outputs"].sel(output=output) for curve in runs.curves]
     low, high = float(full.min()), float(full.max())
     span = high - low
-    kept = [curve.run["status"].item() in FINISHED for curve in runs.curves]
-    ended = [full, *itertools.compress(histories, kept)]
+    finished = [curve.run["status"].item() in FINISHED for curve in runs.curves]
+    ended = [full, *itertools.compress(histories, finished)]
     largest = max(0.0, *(float(abs(history).max()) for history in ended))
     # Where the full order is not known, or stands still, all is seen.
     moves = span > STILL * largest
@@ -192,8 +192,8 @@ def _plot_until_it_leaves(
 
 
 def _errors(runs: Runs, output: str) -> list[xr.DataArray]:
-    found = [curve.run["outputs"] - curve.run["reference_outputs"] for curve in runs.curves]
-    return [error.sel(output=output) for error in found]
+    points = [curve.run.sel(output=output) for curve in runs.curves]
+    return [point["outputs"] - point["reference_outputs"] for point in points]
 
 
 def draw_errors(axis: Axes, runs: Runs, output: str) -> None:
@@ -290,7 +290,7 @@ def draw_paths(axis: Axes, runs: Runs) -> None:
 
 
 def draw_distances(axis: Axes, curves: Sequence[Curve]) -> None:
-    """Distance between the places of a reduced and the full vehicle at the same time, over X."""
+    """Distance between the positions of a reduced and the full vehicle at the same time, over X."""
     for curve in curves:
         x, y = positions(curve.run["reference_outputs"])
         ahead, aside = positions(curve.run["outputs"])

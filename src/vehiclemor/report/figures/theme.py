@@ -118,8 +118,8 @@ def letter(number: int, title: str = "") -> str:
     return f"({name}) {title}".rstrip()
 
 
-class Places(NamedTuple):
-    """Places of the values of a dimension, with the label of its axis.
+class Ticks(NamedTuple):
+    """Coordinates of a dimension's values on an axis, and the label of the axis.
 
     They are perturbations in %, numbers, or 0, 1, 2 ... of what has `names`.
     """
@@ -133,7 +133,7 @@ class Places(NamedTuple):
         axis.set_label_text(self.label)
         if self.names:
             room = max(1, LETTERS // max(map(len, self.names)))
-            step = -(-len(self.names) // min(12, room))
+            step = ceil(len(self.names) / min(12, room))
             axis.set_ticks(self.at[::step], list(self.names)[::step])
         elif self.at.dtype.kind == "i":
             axis.set_major_locator(MaxNLocator(nbins=8, integer=True))
@@ -146,24 +146,24 @@ class Places(NamedTuple):
             panel.set_xscale("log")
         self.tick(panel.xaxis)
 
-    def even(self) -> "Places":
+    def even(self) -> "Ticks":
         """Cells of one size: numbers at unequal distances become names."""
         steps = np.diff(self.at)
         if self.names or np.allclose(steps, steps.mean(), rtol=1e-6):
             return self
         names = [f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for value in self.at]
-        return Places(np.arange(len(names)), self.label, names)
+        return Ticks(np.arange(len(names)), self.label, names)
 
 
-def places_of(dataset: xr.Dataset, name: str) -> Places:
-    """Places of a dimension of a grid, or of a coordinate on one."""
+def ticks_of(dataset: xr.Dataset, name: str) -> Ticks:
+    """Ticks of a dimension of a grid, or of a coordinate on one."""
     values, text = dataset[name].values, name.removeprefix(PARAMETER).replace("_", " ")
     if name in FACTORS:
-        return Places(100.0 * (values - 1.0), f"{text.removesuffix(' factor')} perturbation (%)")
+        return Ticks(100.0 * (values - 1.0), f"{text.removesuffix(' factor')} perturbation (%)")
     if not np.issubdtype(values.dtype, np.number):
-        return Places(np.arange(len(values)), text, [str(value) for value in values])
+        return Ticks(np.arange(len(values)), text, [str(value) for value in values])
     unit = str(dataset[name].attrs.get("units", UNITS.get(name, "1")))
-    return Places(values, text if unit == "1" else f"{text} ({raised(unit)})")
+    return Ticks(values, text if unit == "1" else f"{text} ({raised(unit)})")
 
 
 def tick_decades(axis: Axis, low: float, high: float) -> None:
@@ -207,9 +207,12 @@ def tell_empty(figure: Figure) -> None:
     """Say in panels of lines that there is nothing that could be drawn."""
     for axis in figure.axes:
         lines = [line for line in axis.lines if line.get_transform() == axis.transData]
-        points = [found for line in lines if np.size(found := line.get_xydata())]
-        if points and not any(np.isfinite(found).all(axis=1).any() for found in points):
-            text = f"no finite values{' above 0' if axis.get_yscale() == 'log' else ''}"
+        points = [np.asarray(line.get_xydata()) for line in lines]
+        points = [each for each in points if each.size]
+        if points and not np.isfinite(np.concatenate(points)).all(axis=1).any():
+            text = "no finite values"
+            if axis.get_yscale() == "log":
+                text += " above 0"
             axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes)
 
 
@@ -237,7 +240,7 @@ def picture_path(path: Path) -> Path:
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
-    """Write a figure whole; its format is the file's suffix."""
+    """Write a complete figure; its format is the file's suffix."""
     suffix = picture_path(path).suffix.removeprefix(".").lower()
     metadata = METADATA[suffix]
     write_whole(path, lambda part: figure.savefig(part, format=suffix, metadata=metadata))

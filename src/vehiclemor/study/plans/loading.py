@@ -145,7 +145,7 @@ def content_hash(definition: FileSchema) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-def write_study(definition: StudyFile, path: Path) -> Path:
+def write_study(definition: FileSchema, path: Path) -> Path:
     """Write what a study says beyond the defaults as a TOML file."""
     content = definition.model_dump(exclude_defaults=True).items()
     # Entries of the longest lists stand on separate lines.

@@ -88,8 +88,9 @@ def _measured(name: str, study: SizeFile, folder: Path) -> xr.Dataset:
     meshes: list[Any] = [build(study.model, overrides=mesh) for mesh in size.meshes]
     with one_thread():
         references = [_reference(mesh, maneuver, size.step, folder) for mesh in meshes]
-        models = [_full(index, mesh, maneuver, size) for index, mesh in enumerate(meshes)]
+        models: list[SizedModel] = []
         for index, mesh in enumerate(meshes):
+            models.append(_full(index, mesh, maneuver, size))
             for label, entry in enumerate(study.methods, start=1):
                 if reduced := _fit(study, entry, mesh):
                     models.append(_reduced(index, label, reduced, maneuver))
@@ -98,44 +99,42 @@ def _measured(name: str, study: SizeFile, folder: Path) -> xr.Dataset:
             coordinates = len(full.model.coordinates)
             models.append(SizedModel(index, 0, full.simulate, steering, coordinates))
             models.append(_reduced(index, 1, reduced, steering))
-        models.sort(key=lambda model: (model.mesh, model.label))
         seconds = _timed(name, models)
-    coordinates = {
+    kinds = [next(iter(mesh)) for mesh in size.meshes] + ["vehicle"] * len(vehicles)
+    labels = {
         "mesh": [*map(_mesh_text, size.meshes), *size.beside],
         "label": [FULL, *study.labelled],
         "group": list(GROUPS),
         # What is refined first: meshes of one kind make one line.
-        "kind": (
-            "mesh",
-            [*(next(iter(mesh)) for mesh in size.meshes), *("vehicle",) * len(vehicles)],
-        ),
+        "kind": ("mesh", kinds),
     }
-    shape = len(coordinates["mesh"]), len(coordinates["label"])
-    table = {name: np.full(shape, np.nan) for name in COLUMNS}
+    shape = len(kinds), len(study.methods) + 1
+    columns = _costs(models, seconds, shape)
     errors = np.full((*shape, len(GROUPS)), np.nan)
     truth = references[-1]["outputs"]
-    quantiles = np.quantile(seconds, (0.5, 0.25, 0.75), axis=0)
-    for model, quartiles in zip(models, quantiles.T, strict=True):
-        row = model.order, model.offline_seconds, *quartiles
-        for column, value in zip(table.values(), row, strict=True):
-            column[model.mesh, model.label] = value
+    for model in models:
         if model.mesh < len(meshes):
             run = model.simulate(maneuver) if model.label else references[model.mesh]
             errors[model.mesh, model.label] = _errors(run, truth)
-    columns = variables({"coordinates_of_mesh": table["effective_rank"][:, 0].astype(int)}, "mesh")
-    columns |= variables(table, "mesh", "label")
     columns |= variables({"relative_error": errors}, "mesh", "label", "group")
-    return xr.Dataset(
-        columns,
-        coordinates,
-        attributes(
-            study.title,
-            meshes[0].kernel_hash,
-            study=name,
-            model=study.model,
-            configuration=study.model_dump_json(exclude_defaults=True),
-        ),
-    )
+    text = study.model_dump_json(exclude_defaults=True)
+    about = {"study": name, "model": study.model, "configuration": text}
+    return xr.Dataset(columns, labels, attributes(study.title, meshes[0].kernel_hash, **about))
+
+
+def _costs(
+    models: Sequence[SizedModel], seconds: np.ndarray, shape: tuple[int, int]
+) -> dict[str, tuple]:
+    """Orders and times on the dimensions `mesh` and `label`, of seconds (rounds, models)."""
+    table = {name: np.full(shape, np.nan) for name in COLUMNS}
+    quantiles = np.quantile(seconds, (0.5, 0.25, 0.75), axis=0)
+    for model, quartiles in zip(models, quantiles.T, strict=True):
+        row = model.order, model.offline_seconds, *quartiles
+        for name, value in zip(COLUMNS, row, strict=True):
+            table[name][model.mesh, model.label] = value
+    coordinates = table["effective_rank"][:, 0].astype(int)
+    columns = variables({"coordinates_of_mesh": coordinates}, "mesh")
+    return columns | variables(table, "mesh", "label")
 
 
 def _mesh_text(mesh: Mapping[str, float]) -> str:

@@ -26,7 +26,7 @@ from vehiclemor.study.plans.study_runs import (
 )
 from vehiclemor.toml_files import FileSchema, Line
 
-# Of the test sets of every study that gives none.
+# Of the test sets of every study without a seed.
 SEED, MOST_SEED = 20261122, 2**63 - 1
 # Sets of scenarios that a protocol lists, and those that it samples.
 SETS = ("training", "validation", "test", "outside")
@@ -346,10 +346,3 @@ def _hint(key: str, schema: type[StudyFile | CollectionFile]) -> str:
         kinds = " or ".join(other.kind for other in others)
         return f"it belongs to {kinds}"
     return did_you_mean(key, schema.model_fields) or f"known: {', '.join(schema.model_fields)}"
-
-
-def study_from(content: Mapping[str, Any]) -> StudyFile:
-    """A study with this content, validated."""
-    schema = schema_of(content)
-    assert schema is not CollectionFile
-    return schema.model_validate(content)  # type: ignore[return-value]

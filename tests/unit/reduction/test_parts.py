@@ -1,0 +1,46 @@
+"""Parts of saved models by declared types: what a file can't make, and what can't be written."""
+
+from typing import Any, NamedTuple
+
+import pytest
+
+from vehiclemor.exceptions import InputError
+from vehiclemor.reduction import parts
+from vehiclemor.reduction.parts import Parts
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.model import Model
+
+
+@pytest.fixture(scope="module")
+def model():
+    return build("independent_suspension_vehicle")
+
+
+@pytest.mark.parametrize("declared", [DynamicModel, Model, DynamicModel | None, Any])
+@pytest.mark.parametrize("part", [{}, {"definition": {}, "system": {}, "equations": {}}])
+def test_models_are_referred_to_and_never_built_from_a_file(model, part, declared):
+    reader = Parts(model)
+    assert reader.read({"@full": "model"}, "model", declared) is model
+    with pytest.raises(ValueError, match="model"):
+        reader.read(part, "model", declared)
+
+
+def test_another_model_is_not_written(model):
+    other = build("independent_suspension_vehicle", overrides={"sprung_mass": 1400.0})
+    with pytest.raises(InputError, match="it can't be saved: model is"):
+        Parts(model).write(other, "model", DynamicModel)
+
+
+class Couple(NamedTuple):
+    """A part of a plug-in that holds more than it declares."""
+
+    items: tuple[float, float]
+
+
+def test_more_items_than_declared_are_not_written(model, monkeypatch):
+    monkeypatch.setattr(parts, "_plug_ins", lambda: {__name__.partition(".")[0]})
+    writer: Any = Parts(model)
+    assert writer.write(Couple((1.0, 2.0)), "couple")["items"] == [1.0, 2.0]
+    with pytest.raises(InputError, match=r"it can't be saved: couple\.items is"):
+        writer.write(Couple((1.0, 2.0, 3.0)), "couple")  # type: ignore[arg-type]
