@@ -24,8 +24,7 @@ def interpolants(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Piec
     """Polynomials of each run through samples (runs, n, inputs) by one of `HOLDS`.
 
     One piece for each interval; segments end at kinks, at jumps, and at the ends of rests.
-    `InputError` if times (n,)
-    don't increase, or a number isn't finite.
+    `InputError` if times (n,) don't increase, or a number isn't finite.
     """
     _check(times, samples)
     runs = []
