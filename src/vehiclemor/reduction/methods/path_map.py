@@ -132,14 +132,19 @@ class PathMapModel(ReducedMechanism):
         return map_kernel(self.moving, self.degree, self.columns)
 
     @cached_property
+    def _polynomials(self) -> np.ndarray:
+        """Address of the compiled kernel."""
+        return np.array([address_of(Kernels([self._kernel]), self._kernel.name)])
+
+    @cached_property
     def _pool(self) -> Pool[Prepared]:
         return Pool()
 
     def _packed(self, given: Ready, size: int) -> Prepared:
         """The loop for some inputs, to be given space of that size."""
-        polynomials = np.array([address_of(Kernels([self._kernel]), self._kernel.name)])
         loop = kinematic_loop("map_path", "reduction.map_loops")
-        call = loop.prepared(given, self.cells, polynomials, len(self.columns), np.empty(0))
+        columns = len(self.columns)
+        call = loop.prepared(given, self.cells, self._polynomials, columns, np.empty(0))
         call.words[call.address("space") + 1] = size
         return call
 
