@@ -108,7 +108,10 @@ def altered(alter):
         def simulate(*arguments):
             return alter(reduced.simulate(*arguments), next(runs))
 
-        return SimpleNamespace(simulate=simulate, order=0, offline=reduced.offline)
+        best = reduced.best_approximation
+        return SimpleNamespace(
+            simulate=simulate, best_approximation=best, order=0, offline=reduced.offline
+        )
 
     return replace(method, fit=fit)
 

@@ -15,17 +15,26 @@ KINK, FINE = 1e-3, 0.01
 REST = 0.1
 # Largest swing of a spline within a rest, relative to the largest value.
 SWING = 1e-6
+# Runs that are computed together: their arrays fit into the cache of a processor.
+TOGETHER = 1000
 INFINITE = "samples of a signal: the polynomials through them are not finite"
 
 
 def interpolants(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
     """Polynomials of each run through samples (runs, n, inputs) by one of `HOLDS`.
 
-    One piece for each interval; segments end at kinks, at jumps, and at the ends of rests.  Runs
-    with the same segments share all arrays but their coefficients.  `InputError` if times (n,)
-    don't increase, or a number isn't finite.
+    One piece for each interval; segments end at kinks, at jumps, and at the ends of rests.
+    `InputError` if times (n,) don't increase, or a number isn't finite.
     """
     _check(times, samples)
+    runs = []
+    for first in range(0, len(samples), TOGETHER):
+        runs += _interpolants(times, samples[first : first + TOGETHER], hold)
+    return runs
+
+
+def _interpolants(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
+    """The same; runs with the same segments share all arrays but their coefficients."""
     lengths = np.diff(times)
     with np.errstate(over="ignore", invalid="ignore"):
         rises = np.diff(samples, axis=1)

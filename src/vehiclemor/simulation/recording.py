@@ -118,12 +118,8 @@ class Recording:
         inputs: np.ndarray,
         point_of_sample: np.ndarray,
     ) -> None:
-        self._recorder, self.states, self.inputs, self.point_of_sample = (
-            recorder,
-            states,
-            inputs,
-            point_of_sample,
-        )
+        self._recorder, self.states, self.inputs = recorder, states, inputs
+        self.point_of_sample = point_of_sample
         # The first sample without numbers.
         self.end = len(point_of_sample) or len(states)
 

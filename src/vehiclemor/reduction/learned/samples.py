@@ -21,8 +21,10 @@ from vehiclemor.simulation.model import Model
 
 # Most samples of a fit, equidistant.
 MOST_SAMPLES = 30_000
-# Components below this part of the first one are rounding, and a first one below it, in SI units.
+# Components below this part of the first one are rounding.
 ROUNDING = 1e-9
+# A first component below it, in SI units, is the error of full-order runs: nothing moves.
+RESTING = 1e-6
 # Rates of states in SI units below which the start is at rest.
 STILL = 1e-6
 # Fewer samples are refused.
@@ -195,7 +197,7 @@ def components(samples: Samples, rank: int) -> tuple[np.ndarray, np.ndarray]:
     learned models of it were unstable.  `InputError` if nothing moves.
     """
     _, sizes, rows = np.linalg.svd(samples.deviations, full_matrices=False)
-    if sizes[0] < ROUNDING * np.sqrt(len(samples.deviations)):
+    if sizes[0] < RESTING * np.sqrt(len(samples.deviations)):
         raise InputError("nothing moves in the training runs: there is nothing to learn")
     sizes = sizes[:rank][sizes[:rank] > ROUNDING * sizes[0]] / np.sqrt(len(samples.deviations))
     vectors = rows[: len(sizes)]
