@@ -59,7 +59,23 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 # Folders and files whose tests take long.
-SLOW = ("contracts", "plugin", "reference", "report", "study", "unit/exporting")
+SLOW = (
+    *(
+        "contracts",
+        "plugin",
+        "reference",
+        "report",
+        "study",
+        "unit/exporting",
+        "unit/test_files.py",
+    ),
+    *("texts/test_pages.py", "texts/test_examples.py"),
+    "unit/reduction/methods/test_slow_manifold.py",
+    "unit/reduction/test_crafted_files.py",
+    "unit/reduction/test_saved.py",
+    "unit/reduction/test_second_order_methods.py",
+    "unit/reduction/vehicle/test_lifting.py",
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
