@@ -174,8 +174,8 @@ def report(
     Parameters
     ----------
     studies
-        Studies, collections or TOML files, run first where results are missing, or models, of which
-        their studies by default are meant. Without any: everything that the results folder holds.
+        Studies, collections, TOML files, or models, which stand for their default studies; what is
+        missing is run first. Without any: everything that the results folder holds.
     out
         The file, which ends with .html.
     """
@@ -222,7 +222,8 @@ def shown_progress() -> Iterator[dict[str, int]]:
         nonlocal printed
         now = time.monotonic()
         # The test of a protocol adds to what its validation was.
-        grown, totals[work] = totals.get(work) != total, total
+        grown = totals.get(work) != total
+        totals[work] = total
         if console.is_terminal:
             if work not in tasks:
                 tasks[work] = bar.add_task(work)

@@ -229,7 +229,7 @@ def _call_kernel(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     packed, kinds = args[2], sig.args[2]
     for value, kind in zip(cgutils.unpack_tuple(builder, packed, len(kinds)), kinds, strict=True):
         pointers.append(context.make_array(kind)(context, builder, value).data)
-    # A step executes other kernels of the list; all others don't see this argument.
+    # Step kernels call other kernels of the list; kernels that don't take this argument ignore it.
     kernels = context.make_array(sig.args[0])(context, builder, args[0])
     pointers.append(builder.bitcast(kernels.data, DOUBLE.as_pointer()))
     return _call_address(context, builder, sig, args, pointers)

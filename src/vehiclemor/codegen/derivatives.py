@@ -277,12 +277,14 @@ class JacobianProduct(ShortRepr):
         row_lengths = (self.width, self.size) if lanes > 1 else ()
         for _ in range(0, rows, lanes):
             function(*pointers, *row_lengths)
+            # The next rows of seeds and of the result, the last two arguments.
             pointers[-2] += 8 * lanes * self.width
             pointers[-1] += 8 * lanes * self.size
         return result
 
 
 def _rows(count: int) -> int:
+    """Rows for so many directions: many of them fill their last lanes with zeros."""
     return count if count <= FEW else -(-count // DIRECTIONS) * DIRECTIONS
 
 

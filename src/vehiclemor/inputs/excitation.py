@@ -41,8 +41,8 @@ def cached(compute: Callable[..., Result]) -> Callable[..., Result]:
 class Extent(NamedTuple):
     """Extremes of the inputs of a run, see `polynomial_loops.extent`.
 
-    Largest (3, inputs) are magnitudes of the inputs, of what of them is above 2 Hz, and the root of
-    the integral of the square of what is above 8 Hz.
+    `largest` (3, inputs) has three rows: the largest magnitude of each input, that of its part
+    above 2 Hz, and the root of the integral of the square of its part above 8 Hz.
     """
 
     low: np.ndarray

@@ -106,9 +106,9 @@ class Signal(Excitation):
             Between samples: `linear`; `zero`, each sample until the next, so that the last only
             ends the run; `cubic`, the spline with continuous second derivatives.
         inputs
-            Names of the columns; by default they are all inputs of a model, in its order.  Inputs
-            that a model has besides are 0, but where they are derivatives of one that is given
-            (`s_dot` and `s_ddot` of `s`) these.
+            Names of the columns; by default they are all inputs of a model, in its order.  Further
+            inputs of a model are 0, but derivatives of one that is given (`s_dot` and `s_ddot` of
+            `s`) follow from it; that needs a cubic hold.
         output_step
             About the time in s between output times.
 
@@ -183,7 +183,8 @@ class Signal(Excitation):
 
     @cached
     def _completed(self, names: tuple[str, ...]) -> Signal:
-        columns, needed = self.nominal_pieces.coefficients.shape[1], ", ".join(names)
+        columns = self.nominal_pieces.coefficients.shape[1]
+        needed = ", ".join(names)
         if not self.inputs:
             if columns == len(names):
                 return replace(self, inputs=names)

@@ -213,7 +213,7 @@ def _allows(choice: Any, kind: type) -> bool:
     """Whether a value of a class may stand where a type is declared."""
     origin = get_origin(choice) or choice
     if origin is Any or not isinstance(origin, type) or getattr(origin, "_is_protocol", False):
-        # It would not say that a list or mapping is to be read as one.
+        # An open type doesn't say whether a list of JSON was a list or a tuple, a table a mapping.
         return kind not in (list, dict)
     if origin is float:
         return kind in (float, int)

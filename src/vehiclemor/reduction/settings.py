@@ -55,7 +55,7 @@ AnyIntegrator = Annotated[
 # How a reduced system is integrated: the same two settings of all methods that have one.
 Solver = Annotated[
     AnyIntegrator,
-    Field(description="as of full_order; all but dopri5 and rodas4 freeze the Jacobian"),
+    Field(description="as of full_order; etdrk4 freezes the Jacobian"),
 ]
 # Projected systems have no Jacobian to freeze.
 ProjectedSolver = Annotated[

@@ -188,10 +188,11 @@ def not_monotone(results: Results, label: str, quantity: str) -> Finding:
     falls: dict[str, float] = {}
     for output in BOTH:
         errors = at_point(study, label, output=output)["rms_error"].values
-        steps = [errors[factors >= 1.0], errors[factors <= 1.0][::-1]]
+        # Both away from the nominal input.
+        sides = [errors[factors >= 1.0], errors[factors <= 1.0][::-1]]
         # From the first that is not zero on: replay is exact at the nominal input.
-        steps = [step[np.argmax(step > 0.0) :] for step in steps]
-        falls[output] = max(float(np.max(1.0 - e[1:] / e[:-1])) for e in steps)
+        sides = [side[np.argmax(side > 0.0) :] for side in sides]
+        falls[output] = max(float(np.max(1.0 - e[1:] / e[:-1])) for e in sides)
     largest = max(falls.values())
     text = "largest fall of an RMS error over a step away from the nominal input, as a share of it"
     seen = f"displacement {falls[DISPLACEMENT]:.2g}, angle {falls[ANGLE]:.2g}"

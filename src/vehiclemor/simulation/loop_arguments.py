@@ -67,7 +67,7 @@ class Method(NamedTuple):
     step_sizes
         In s, those for which operators of a frozen Jacobian are stored.
     operators
-        Of each step size.
+        Of a frozen Jacobian, for each of these step sizes.
     active
         Numbers of the states that the right-hand side depends on.
     """
@@ -86,7 +86,7 @@ class Control(NamedTuple):
     exponent, rejected_exponent, memory_exponent
         Of the error in the factor of the next step, after a rejected step, and of the error before.
     memory_start, memory_floor
-        What counts as the error before the first step, and at least as that before any other.
+        What counts as the error before the first step; the least that counts before any other.
     shrink_least, shrink, grow, safety
         Smallest factor after a rejected and after an accepted step, largest factor; share of the
         step size that the error asks for.
@@ -208,9 +208,16 @@ class Output(NamedTuple):
 class Outputs(NamedTuple):
     """Some outputs of a model.
 
-    Address of their kernel, for `LANES` samples or for one on shorter paths, and its constants; by
-    output the column of the states, or -1 less the column of the kernel's results; ranges
-    (limited, 2) of those that are watched.
+    Attributes
+    ----------
+    kernel
+        Address of their kernel: for `LANES` samples at once, for a single one on shorter paths.
+    constants
+        Hoisted constants of the kernel.
+    columns
+        Of each output: column c of the states, or -1 - c for column c of the kernel's results.
+    ranges
+        Of the outputs that are watched (limited, 2).
     """
 
     kernel: IntVector

@@ -134,9 +134,8 @@ class System(ShortRepr):
         """The kernels that a run calls, a solver's step kernel too, cached."""
         key = formulation, solver
         if key not in self._ready:
-            kernel, step = self._step_kernel(solver) if solver else None, 0
-            if kernel:
-                step = address_of(Kernels([kernel]), kernel.name)
+            kernel = self._step_kernel(solver) if solver else None
+            step = address_of(Kernels([kernel]), kernel.name) if kernel else 0
             called = catalogue.FORMULATIONS[formulation]
             addresses = [
                 address_of(self.kernels, name) if name in called else 0
@@ -234,7 +233,8 @@ class System(ShortRepr):
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = windows.formulation
         longest = float(solver.longest_step or np.inf)
-        start, step = np.empty(n), self._step_kernel(name) if full else None
+        start = np.empty(n)
+        step = self._step_kernel(name) if full else None
         buffer = np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, step))
         call = catalogue.time_loop(name, formulation).prepared(
             start,

@@ -103,8 +103,8 @@ class StructuralModesSettings(StructuralSettings):
     highest: float = Field(100.0, gt=0.0, le=1e5, description="modes of up to so many Hz are kept")
 
 
-# Shape, its lateral modes, what of it follows the inputs at once, settings -> these of the reduced
-# vehicle.
+# Shape, its lateral modes, its static response (what follows the inputs at once), settings -> modes
+# and static response of the reduced vehicle.
 Reductor = Callable[
     [VehicleShape, SlowModes, np.ndarray, Any],
     tuple[SlowModes, np.ndarray],
@@ -170,6 +170,8 @@ def linear_vehicle(model: DynamicModel, settings: Any, reductor: Reductor) -> Re
     linear = shape.linearised
     k, inputs = len(modes.rates), linear.b.shape[1]
     listing = FeatureListing(k + 1, inputs)
+    # Terms, rows of `c`: one, the lateral coordinates, the deviation of the speed, the inputs.
+    # Columns of `c`: rates of coordinates and speed; yaw rate, forward and lateral speed.
     terms = [(value,) for value in (listing.number(1.0), *listing.z, *listing.u)]
     odd, even = [*range(1, k + 1), *range(k + 2, k + 2 + inputs)], [0, k + 1]
     # The vehicle equals its mirror image: the speed moves nothing sideways, steering changes no U.

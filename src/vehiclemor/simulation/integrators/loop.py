@@ -133,8 +133,8 @@ def over_span(problem, times, h, method, control, work, output, sample):
     Takes the first step size to try in s, none if zero, and the number of the next sample; returns
     a status, the time, the step size for what follows and the number of the next sample.
     """
-    y, f, (t, end) = work.y, work.f, times
-    counts = output.counts
+    t, end = times
+    y, f, counts = work.y, work.f, output.counts
     begin(problem, t, method, work)
     counts[RHS_CALLS] += 1
     if h <= 0.0:
@@ -142,7 +142,7 @@ def over_span(problem, times, h, method, control, work, output, sample):
         size = error_norm(problem, f, y, 1.0)
         if not math.isfinite(size):
             return NOT_FINITE, t, h, sample
-        # At rest it says nothing of the input, and a long step could pass over all of it.
+        # A slope of zero says nothing of the input, which a long first step could pass over.
         h = min(control.longest, 0.02 * (end - t))
         if not size <= 1e-10:
             h = max(control.shortest_first, 0.01 / size)
@@ -216,6 +216,7 @@ def record_samples(problem, step, method, work, output, sample):
     if sample == first:
         return sample
     prepare_curve(h, method, work)
+    # From this one on samples are points themselves; those before it follow from nodes.
     alone = first
     if len(output.point_of_sample) and sample - first > NODES + 1 and t >= output.record_all_until:
         # At the end of a span inputs may jump.
