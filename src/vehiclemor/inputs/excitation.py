@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Hashable
 from dataclasses import replace
-from functools import cache, cached_property, wraps
+from functools import cache, cached_property, lru_cache, wraps
 from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -50,6 +50,13 @@ class Extent(NamedTuple):
     largest: np.ndarray
 
 
+@lru_cache(maxsize=64)
+def _equidistant(duration: float, samples: int) -> np.ndarray:
+    times = np.linspace(0.0, duration, samples)
+    times.flags.writeable = False
+    return times
+
+
 class Excitation(ShortRepr):
     """Inputs of a model over a fixed duration: a `Maneuver` of functions, a `Signal` of samples."""
 
@@ -70,8 +77,8 @@ class Excitation(ShortRepr):
 
     @property
     def times(self) -> np.ndarray:
-        """Equidistant output times (samples,) in s."""
-        return np.linspace(0.0, self.duration, self.samples)
+        """Equidistant output times (samples,) in s, not to be written to."""
+        return _equidistant(self.duration, self.samples)
 
     @property
     @abstractmethod

@@ -132,14 +132,19 @@ class PathMapModel(ReducedMechanism):
         return map_kernel(self.moving, self.degree, self.columns)
 
     @cached_property
+    def _polynomials(self) -> np.ndarray:
+        """Address of the compiled kernel."""
+        return np.array([address_of(Kernels([self._kernel]), self._kernel.name)])
+
+    @cached_property
     def _pool(self) -> Pool[Prepared]:
         return Pool()
 
     def _packed(self, given: Ready, size: int) -> Prepared:
         """The loop for some inputs, to be given space of that size."""
-        polynomials = np.array([address_of(Kernels([self._kernel]), self._kernel.name)])
         loop = kinematic_loop("map_path", "reduction.map_loops")
-        call = loop.prepared(given, self.cells, polynomials, len(self.columns), np.empty(0))
+        columns = len(self.columns)
+        call = loop.prepared(given, self.cells, self._polynomials, columns, np.empty(0))
         call.words[call.address("space") + 1] = size
         return call
 
@@ -306,31 +311,25 @@ def _coefficients(values: np.ndarray, moving: int, number: int, degree: int) -> 
     grid = values.reshape(*[number, size] * moving, quantities)
     grid = np.moveaxis(grid, range(0, 2 * moving, 2), range(moving))
     cells = grid.reshape(number**moving, *[size] * moving, quantities)
-    coefficients = np.array([_of_cell(cell, moving, degree) for cell in cells])
-    padding = padded(quantities) - quantities
-    return loop_array(np.pad(coefficients, ((0, 0), (0, 0), (0, padding))))
-
-
-def _of_cell(cell: np.ndarray, moving: int, degree: int) -> np.ndarray:
-    """Coefficients (monomials, quantities) from values of one cell (nodes, ..., quantities)."""
-    size = degree + 1
     # Chebyshev series first: they say what to leave out, and are well-conditioned.
     to_series = np.linalg.inv(chebyshev.chebvander(chebyshev.chebpts1(size), degree))
-    for axis in range(moving):
-        cell = _along(to_series, cell, axis)
+    for axis in range(1, moving + 1):
+        cells = _along(to_series, cells, axis)
     orders = np.indices([size] * moving).sum(axis=0)
-    cell[orders > degree] = 0.0
+    cells[:, orders > degree] = 0.0
     to_powers = np.zeros((size, size))
     for order in range(size):
         to_powers[: order + 1, order] = chebyshev.cheb2poly(np.eye(size)[order, : order + 1])
-    for axis in range(moving):
-        cell = _along(to_powers, cell, axis)
+    for axis in range(1, moving + 1):
+        cells = _along(to_powers, cells, axis)
     terms = monomials(moving, degree)
     powers = np.zeros((moving, len(terms)), dtype=int)
     for column, term in enumerate(terms):
         for variable in term:
             powers[variable, column] += 1
-    return cell[tuple(powers)]
+    coefficients = cells[:, *powers]
+    padding = padded(quantities) - quantities
+    return loop_array(np.pad(coefficients, ((0, 0), (0, 0), (0, padding))))
 
 
 def _along(matrix: np.ndarray, values: np.ndarray, axis: int) -> np.ndarray:
