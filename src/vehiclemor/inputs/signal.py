@@ -310,7 +310,9 @@ def many_signals(
             f"samples of a signal: t has shape {times.shape} and u {values.shape[1:]} in a run, "
             f"not (n,) and (n,) or (n, inputs)"
         )
-    if len(times) < 2 or not len(values):
+    if not len(values):
+        raise InputError("u holds no runs; one is needed at least")
+    if len(times) < 2:
         raise InputError(f"a signal needs two samples at least, not {len(times)}")
     within("number of samples", len(times), (2, MOST_SAMPLES))
     times, values = times - times[0], values.reshape(*values.shape[:2], -1)
