@@ -97,23 +97,29 @@ def simulate(
     how: dict[str, Any] = {"maneuver": _maneuver(maneuver, csv), "start": start, "preset": preset}
     how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
     dataset = vm.simulate(ready, method, **how, **chosen)
-    from vehiclemor.netcdf_file import write_dataset
     from vehiclemor.report.labels import tabled_outputs
     from vehiclemor.report.printing import simulation_text
 
     shown = ready.outputs if all_outputs else tabled_outputs(ready.definition)
     print(simulation_text(dataset, shown, ready.counts))
+    _write(dataset, out, picture, animate)
+    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
+
+
+def _write(dataset: Any, out: Path | None, picture: Path | None, film: Path | None) -> None:
+    """Write a run to those files that are asked for, and say so."""
     if out is not None:
+        from vehiclemor.netcdf_file import write_dataset
+
         write_dataset(dataset, out)
         print(f"written: {out}")
-    if picture:
+    if picture is not None:
         vm.plot(dataset, out=picture)
         print(f"written: {picture}")
-    if animate:
-        print(f"written: {vm.animate(dataset, out=animate)}")
-    if out is None and picture is None and animate is None:
+    if film is not None:
+        print(f"written: {vm.animate(dataset, out=film)}")
+    if out is None and picture is None and film is None:
         print("nothing is saved: --out FILE.nc saves the result, --plot draws it")
-    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
 def _maneuver(name: str | None, csv: list[str] | None) -> str | vm.Signal | None:

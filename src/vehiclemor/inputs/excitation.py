@@ -77,7 +77,7 @@ class Excitation(ShortRepr):
 
     @property
     def times(self) -> np.ndarray:
-        """Equidistant output times (samples,) in s, not to be written to."""
+        """Equidistant output times (samples,) in s, read-only."""
         return _equidistant(self.duration, self.samples)
 
     @property
@@ -116,13 +116,13 @@ class Excitation(ShortRepr):
     @cached
     def recorded_inputs(self) -> tuple[np.ndarray, np.ndarray]:
         """Output times (samples,) in s and inputs (samples, inputs) at these, read-only."""
-        times, inputs = self._record()
-        times.flags.writeable = inputs.flags.writeable = False
-        return times, inputs
+        inputs = self._at_output_times()
+        inputs.flags.writeable = False
+        return self.times, inputs
 
     @abstractmethod
-    def _record(self) -> tuple[np.ndarray, np.ndarray]:
-        """Output times and the inputs at these."""
+    def _at_output_times(self) -> np.ndarray:
+        """Inputs (samples, inputs) at the output times."""
 
     @property
     @cached

@@ -150,13 +150,11 @@ class Maneuver(Excitation):
         coefficients = self.amplitude_factor * unit.pieces.coefficients
         return unit.pieces._replace(coefficients=coefficients)
 
-    def _record(self) -> tuple[np.ndarray, np.ndarray]:
+    def _at_output_times(self) -> np.ndarray:
         unit = self._of_unit_amplitude()
         if unit is None:
-            times = self.times
-            return times, loop_array(self.at(times))
-        times, inputs = unit.recorded_inputs
-        return times, self.amplitude_factor * inputs
+            return loop_array(self.at(self.times))
+        return self.amplitude_factor * unit.recorded_inputs[1]
 
     def _of_unit_amplitude(self) -> Maneuver | None:
         """The maneuver to which this one is proportional, if it declares that it is."""

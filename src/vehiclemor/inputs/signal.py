@@ -157,11 +157,10 @@ class Signal(Excitation):
             raise InputError(f"{self} lasts from 0 to {self.duration:g} s: no inputs at {late:g} s")
         return values_at(self.pieces, within_run)
 
-    def _record(self) -> tuple[np.ndarray, np.ndarray]:
-        times = self.times
+    def _at_output_times(self) -> np.ndarray:
         inputs = np.empty((self.samples, self.pieces.coefficients.shape[1]))
-        polynomial_loops()["sampled"](self.packed_pieces, times, inputs)
-        return times, inputs
+        polynomial_loops()["sampled"](self.packed_pieces, self.times, inputs)
+        return inputs
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
         """The signal with its factors set: so much faster and shorter, so many times as large."""
