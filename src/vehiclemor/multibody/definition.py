@@ -95,7 +95,8 @@ class ModelDefinition(ShortRepr):
         Name of the nominal maneuver.
     coordinates, speeds, inputs, outputs
         Quantities in order; inputs are those of every run.  A state is the coordinates and, after
-        them, as many speeds; models of kind `ae` have no speeds.  Coordinates of a structure have no names: there are none.
+        them, as many speeds; models of kind `ae` have no speeds.  Coordinates of a structure have no
+        names: there are none.
     equations
         Residual equations with their units (kind `ae`).
     constraints
