@@ -33,6 +33,9 @@ WHEELS = ("FL", "FR", "RL", "RR")
 
 # Outputs that are zero where a wheel has left the road.
 TIRE_LOADS = tuple(f"Fz_{wheel}" for wheel in WHEELS)
+SLIP_RATIOS = tuple(f"slip_ratio_{wheel}" for wheel in WHEELS)
+# Outputs that are zero where a vehicle has come to rest.
+STANDSTILL = ("longitudinal_speed", "lateral_speed")
 # Bounds beyond which the models mean nothing: of the longitudinal speed, and of the attitude.
 FORWARD = (0.5, math.inf)
 UPRIGHT = {"roll": (-1.2, 1.2), "pitch": (-1.2, 1.2)}

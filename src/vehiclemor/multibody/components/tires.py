@@ -271,9 +271,7 @@ def upright_wheel(
     pressed = let(p["tire_stiffness"] * (p["tire_radius"] - above) - p["tire_damping"] * rise)
     load = let((pressed + sp.Abs(pressed)) / 2)
     reference_load = let(p["nominal_load"] * p["load_scale"])
-    tire = magic_formula(
-        tape, p, load, reference_load, p["tire_radius"], *slips, inputs.friction
-    )
+    tire = magic_formula(tape, p, load, reference_load, p["tire_radius"], *slips, inputs.friction)
     shear = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral)
     moment = arm.cross(shear) + up * tire.aligning
     force = g.named(tape, shear + up * load)

@@ -20,6 +20,8 @@ from vehiclemor.multibody.quantities import (
     FORWARD,
     OPTIONAL_INPUTS,
     OPTIONAL_RANGES,
+    SLIP_RATIOS,
+    STANDSTILL,
     TIRE_LOADS,
     UPRIGHT,
     WHEELS,
@@ -214,7 +216,9 @@ DEFINITION = ModelDefinition(
         **UPRIGHT,
         **OPTIONAL_RANGES,
     },
+    standstill=STANDSTILL,
     loads=TIRE_LOADS,
+    slips=SLIP_RATIOS,
     tabled_outputs=(
         "lateral_speed",
         "vertical_speed",

@@ -18,6 +18,8 @@ from vehiclemor.multibody.quantities import (
     FORWARD,
     OPTIONAL_INPUTS,
     OPTIONAL_RANGES,
+    SLIP_RATIOS,
+    STANDSTILL,
     TIRE_LOADS,
     UPRIGHT,
     WHEELS,
@@ -125,7 +127,9 @@ DEFINITION = ModelDefinition(
         "delta": (-1.066, 1.066),
         **OPTIONAL_RANGES,
     },
+    standstill=STANDSTILL,
     loads=TIRE_LOADS,
+    slips=SLIP_RATIOS,
     tabled_outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
     main_outputs=("pitch", "yaw", "lateral_position"),
 )
