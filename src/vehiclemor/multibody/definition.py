@@ -13,8 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import line_of_text
 from vehiclemor.exceptions import InputError, did_you_mean
-from vehiclemor.multibody.input_choice import DEFAULTS, InputChoice
-from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.quantities import DEFAULTS, InputChoice, Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr
 

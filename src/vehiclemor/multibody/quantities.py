@@ -28,6 +28,33 @@ class Quantity:
     default: float | None = None
 
 
+@dataclass(frozen=True)
+class InputChoice:
+    """Optional inputs of a run in declared order; those in neither tuple are their defaults.
+
+    Attributes
+    ----------
+    driven
+        Inputs that change with time.
+    constant
+        Inputs whose values are parameters of the model.
+    """
+
+    driven: tuple[str, ...] = ()
+    constant: tuple[str, ...] = ()
+
+
+DEFAULTS = InputChoice()
+
+
+def integral_of(name: str) -> str:
+    """Name of the input whose time derivative has this name, such as s of s_dot; else empty."""
+    base, dot, order = name.rpartition("_")
+    if order == "ddot":
+        return f"{base}_dot"
+    return base if dot and order == "dot" else ""
+
+
 # Front left, front right, rear left, rear right.
 WHEELS = ("FL", "FR", "RL", "RR")
 

@@ -17,8 +17,7 @@ from vehiclemor.multibody.components.tires import Corner, WheelOnRoad, tilted_wh
 from vehiclemor.multibody.components.wheel_inputs import wheel_inputs
 from vehiclemor.multibody.double_wishbone.definition import POINTS
 from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SOLVED, SPINS
-from vehiclemor.multibody.input_choice import InputChoice
-from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.multibody.quantities import WHEELS, InputChoice
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
 from vehiclemor.symbolic.geometry import Vector
