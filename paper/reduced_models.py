@@ -20,11 +20,10 @@ import numpy as np
 from vehiclemor import VehiclemorError
 from vehiclemor.api import RESULTS, reduce
 from vehiclemor.exceptions import FileError
-from vehiclemor.files import make_folder
+from vehiclemor.files import data_folder, make_folder
 from vehiclemor.provenance import code_digest
 from vehiclemor.reduction.model_file import content
 from vehiclemor.reduction.reduced_model import ReducedOrderModel, load, shipped_folder
-from vehiclemor.resources import data_folder
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.experiment import Settings
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from pydantic import Field
 
-from vehiclemor.array_shapes import check_distinct_indices, check_indices, check_shapes, require
+from vehiclemor.arguments import check_distinct_indices, check_indices, check_shapes, require
 from vehiclemor.codegen.derivatives import JacobianProduct, jacobian_product
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready

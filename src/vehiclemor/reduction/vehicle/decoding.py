@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.array_shapes import check_shapes, require
+from vehiclemor.arguments import check_shapes, require
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Prepared, loops
 from vehiclemor.codegen.operations import Kernel

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.array_shapes import check_distinct_indices, require
+from vehiclemor.arguments import check_distinct_indices, require
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.operations import (
     COMPARISONS,
