@@ -29,9 +29,9 @@ from vehiclemor.codegen.operations import (
     Listing,
     Operation,
     Value,
+    padded,
     pruned,
 )
-from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.simulation.evaluation import at_samples
 from vehiclemor.simulation.system import System
 
