@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import GeometryError
+from vehiclemor.files import data_folder
 from vehiclemor.parameters import Declared
-from vehiclemor.resources import data_folder
 from vehiclemor.toml_files import toml_content
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from vehiclemor.files import data_names
 from vehiclemor.inputs.excitation import FACTORS
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.multibody.input_choice import with_overrides
@@ -14,7 +15,6 @@ from vehiclemor.reduction.interface import never_refused
 from vehiclemor.reduction.model_file import training_of
 from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.registry import component, names, unknown
-from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build_derived
 from vehiclemor.study.plans.loading import is_study, load_studies, read_study, study_path
 from vehiclemor.study.plans.study_file import (

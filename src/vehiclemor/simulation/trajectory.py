@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import quoted, real_array
-from vehiclemor.array_shapes import check_shapes
+from vehiclemor.arguments import check_shapes, quoted, real_array
 from vehiclemor.exceptions import InputError
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import choice
