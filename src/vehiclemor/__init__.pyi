@@ -12,6 +12,7 @@ from .api import studies as studies
 from .error_measures import errors as errors
 from .exceptions import VehiclemorError as VehiclemorError
 from .exporting.export import export as export
+from .handling.metrics import metrics as metrics
 from .inputs.maneuver import maneuver as maneuver
 from .inputs.road import road as road
 from .inputs.signal import Signal as Signal

@@ -49,7 +49,7 @@ MULTISINE = np.array([0.15, 0.35, 0.6, 0.95, 1.4])
 PHASES = -np.pi * np.arange(5) * np.arange(1, 6) / 5
 # Slow ramp: size after a second.  Weave: frequency in Hz.
 RAMP_RATE, RAMP_DURATION = 0.05, 21.0
-WEAVE_FREQUENCY, WEAVE_DURATION = 0.2, 21.0
+WEAVE_FREQUENCY, WEAVE_DURATION = 0.2, 22.0
 # Sine with dwell: frequency in Hz, length of the dwell, of the transition into and out of it (s).
 DWELL_FREQUENCY, DWELL, TRANSITION, DWELL_DURATION = 0.7, 0.5, 0.1, 6.0
 # Periods of the sine before the dwell.
@@ -232,7 +232,7 @@ slow_ramp_steer, rack_slow_ramp_steer = _steered(
 )
 weave, rack_weave = _steered(
     "weave",
-    "steering to and fro at 0.2 Hz to 1 m/s^2 at 20 m/s (ISO 13674-1), 21 s",
+    "steering to and fro at 0.2 Hz to 1 m/s^2 at 20 m/s (ISO 13674-1), 22 s",
     _weave,
     _onset,
     WEAVE_DURATION,

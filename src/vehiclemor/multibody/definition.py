@@ -150,6 +150,8 @@ class ModelDefinition(ShortRepr):
         A run that leaves that of an output has diverged, an input beyond its range is refused.
     loads
         Outputs that are zero where a wheel has left the road.
+    wheelbase
+        Parameters -> distance of the axles in m, of a vehicle.
     tabled_outputs
         Outputs whose errors are listed in tables, all by default.
     main_outputs
@@ -208,6 +210,7 @@ class ModelDefinition(ShortRepr):
     error_scale: Mapping[str, float] = field(default_factory=dict)
     validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     loads: tuple[str, ...] = ()
+    wheelbase: Callable[[Values], float] | None = None
     tabled_outputs: tuple[str, ...] = ()
     main_outputs: tuple[str, ...] = ()
 

@@ -211,6 +211,7 @@ DEFINITION = ModelDefinition(
         **UPRIGHT,
     },
     loads=TIRE_LOADS,
+    wheelbase=lambda p: wheel_places(p)[0][0] - wheel_places(p)[1][0],
     tabled_outputs=(
         "lateral_speed",
         "vertical_speed",

@@ -118,6 +118,7 @@ DEFINITION = ModelDefinition(
     # Steering as far as that of the car (CommonRoad, BMW 320i).
     validity={"longitudinal_speed": FORWARD, **UPRIGHT, "delta": (-1.066, 1.066)},
     loads=TIRE_LOADS,
+    wheelbase=lambda p: p["front_axle_distance"] + p["rear_axle_distance"],
     tabled_outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
     main_outputs=("pitch", "yaw", "lateral_position"),
 )
