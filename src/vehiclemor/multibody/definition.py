@@ -154,6 +154,8 @@ class ModelDefinition(ShortRepr):
         Outputs that are zero where a wheel has left the road.
     slips
         Outputs that are the slip ratios of the wheels.
+    wheelbase
+        Parameters -> distance of the axles in m, of a vehicle.
     tabled_outputs
         Outputs whose errors are listed in tables, all by default.
     main_outputs
@@ -214,6 +216,7 @@ class ModelDefinition(ShortRepr):
     standstill: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
     slips: tuple[str, ...] = ()
+    wheelbase: Callable[[Values], float] | None = None
     tabled_outputs: tuple[str, ...] = ()
     main_outputs: tuple[str, ...] = ()
 

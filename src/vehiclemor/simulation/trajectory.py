@@ -107,6 +107,8 @@ class Trajectory(ShortRepr):
         Of which it is.
     method
         By which it was reduced; empty for a run of the full model.
+    maneuver
+        Name of the input.
     """
 
     times: np.ndarray
@@ -123,6 +125,7 @@ class Trajectory(ShortRepr):
     names: tuple[str, ...] = ()
     model: Any = None
     method: str = ""
+    maneuver: str = ""
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None

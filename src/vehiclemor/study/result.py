@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.error_measures import max_abs, rms, signal_range
 from vehiclemor.failure import Failure
 from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.provenance import attributes
 from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.registry import component

@@ -219,6 +219,7 @@ DEFINITION = ModelDefinition(
     standstill=STANDSTILL,
     loads=TIRE_LOADS,
     slips=SLIP_RATIOS,
+    wheelbase=lambda p: wheel_places(p)[0][0] - wheel_places(p)[1][0],
     tabled_outputs=(
         "lateral_speed",
         "vertical_speed",
