@@ -23,11 +23,17 @@ def checked_maneuver(maneuver: str | Excitation, definition: ModelDefinition) ->
     return _checked(maneuver, definition)
 
 
+def completed(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
+    """A maneuver with all inputs of a model in its order, those that it lacks at their defaults."""
+    names = tuple(quantity.name for quantity in definition.inputs)
+    return maneuver.for_inputs(names, tuple(q.default or 0.0 for q in definition.inputs))
+
+
 # A maneuver is checked once for all its runs, and so is a signal that has been completed.
 @cached
 def _checked(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
     names = tuple(quantity.name for quantity in definition.inputs)
-    complete = maneuver.for_inputs(names)
+    complete = completed(maneuver, definition)
     if complete.inputs != names:
         raise InputError(
             f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "

@@ -95,8 +95,8 @@ class ModelDefinition(ShortRepr):
         Name of the nominal maneuver.
     coordinates, speeds, inputs, outputs
         Quantities in order; inputs are those of every run.  A state is the coordinates and, after
-        them, as many speeds; models of kind `ae` have no speeds.  Coordinates of a structure have no
-        names: there are none.
+        them, as many speeds; models of kind `ae` have no speeds.  Coordinates of a structure have
+        no names: there are none.
     equations
         Residual equations with their units (kind `ae`).
     constraints
@@ -148,8 +148,13 @@ class ModelDefinition(ShortRepr):
     validity
         Output or input -> (smallest, largest) value in its unit at which the model means anything.
         A run that leaves that of an output has diverged, an input beyond its range is refused.
+    standstill
+        Outputs that are the forward and the lateral speed: where the first falls below its range
+        and the second is as small, the vehicle has stopped, and the run has not diverged.
     loads
         Outputs that are zero where a wheel has left the road.
+    slips
+        Outputs that are the slip ratios of the wheels.
     tabled_outputs
         Outputs whose errors are listed in tables, all by default.
     main_outputs
@@ -207,7 +212,9 @@ class ModelDefinition(ShortRepr):
     heading_pairs: tuple[tuple[str, str], ...] = ()
     error_scale: Mapping[str, float] = field(default_factory=dict)
     validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    standstill: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
+    slips: tuple[str, ...] = ()
     tabled_outputs: tuple[str, ...] = ()
     main_outputs: tuple[str, ...] = ()
 
@@ -260,7 +267,9 @@ class ModelDefinition(ShortRepr):
         self._known("online", self.online, self.parameters)
         inputs = {q.name for q in (*self.inputs, *self.optional_inputs)}
         self._known("validity", self.validity, outputs | inputs)
+        self._known("standstill", self.standstill, outputs)
         self._known("loads", self.loads, outputs)
+        self._known("slips", self.slips, outputs)
         self._known("tabled_outputs", self.tabled_outputs, outputs)
         self._known("main_outputs", self.main_outputs, self.tabled_outputs or outputs)
 

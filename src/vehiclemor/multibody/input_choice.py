@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -34,13 +34,21 @@ DEFAULTS = InputChoice()
 
 
 def driving(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinition:
-    """The declaration whose inputs are those of every run, and the optional ones among the names.
+    """The declaration with the optional inputs among these names as inputs too.
 
-    Optional inputs that were parameters stay parameters if they are not named.
+    With the height of a road its rate is driven.  What was a parameter is none any more.
     """
-    names = set(names)
-    constant = (name for name in definition.choice.constant if name not in names)
-    return _chosen(definition, _ordered(definition, names), _ordered(definition, constant))
+    named = {*names}
+    driven = {*definition.choice.driven, *named}
+    driven |= {q.name for q in definition.optional_inputs if integral_of(q.name) in named}
+    constant = {*definition.choice.constant} - driven
+    return _chosen(definition, _ordered(definition, driven), _ordered(definition, constant))
+
+
+def with_overrides(definition: ModelDefinition, overrides: Mapping[str, object]) -> ModelDefinition:
+    """The declaration with the optional inputs as parameters for which there are values."""
+    names = {quantity.name for quantity in definition.optional_inputs}
+    return with_constants(definition, names.intersection(overrides))
 
 
 def with_constants(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinition:
@@ -54,6 +62,14 @@ def with_constants(definition: ModelDefinition, names: Iterable[str]) -> ModelDe
     constant = {*definition.choice.constant, *names}
     driven = (name for name in definition.choice.driven if name not in constant)
     return _chosen(definition, _ordered(definition, driven), _ordered(definition, constant))
+
+
+def integral_of(name: str) -> str:
+    """Name of the input whose time derivative has this name, such as s of s_dot; else empty."""
+    base, dot, order = name.rpartition("_")
+    if order == "ddot":
+        return f"{base}_dot"
+    return base if dot and order == "dot" else ""
 
 
 def _ordered(definition: ModelDefinition, names: Iterable[str]) -> tuple[str, ...]:

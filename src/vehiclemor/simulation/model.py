@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.inputs.maneuver import registered
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
@@ -103,6 +104,11 @@ class Model(ShortRepr):
         return tuple(q.name for q in self.definition.inputs)
 
     @cached_property
+    def inputs_at_rest(self) -> np.ndarray:
+        """Inputs (number of inputs,) of a run that drives nothing: their defaults, else 0."""
+        return np.array([quantity.default or 0.0 for quantity in self.definition.inputs])
+
+    @cached_property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs."""
         return tuple(q.name for q in self.definition.outputs)
@@ -140,6 +146,28 @@ class Model(ShortRepr):
     def kernels(self) -> Kernels:
         """Kernels of the equations, each compiled when it is first used."""
         return self.equations.kernels
+
+    @cached_property
+    def _undriven(self) -> frozenset[str]:
+        """Names of optional inputs that no run of this model drives."""
+        optional = (quantity.name for quantity in self.definition.optional_inputs)
+        return frozenset(optional).difference(self.inputs)
+
+    def driving(self, names: Iterable[str]) -> Self:
+        """The model whose runs drive the optional inputs among these names too, cached."""
+        if self._undriven.isdisjoint(names := [*names]):
+            return self
+        from vehiclemor.simulation.build import with_inputs
+
+        return with_inputs(self, names)
+
+    def driven_by(self, maneuver: Any) -> Self:
+        """The model that has the optional inputs which a maneuver, or one of this name, names."""
+        if not self._undriven:
+            return self
+        if isinstance(maneuver, str):
+            maneuver = registered(maneuver)
+        return self.driving(maneuver.inputs) if isinstance(maneuver, Excitation) else self
 
     def start(self, name: Start | None = None) -> np.ndarray:
         """State (n,) of an initial condition, the first by default, or a copy of the one given."""
