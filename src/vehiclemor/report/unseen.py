@@ -37,7 +37,7 @@ CONTINUED = 0.5
 
 
 def protocol_rows(dataset: xr.Dataset) -> list[Row]:
-    """Rows of one protocol, by `kind`: `method`, `count`; `target` and `bound` of what was chosen."""
+    """Rows of one protocol, by `kind`: `method`, `count`; of what was chosen `target`, `bound`."""
     protocol = protocol_of(dataset)
     methods = method_rows(dataset, protocol)
     rows = methods + target_rows(dataset, protocol, methods)

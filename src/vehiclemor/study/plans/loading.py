@@ -86,7 +86,7 @@ def _merged(path: Path, readers: tuple[Path, ...] = ()) -> dict[str, Any]:
 
 def _move_logs(content: dict[str, Any], old: Path, new: Path) -> None:
     """Give paths of logs from another folder."""
-    for part in (part for name in SETS for part in content.get(name, ())):
+    for part in (part for name in ("logs", *SETS) for part in content.get(name, ())):
         if "log" in part:
             part["log"] = os.path.relpath(old / part["log"], new)
 

@@ -15,7 +15,8 @@ from pydantic import BeforeValidator, Field, model_validator
 from vehiclemor.arguments import within
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.columns import UNITS, csv_samples
-from vehiclemor.inputs.signal import Signal, many_signals
+from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.inputs.signal import many_signals
 from vehiclemor.inputs.steering import ramp
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import choice
@@ -102,7 +103,7 @@ class LogGroup(Log, Runs):
 class Window(NamedTuple):
     """Inputs of a run, and its speed in m/s if the log has one."""
 
-    signal: Signal
+    signal: Excitation
     speed: float | None
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from vehiclemor.exceptions import InputError, did_you_mean
-from vehiclemor.study.plans.logs import LogGroup
+from vehiclemor.study.plans.logs import Log, LogGroup
 from vehiclemor.study.plans.study_runs import (
     MOST_POINTS,
     PARAMETER,
@@ -172,6 +172,7 @@ class GridFile(StudyOfModel):
 
     parameters: dict[str, float | list[float]] = PARAMETERS
     maneuver: str = Field("", description="registered name; by default that of the model")
+    logs: list[Log] = list_of("whose windows are run instead: the values of the axis maneuver")
     start: list[str] = list_of("initial conditions; the model's first by default")
     training: Training = Field(
         "matched",
@@ -233,6 +234,8 @@ class GridFile(StudyOfModel):
     def _each_set_once(self) -> "GridFile":
         of_study = {f"{PARAMETER}{name}" for name in self.parameters}
         of_study |= {name for name in ("maneuver", "start") if getattr(self, name)}
+        if self.logs and "maneuver" in of_study | set(self.grid):
+            raise ValueError("give a maneuver or logs, not both")
         sampled = set(self.sampling.ranges) if self.sampling else set()
         axes = {"grid": set(self.grid), "sampling": sampled}
         names_by_part = axes | {"study": of_study}
