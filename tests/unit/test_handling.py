@@ -131,8 +131,8 @@ def test_a_sine_with_dwell_is_judged_at_the_times_of_the_standard(side):
     run = run_of(TIMES, steering, "sine_with_dwell", yaw_rate=side * yaw_rate, **path)
     numbers = vm.metrics(run)
     # Steering begins and ends where it passes 5 % of its largest value: by 15 ms.
-    assert numbers["yaw_rate_ratio_1_s"] == pytest.approx(np.exp(-1.0 / 0.8), rel=0.02)
-    assert numbers["yaw_rate_ratio_1_75_s"] == pytest.approx(np.exp(-1.75 / 0.8), rel=0.02)
+    assert numbers["early_yaw_rate_ratio"] == pytest.approx(np.exp(-1.0 / 0.8), rel=0.02)
+    assert numbers["late_yaw_rate_ratio"] == pytest.approx(np.exp(-1.75 / 0.8), rel=0.02)
     assert numbers["lateral_displacement"] == pytest.approx(0.5 * 4.0 * 1.07**2, rel=0.03)
 
 

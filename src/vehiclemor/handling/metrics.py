@@ -83,6 +83,11 @@ def test_of(maneuver: str) -> str:
     return choice("maneuver with numbers", name, TESTS)
 
 
+def standard_of(test: str) -> str:
+    """Number of the standard of a test."""
+    return declared().standards[test]
+
+
 def motion_of(run: Trajectory) -> Motion:
     """Motion of a run, with outputs that may have been chosen."""
     names, p = run.names or run.model.outputs, run.model.parameters.values()
@@ -95,7 +100,7 @@ def numbers_of(motion: Motion, test: str) -> xr.Dataset:
     """Numbers of a test with units and definitions."""
     import xarray as xr
 
-    standard = declared().standards[test]
+    standard = standard_of(test)
     variables: dict[str, tuple] = {}
     for name, value in TESTS[test](motion).items():
         unit, definition = declared().numbers[test][name]

@@ -15,8 +15,10 @@ ORDER, DELAY = 4, 0.1
 # Part of the largest steering around the centre, where on-centre gains are taken; part from which
 # on steering has begun.
 ON_CENTRE, BEGUN = 0.2, 0.05
-# s: ratios of the yaw rate after the end of the steering, displacement after its beginning.
-RATIO_TIMES, DISPLACEMENT_TIME = (1.0, 1.75), 1.07
+# s: ratios of the yaw rate are taken so long after the steering, the displacement after its
+# beginning.
+RATIOS = {"early_yaw_rate_ratio": 1.0, "late_yaw_rate_ratio": 1.75}
+DISPLACEMENT_TIME = 1.07
 
 
 def steady_turn(motion: Motion) -> dict[str, float]:
@@ -37,12 +39,12 @@ def step(motion: Motion) -> dict[str, float]:
     times = motion.times
     steady = times >= times[-1] - STEADY
     half = first_time(times, motion.steering / np.mean(motion.steering[steady]), 0.5)
-    yaw_rate = np.mean(motion.yaw_rate[steady])
+    yaw_rate = float(np.mean(motion.yaw_rate[steady]))
     response = motion.yaw_rate / yaw_rate
     lateral = motion.lateral_acceleration / np.mean(motion.lateral_acceleration[steady])
     peak, largest = _peak(times, response)
     return {
-        "yaw_rate_gain": yaw_rate / np.mean(motion.wheel_angle[steady]),
+        "yaw_rate_gain": yaw_rate / float(np.mean(motion.wheel_angle[steady])),
         "yaw_rate_response_time": first_time(times, response, 0.9) - half,
         "yaw_rate_peak_time": peak - half,
         "yaw_rate_overshoot": largest - 1.0,
@@ -78,8 +80,6 @@ def transfer_function(times: np.ndarray, given: np.ndarray, response: np.ndarray
     A difference equation with delays of `DELAY` is fitted to all samples.  Fourier spectra of a
     sweep that ends in motion are wrong by 10 %.
     """
-    from scipy.signal import freqz
-
     delay = max(round(DELAY * (len(times) - 1) / (times[-1] - times[0])), 1)
     rows = np.arange(ORDER * delay, len(times))
     if len(rows) < 2 * ORDER + 1:
@@ -87,9 +87,9 @@ def transfer_function(times: np.ndarray, given: np.ndarray, response: np.ndarray
     past = [response[rows - k * delay] for k in range(1, ORDER + 1)]
     driven = [given[rows - k * delay] for k in range(ORDER + 1)]
     fitted = np.linalg.lstsq(np.column_stack(past + driven), response[rows], rcond=None)[0]
-    rate = 1.0 / (delay * (times[1] - times[0]))
-    denominator = np.append(1.0, -fitted[:ORDER])
-    return freqz(fitted[ORDER:], denominator, worN=FREQUENCIES, fs=rate)[1]
+    back = np.exp(-2j * np.pi * FREQUENCIES * delay * (times[1] - times[0]))
+    remembered = np.polyval(np.append(0.0, fitted[:ORDER])[::-1], back)
+    return np.polyval(fitted[ORDER:][::-1], back) / (1.0 - remembered)
 
 
 def weave(motion: Motion) -> dict[str, float]:
@@ -130,10 +130,6 @@ def sine_with_dwell(motion: Motion) -> dict[str, float]:
     turned_back = (times >= reversal) & (times <= end)
     peak = np.max(reversed_rate, where=turned_back, initial=0.0) or np.nan
 
-    def ratio(after: float) -> float:
-        late = np.interp(end + after, times, reversed_rate, right=np.nan)
-        return float(late / peak)
-
     def at(signal: np.ndarray, time: float) -> float:
         return float(np.interp(time, times, signal, right=np.nan))
 
@@ -141,11 +137,8 @@ def sine_with_dwell(motion: Motion) -> dict[str, float]:
     ahead = at(motion.x, then) - at(motion.x, begin)
     aside = at(motion.y, then) - at(motion.y, begin)
     displacement = aside * np.cos(heading) - ahead * np.sin(heading)
-    return {
-        "yaw_rate_ratio_1_s": ratio(RATIO_TIMES[0]),
-        "yaw_rate_ratio_1_75_s": ratio(RATIO_TIMES[1]),
-        "lateral_displacement": float(towards * displacement),
-    }
+    ratios = {name: at(reversed_rate, end + after) / peak for name, after in RATIOS.items()}
+    return ratios | {"lateral_displacement": float(towards * displacement)}
 
 
 def steering_times(motion: Motion) -> tuple[float, float, float]:
