@@ -12,6 +12,7 @@ import numpy as np
 from vehiclemor.arguments import number, quoted, real_array
 from vehiclemor.exceptions import FileError, InputError, one_line
 from vehiclemor.files import NO_FILE
+from vehiclemor.multibody.quantities import integral_of
 from vehiclemor.registry import choice
 
 # Usual separators of columns, to guess the one that is meant.
@@ -118,14 +119,6 @@ def column_names(inputs: Any, columns: int) -> tuple[str, ...]:
     if len(set(names)) < len(names) or len(names) not in (0, columns):
         raise InputError(f"a signal of {columns} columns can't be named {quoted(names)}")
     return names
-
-
-def integral_of(name: str) -> str:
-    """Name of the input whose time derivative has this name, such as s of s_dot; else empty."""
-    base, dot, order = name.rpartition("_")
-    if order == "ddot":
-        return f"{base}_dot"
-    return base if dot and order == "dot" else ""
 
 
 def derivative_order(name: str, inputs: Sequence[str]) -> int:

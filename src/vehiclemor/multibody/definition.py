@@ -13,8 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import line_of_text
 from vehiclemor.exceptions import InputError, did_you_mean
-from vehiclemor.multibody.input_choice import DEFAULTS, InputChoice
-from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.quantities import DEFAULTS, InputChoice, Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr
 
@@ -95,8 +94,8 @@ class ModelDefinition(ShortRepr):
         Name of the nominal maneuver.
     coordinates, speeds, inputs, outputs
         Quantities in order; inputs are those of every run.  A state is the coordinates and, after
-        them, as many speeds; models of kind `ae` have no speeds.  Coordinates of a structure have no
-        names: there are none.
+        them, as many speeds; models of kind `ae` have no speeds.  Coordinates of a structure have
+        no names: there are none.
     equations
         Residual equations with their units (kind `ae`).
     constraints
@@ -148,10 +147,15 @@ class ModelDefinition(ShortRepr):
     validity
         Output or input -> (smallest, largest) value in its unit at which the model means anything.
         A run that leaves that of an output has diverged, an input beyond its range is refused.
+    standstill
+        Outputs that are the forward and the lateral speed: where the first falls below its range
+        and the second is as small, the vehicle has stopped, and the run has not diverged.
     loads
         Outputs that are zero where a wheel has left the road.
     wheelbase
         Parameters -> distance of the axles in m, of a vehicle.
+    slips
+        Outputs that are the slip ratios of the wheels.
     tabled_outputs
         Outputs whose errors are listed in tables, all by default.
     main_outputs
@@ -209,8 +213,10 @@ class ModelDefinition(ShortRepr):
     heading_pairs: tuple[tuple[str, str], ...] = ()
     error_scale: Mapping[str, float] = field(default_factory=dict)
     validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    standstill: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
     wheelbase: Callable[[Values], float] | None = None
+    slips: tuple[str, ...] = ()
     tabled_outputs: tuple[str, ...] = ()
     main_outputs: tuple[str, ...] = ()
 
@@ -263,7 +269,9 @@ class ModelDefinition(ShortRepr):
         self._known("online", self.online, self.parameters)
         inputs = {q.name for q in (*self.inputs, *self.optional_inputs)}
         self._known("validity", self.validity, outputs | inputs)
+        self._known("standstill", self.standstill, outputs)
         self._known("loads", self.loads, outputs)
+        self._known("slips", self.slips, outputs)
         self._known("tabled_outputs", self.tabled_outputs, outputs)
         self._known("main_outputs", self.main_outputs, self.tabled_outputs or outputs)
 

@@ -2,45 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from vehiclemor.exceptions import InputError, did_you_mean
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.quantities import InputChoice, integral_of
 from vehiclemor.parameters import Declared
-
-if TYPE_CHECKING:
-    from vehiclemor.multibody.definition import ModelDefinition
-
-
-@dataclass(frozen=True)
-class InputChoice:
-    """Optional inputs of a run in declared order; those in neither tuple are their defaults.
-
-    Attributes
-    ----------
-    driven
-        Inputs that change with time.
-    constant
-        Inputs whose values are parameters of the model.
-    """
-
-    driven: tuple[str, ...] = ()
-    constant: tuple[str, ...] = ()
-
-
-DEFAULTS = InputChoice()
 
 
 def driving(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinition:
-    """The declaration whose inputs are those of every run, and the optional ones among the names.
+    """The declaration with the optional inputs among these names as inputs too.
 
-    Optional inputs that were parameters stay parameters if they are not named.
+    With the height of a road its rate is driven.  What was a parameter is none any more.
     """
-    names = set(names)
-    constant = (name for name in definition.choice.constant if name not in names)
-    return _chosen(definition, _ordered(definition, names), _ordered(definition, constant))
+    named = {*names}
+    driven = {*definition.choice.driven, *named}
+    driven |= {q.name for q in definition.optional_inputs if integral_of(q.name) in named}
+    constant = {*definition.choice.constant} - driven
+    return _chosen(definition, _ordered(definition, driven), _ordered(definition, constant))
+
+
+def with_overrides(definition: ModelDefinition, overrides: Mapping[str, object]) -> ModelDefinition:
+    """The declaration with the optional inputs as parameters for which there are values."""
+    names = {quantity.name for quantity in definition.optional_inputs}
+    return with_constants(definition, names.intersection(overrides))
 
 
 def with_constants(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinition:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import real_array
+from vehiclemor.arguments import quoted, real_array
 from vehiclemor.codegen.kernels import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.exceptions import GeometryError, InputError, VehiclemorError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
-from vehiclemor.multibody.input_choice import DEFAULTS, driving, with_constants
+from vehiclemor.multibody.input_choice import driving, with_constants, with_overrides
+from vehiclemor.multibody.quantities import DEFAULTS
 from vehiclemor.parameters import (
     ParameterSet,
     load_parameters,
@@ -49,36 +50,45 @@ def build(
     name: str,
     parameter_file: Path | None = None,
     overrides: Mapping[str, object] | None = None,
+    *,
+    constant_inputs: Mapping[str, object] | None = None,
     driven: Iterable[str] = (),
 ) -> Model:
     """Derive (or fetch), compile and parametrise a registered model.
 
     The parameter file is the registered one by default, overrides are values in SI units by name,
-    of parameters and of optional inputs that are constant.  Runs drive the inputs `driven`.
-    `InputError` if a name or an override is wrong; another `VehiclemorError` if the parameters
-    can't be read, or the model can't be assembled from them or can't stand.
+    of parameters and of optional inputs that are constant.  Constant inputs are such values too;
+    runs drive the optional inputs `driven`.  `InputError` if a name or an override is wrong;
+    another `VehiclemorError` if the parameters can't be read, or the model can't be assembled from
+    them or can't stand.
     """
     definition: ModelDefinition = driving(component("model", name), driven)
-    definition = with_constants(definition, _optional(definition, overrides or {}))
+    inputs = {} if constant_inputs is None else constant_inputs
+    if not isinstance(inputs, Mapping):
+        raise InputError(f"inputs must be a mapping of values by name, not {quoted(inputs)}")
+    definition = with_constants(definition, inputs)
+    if isinstance(overrides, Mapping):
+        definition = with_overrides(definition, overrides)
+        overrides = {**overrides, **inputs}
     path = parameter_file or definition.parameter_file
-    parameters = load_parameters(name, definition.parameters, path, overrides)
+    parameters = load_parameters(name, definition.parameters, path, overrides or inputs)
     with first_use(name):
         return _made(definition, parameters)
 
 
 def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
     """The model with some of its parameters changed: name -> value in SI units; see `build`."""
-    definition = with_constants(model.definition, _optional(model.definition, overrides))
+    definition = with_overrides(model.definition, overrides)
     if definition is not model.definition:
         return _with_definition(model, definition, overrides)
     parameters = overridden(model.parameters, definition.parameters, overrides)
     return _made(definition, parameters, (model.equations, model.kernel_hash))
 
 
-def with_inputs(model: Model, names: Iterable[str]) -> Model:
-    """The model whose runs drive these of its optional inputs, and no others."""
-    definition = driving(model.definition, names)
-    return model if definition is model.definition else _with_definition(model, definition)
+@lru_cache(maxsize=64)
+def _rebuilt(model: Model, definition: ModelDefinition) -> Model:
+    """The model with the inputs of another declaration of it."""
+    return _with_definition(model, definition)
 
 
 def _with_definition(
@@ -88,12 +98,6 @@ def _with_definition(
     parameters = with_entries(model.parameters, definition.parameters, overrides or {})
     with first_use(model.name):
         return _made(definition, parameters)
-
-
-def _optional(definition: ModelDefinition, overrides: Mapping[str, object]) -> set[str]:
-    """Optional inputs among the names of overrides that are no parameters yet."""
-    optional = {quantity.name for quantity in definition.optional_inputs}
-    return optional.intersection(overrides).difference(definition.parameters)
 
 
 def _made(
@@ -122,7 +126,7 @@ def _made(
         near = [_near(definition, flat, equations, digest)]
     _check_states(definition, initial)
     constants = hoisted_constants(equations, flat, solved)
-    return make(definition, equations, parameters, digest, constants, initial, *near)
+    return make(definition, equations, parameters, digest, constants, initial, _rebuilt, *near)
 
 
 def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:

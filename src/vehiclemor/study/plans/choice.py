@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from vehiclemor.simulation.trajectory import FINISHED
+from vehiclemor.simulation.trajectory import FINISHED, WITHOUT_COMPLAINT
 from vehiclemor.study.experiment import Settings
 from vehiclemor.study.plans.protocol import Entry, Protocol
 from vehiclemor.study.plans.study_file import Bound
@@ -119,8 +119,9 @@ def outcomes(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> Outcomes:
     """Outcomes of a row in its scenarios."""
     multiples, status = scores(dataset, bounds), dataset["status"].values
     missed = ~(multiples <= 1.0)
-    warned = (status != "ok") | np.isfinite(dataset["trusted_until"].values)
-    return Outcomes(multiples, missed, warned, missed & (status == "ok"))
+    complete = np.isin(status, WITHOUT_COMPLAINT)
+    warned = ~complete | np.isfinite(dataset["trusted_until"].values)
+    return Outcomes(multiples, missed, warned, missed & complete)
 
 
 def choose(results: Sequence[Validation]) -> int:

@@ -13,8 +13,8 @@ from typing import TypeVar
 import numpy as np
 
 from vehiclemor.exceptions import FileError, GeometryError, InputError, PlugInError
+from vehiclemor.files import data_names
 from vehiclemor.registry import choice
-from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
