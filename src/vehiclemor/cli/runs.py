@@ -152,8 +152,10 @@ def metrics(
     speed: float | None = None,
     amplitude: float = 1.0,
     json_output: Json = False,
-) -> None:
+) -> int:
     """Print the numbers of the standards: how a vehicle handles, full and reduced side by side.
+
+    The exit status is 1 where a run has not come to its end, or does not reach what a number needs.
 
     Parameters
     ----------
@@ -181,13 +183,14 @@ def metrics(
         models[SHIPPED] = vm.rom(model)
     elif method is not None:
         models[method] = vm.reduce(model, method)
-    rows = handling_rows(models, maneuver or (), amplitude)
+    rows = pd.DataFrame(handling_rows(models, maneuver or (), amplitude))
     if json_output:
-        print(json_text(pd.DataFrame(rows)))
+        print(json_text(rows))
     else:
         columns = {name: Column(name) for name in ("number", "unit")}
         columns |= {name: Column(name, ".4g") for name in models}
         print(Table(rows, columns, group="test"))
+    return FAILED if bool(rows[[*models]].isna().to_numpy().any()) else 0
 
 
 def plot(

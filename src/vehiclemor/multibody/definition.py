@@ -152,10 +152,10 @@ class ModelDefinition(ShortRepr):
         and the second is as small, the vehicle has stopped, and the run has not diverged.
     loads
         Outputs that are zero where a wheel has left the road.
-    wheelbase
-        Parameters -> distance of the axles in m, of a vehicle.
     slips
         Outputs that are the slip ratios of the wheels.
+    wheelbase
+        Parameters -> distance of the axles in m, of a vehicle.
     tabled_outputs
         Outputs whose errors are listed in tables, all by default.
     main_outputs
@@ -215,8 +215,8 @@ class ModelDefinition(ShortRepr):
     validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     standstill: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
-    wheelbase: Callable[[Values], float] | None = None
     slips: tuple[str, ...] = ()
+    wheelbase: Callable[[Values], float] | None = None
     tabled_outputs: tuple[str, ...] = ()
     main_outputs: tuple[str, ...] = ()
 

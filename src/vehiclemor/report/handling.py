@@ -54,11 +54,13 @@ def handling_rows(
         maneuver = registered(name).perturbed(amplitude=amplitude)
         runs = {key: model.simulate(maneuver, full.start()) for key, model in models.items()}
         remarks = [f"{key}: {run.message}" for key, run in runs.items() if run.message]
-        numbers = {key: _values(metrics(run)) for key, run in runs.items() if run.finished}
-        test = "; ".join([f"{name} ({standard})", *remarks])
-        units = {number: unit for each in numbers.values() for number, (unit, _) in each.items()}
-        for number, unit in units.items():
-            columns = {key: numbers[key][number][1] if key in numbers else np.nan for key in models}
+        numbers = {key: metrics(run) for key, run in runs.items() if run.finished}
+        speed = [f"from {float(each['speed']):.4g} m/s" for each in numbers.values()][:1]
+        test = "; ".join([f"{name} ({standard})", *speed, *remarks])
+        values = {key: _values(each) for key, each in numbers.items()}
+        units = {number: unit for each in values.values() for number, (unit, _) in each.items()}
+        for number, unit in (units or {"no numbers": ""}).items():
+            columns = {key: values[key][number][1] if key in values else np.nan for key in models}
             rows.append({"test": test, "number": number, "unit": unit} | columns)
     return rows
 
@@ -66,7 +68,7 @@ def handling_rows(
 def _values(numbers: xr.Dataset) -> dict[str, tuple[str, float]]:
     """Name of a number -> unit and value, with its frequency if it has one."""
     values: dict[str, tuple[str, float]] = {}
-    for key, number in numbers.data_vars.items():
+    for key, number in numbers.drop_vars("speed").data_vars.items():
         name, unit = str(key).replace("_", " "), str(number.attrs["units"])
         if number.dims:
             for hertz in PRINTED:

@@ -218,8 +218,8 @@ DEFINITION = ModelDefinition(
     },
     standstill=STANDSTILL,
     loads=TIRE_LOADS,
-    wheelbase=lambda p: wheel_places(p)[0][0] - wheel_places(p)[1][0],
     slips=SLIP_RATIOS,
+    wheelbase=lambda p: wheel_places(p)[0][0] - wheel_places(p)[1][0],
     tabled_outputs=(
         "lateral_speed",
         "vertical_speed",

@@ -129,8 +129,8 @@ DEFINITION = ModelDefinition(
     },
     standstill=STANDSTILL,
     loads=TIRE_LOADS,
-    wheelbase=lambda p: p["front_axle_distance"] + p["rear_axle_distance"],
     slips=SLIP_RATIOS,
+    wheelbase=lambda p: p["front_axle_distance"] + p["rear_axle_distance"],
     tabled_outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
     main_outputs=("pitch", "yaw", "lateral_position"),
 )
