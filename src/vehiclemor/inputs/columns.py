@@ -18,7 +18,8 @@ from vehiclemor.registry import choice
 # Usual separators of columns, to guess the one that is meant.
 SEPARATORS = ",;\t| "
 # Units of logged inputs -> SI.
-UNITS = {"SI": 1.0, "deg": np.pi / 180.0, "mm": 1e-3}
+UNITS = {"SI": 1.0, "rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "mm": 1e-3}
+UNITS |= {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "s": 1.0, "ms": 1e-3}
 
 
 def csv_samples(
@@ -62,9 +63,9 @@ def csv_samples(
     table.columns = table.columns.astype(str)
     columns = inputs if isinstance(inputs, Mapping) else {name: name for name in listed(inputs)}
     columns = columns or {name: name for name in table if name != time}
-    for name in listed([time, *columns.values()]):
+    options = [*columns] if isinstance(inputs, Mapping) else ["inputs"] * len(columns)
+    for option, name in zip(["time", *options], listed([time, *columns.values()]), strict=True):
         if name not in table:
-            option = "time" if name == time else "inputs"
             known = f"set {option}= to one of {', '.join(table)}"
             raise InputError(f"{path}: there is no column {quoted(name)}: {known}")
         if table[name].dtype.kind not in "iuf":

@@ -273,7 +273,7 @@ class Signal(Excitation):
         inputs
             Columns to take, or input -> column where they have other names; all by default.
         unit
-            Of these columns: `SI`, `deg` or `mm`.
+            Of these columns: `SI`, `rad`, `deg`, `m`, `mm`, `m/s`, `km/h`, `mph`.
         ratio
             Divides them, as a steering ratio does the angle of a steering wheel.
         hold, output_step, name

@@ -141,10 +141,7 @@ def _row(label: str, part: xr.Dataset, bounds: Bounds) -> dict[str, Any]:
     return {
         "kind": "method",
         "label": label,
-        "runs": len(ends.scores),
-        "misses": int(ends.missed.sum()),
-        "silent": int(ends.undetected.sum()),
-        "flagged": int(ends.warned.sum()),
+        **ends.counts,
         "score": float(ends.scores.max()),
         "median_score": float(np.median(ends.scores)),
         "output": max(worst, key=lambda name: worst[name]),

@@ -114,6 +114,17 @@ class Outcomes(NamedTuple):
     warned: np.ndarray
     undetected: np.ndarray
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many runs there are, and of these how many are right, and so on."""
+        return {
+            "runs": len(self.scores),
+            "right": int((~self.missed).sum()),
+            "misses": int(self.missed.sum()),
+            "silent": int(self.undetected.sum()),
+            "flagged": int(self.warned.sum()),
+        }
+
 
 def outcomes(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> Outcomes:
     """Outcomes of a row in its scenarios."""
