@@ -371,7 +371,8 @@ def plot(
     *beside
         The full-order run of the same input, to be drawn with the run; or the kind.
     kind
-        `histories` of outputs, `paths`, or `errors`.
+        `histories` of outputs, `paths`, `errors`; of a sweep `frequency_response`, or
+        `sine_with_dwell`.
     out
         Picture to write (PNG, SVG or PDF).
     results

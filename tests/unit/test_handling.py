@@ -219,6 +219,23 @@ def test_reduced_vehicles_have_the_numbers_of_the_full_ones(name, prefix):
         assert float(value) == pytest.approx(float(full[number]), rel=1e-3), number
 
 
+def test_pictures_show_the_numbers_of_both_models():
+    model, rom = vm.model(CAR), vm.rom(CAR)
+    full, reduced = (each.simulate(vm.maneuver("sine_sweep")) for each in (model, rom))
+    panels = vm.plot(reduced, full, kind="frequency_response").axes
+    for line, run in zip(panels[0].lines, (full, reduced), strict=True):
+        np.testing.assert_allclose(line.get_ydata(), vm.metrics(run)["yaw_rate_gain"])
+    phase = np.degrees(vm.metrics(full)["lateral_acceleration_phase"])
+    np.testing.assert_allclose(panels[3].lines[0].get_ydata(), phase)
+    run = model.simulate(vm.maneuver("sine_with_dwell"))
+    lower = vm.plot(run, kind="sine_with_dwell").axes[1]
+    history, *_, late = lower.lines
+    np.testing.assert_allclose(history.get_ydata(), run["yaw_rate"])
+    # The mark stands 1.75 s after the end, which is at 2.93 s, at 20 % of the second peak.
+    assert late.get_xdata()[0] == pytest.approx(1.0 + 1.0 / 0.7 + 0.5 + 1.75, abs=0.02)
+    assert late.get_ydata()[0] == pytest.approx(0.2 * run["yaw_rate"].min(), rel=0.01)
+
+
 def test_what_has_no_numbers_is_refused():
     run = run_of(TIMES, 0.01 * ONES, "lane_change")
     refused(lambda: vm.metrics(run), "lane_change", "step_steer")
