@@ -10,31 +10,31 @@ import numpy as np
 from vehiclemor.exceptions import InputError
 from vehiclemor.handling.metrics import RACK, TESTS, metrics, standard_of, test_of
 from vehiclemor.inputs.maneuver import registered
-from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import names
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from vehiclemor.reduction.reduced_model import ReducedOrderModel
+    from vehiclemor.simulation.model import Model
 
 # Hz: frequencies of a response that are printed.
 PRINTED = (0.5, 1.0)
 
 
-def maneuvers_of(definition: ModelDefinition) -> list[str]:
-    """Registered maneuvers with numbers, whose inputs a model has; `InputError` if there are none.
+def maneuvers_of(full: Model, reduced: Iterable[ReducedOrderModel]) -> list[str]:
+    """Registered maneuvers with numbers, whose inputs all models have, in the order of the tests.
 
-    In the order of the tests.
+    The full model has its optional inputs too.  `InputError` if there are none.
     """
-    inputs = {quantity.name for quantity in (*definition.inputs, *definition.optional_inputs)}
+    definition = full.definition
+    every = (*definition.inputs, *definition.optional_inputs)
+    shared = {quantity.name for quantity in every}.intersection(*(r.inputs for r in reduced))
     known = {*names("maneuver")}
     wanted = [name for test in TESTS for name in (test, RACK + test) if name in known]
-    fitting = [name for name in wanted if inputs.issuperset(registered(name).inputs)]
+    fitting = [name for name in wanted if shared.issuperset(registered(name).inputs)]
     if not fitting:
-        raise InputError(
-            f"{definition.name} is no vehicle of the handling tests: {', '.join(TESTS)}"
-        )
+        raise InputError(f"{full.name} is no vehicle of the handling tests: {', '.join(TESTS)}")
     return fitting
 
 
@@ -44,10 +44,11 @@ def handling_rows(
     """A row for each number, with a column for each model by its name.
 
     The first model is the full one: all runs start from its state, and by default all maneuvers are
-    taken whose inputs it has.
+    taken whose inputs all models have.
     """
-    full = next(iter(models.values())).model
-    chosen = list(maneuvers) or maneuvers_of(full.definition)
+    first, *reduced = models.values()
+    full = first.model
+    chosen = list(maneuvers) or maneuvers_of(full, reduced)
     standards = {name: standard_of(test_of(name)) for name in chosen}
     rows: list[dict[str, Any]] = []
     for name, standard in standards.items():
