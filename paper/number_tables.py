@@ -170,9 +170,12 @@ def settings(model: str, dataset: xr.Dataset) -> Iterator[Entry]:
 
 
 def protocol(dataset: xr.Dataset) -> Iterator[Entry]:
-    """Methods and integrators on unseen inputs; the chosen method is `chosen` too."""
+    """Methods and integrators on unseen inputs; the chosen method is `chosen` too; by maneuver."""
     head = dataset.attrs["study"].split("-", 1)
     for row in protocol_rows(dataset):
+        if row["kind"] == "count":
+            counts = ("runs", "right", "misses", "silent", "flagged", "apart")
+            yield from ((slug(*head, row["item"], row["label"], n), row[n]) for n in counts)
         if row["kind"] == "method":
             for label in [row["label"]] + ["chosen"] * row["winner"]:
                 yield from ((slug(*head, label, name), value) for name, value in row.items())
@@ -264,5 +267,5 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
     yield "figure-14-spread", partial(spread, "figure-14-spread")
     yield "truck-ranks", partial(grid, "truck.ranks", worst_of_truck)
     yield "size", sizes
-    for kind, model in product(("predictive", "contenders"), names("model")):
+    for kind, model in product(("predictive", "contenders", "logs"), names("model")):
         yield f"{kind}-{model}", protocol

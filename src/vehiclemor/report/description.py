@@ -17,6 +17,7 @@ from vehiclemor.registry import component, names, unknown
 from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build_derived
 from vehiclemor.study.plans.loading import is_study, load_studies, read_study, study_path
+from vehiclemor.study.plans.logs import LogGroup
 from vehiclemor.study.plans.study_file import (
     SETS,
     CollectionFile,
@@ -26,7 +27,7 @@ from vehiclemor.study.plans.study_file import (
     SizeFile,
     StudyFile,
 )
-from vehiclemor.study.plans.study_runs import values
+from vehiclemor.study.plans.study_runs import Group, values
 from vehiclemor.toml_files import read_toml
 
 Description = dict[str, Any]
@@ -245,6 +246,7 @@ def _grid(study: GridFile) -> Description:
         "starts": study.start or ["the model's first"],
         "training": study.trained_on,
         "parameters": _listed(study.parameters),
+        "logs": [log.log for log in study.logs],
         "grid points": study.points,
         "keeps": study.keep,
         "grid": grid,
@@ -253,7 +255,9 @@ def _grid(study: GridFile) -> Description:
 
 def _sets(study: ProtocolFile) -> Description:
     """What a study with bounds trains, chooses by and tests; scenarios are counted."""
-    counted = {s: sum(g.scenarios for g in getattr(study, s)) for s in SETS}
+    parts = {s: getattr(study, s) for s in SETS}
+    counted = {s: sum(p.scenarios for p in parts[s] if isinstance(p, Group)) for s in SETS}
+    logs = [(s, part) for s in SETS for part in parts[s] if isinstance(part, LogGroup)]
     counted |= {name.replace("_", " "): draw.runs for name, draw in study.draws.items()}
     return {
         "runs": [f"{count} {purpose}" for purpose, count in counted.items() if count],
@@ -263,6 +267,7 @@ def _sets(study: ProtocolFile) -> Description:
             {"output": output, "measure": b.measure, "bound": b.bound, "reason": b.reason}
             for output, b in study.bounds.items()
         ],
+        "logs": [{"set": s, "log": log.log, "window": f"{log.window:g} s"} for s, log in logs],
     }
 
 

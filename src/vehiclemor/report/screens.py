@@ -325,13 +325,13 @@ def _protocol_parts(rows: Mapping[str, list[Row]], explain: bool) -> list[Part]:
 
 
 def counts_text(dataset: xr.Dataset) -> str:
-    """How many runs of each method are right, warned and so on: of all, by maneuver or log."""
+    """How many runs of each method are right, warned and so on, by maneuver or log."""
     rows = protocol_rows(dataset)
-    methods = [row | {"item": "all"} for row in rows if row["kind"] == "method"]
-    every = [row for row in methods if row["role"] != FULL_ORDER]
+    every = [row | {"item": "all"} for row in rows if row["kind"] == "method"]
+    every = [row for row in every if row["role"] != FULL_ORDER]
     every += [row for row in rows if row["kind"] == "count"]
-    columns = ("label", "runs", "right", "flagged", "misses", "silent")
-    return str(Table(every, columns, group="item"))
+    columns = ("item", "runs", "right", "flagged", "misses", "silent", "apart")
+    return str(Table(every, columns, group="label"))
 
 
 def _winner_parts(

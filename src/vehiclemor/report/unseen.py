@@ -10,7 +10,7 @@ would stand in for it.
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby, pairwise
+from itertools import groupby, pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -112,15 +112,16 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
 
 
 def count_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> Iterator[Row]:
-    """How many runs of each reduced model are right, warned and so on: of each maneuver or log."""
+    """How many runs of each reduced model are right, warned and so on, by maneuver or log."""
+    sets = dataset["scenario_set"].values
+    tested = dataset.isel(scenario=sets == judged_set(set(sets)))
     part = judged_part(dataset)
-    part = part.isel(label=part["role"].values != FULL_ORDER)
-    driven = part["maneuver"].values
-    for name in dict.fromkeys(driven):
-        for label in part["label"].values:
-            runs = part.sel(label=label).isel(scenario=driven == name)
-            counts = outcomes(runs, protocol.bounds).counts
-            yield {"kind": "count", "item": name, "label": str(label), **counts}
+    reduced = part["label"].values[part["role"].values != FULL_ORDER]
+    for label, name in product(reduced, dict.fromkeys(tested["maneuver"].values)):
+        runs = part.sel(label=label).isel(scenario=part["maneuver"].values == name)
+        counts = outcomes(runs, protocol.bounds).counts
+        apart = int((tested["maneuver"] == name).sum()) - counts["runs"]
+        yield {"kind": "count", "item": name, "label": str(label), **counts, "apart": apart}
 
 
 def _chosen_settings(candidates: list[Row]) -> str:

@@ -281,7 +281,7 @@ class ProtocolFile(StudyOfModel):
     )
     sensitive: dict[str, Limit] = table_of(
         "output -> largest value of the full order's run in the first 10 s; beyond it "
-        "(spin, rollover) a drawn run is not judged"
+        "(spin, rollover) a drawn or measured run is not judged"
     )
     targets: list[SpeedTarget] = list_of("speed that is aimed at")
     failure_rate: float | None = Field(
