@@ -55,7 +55,7 @@ def _summaries(kind: str) -> dict[str, str]:
 
 def studies() -> dict[str, str]:
     """Studies that come with the package: name -> one line."""
-    from vehiclemor.resources import data_names
+    from vehiclemor.files import data_names
     from vehiclemor.study.plans.loading import read_study, study_path
 
     return {name: read_study(study_path(name)).title for name in data_names("studies")}

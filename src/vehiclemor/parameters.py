@@ -11,7 +11,7 @@ from pydantic import Field
 
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.exceptions import FileError, InputError, did_you_mean
-from vehiclemor.resources import data_folder
+from vehiclemor.files import data_folder
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.toml_files import FileSchema, Line, read_toml
 

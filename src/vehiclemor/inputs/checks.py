@@ -64,11 +64,19 @@ def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
         )
     if len(outside):
         j = outside[since[outside].argmin()]
-        name, unit = definition.inputs[j].name, definition.inputs[j].unit
-        value = maneuver.at(since[j : j + 1])[0, j]
+        quantity, value = definition.inputs[j], maneuver.at(since[j : j + 1])[0, j]
+        unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+        said = f"is {value:.4g}{unit} at t = {since[j]:.6g} s"
+        if low[j] <= value <= high[j]:
+            # It only just leaves there.
+            extent = maneuver.extent
+            value = extent.low[j] if extent.low[j] < low[j] else extent.high[j]
+            said = f"reaches {value:.4g}{unit} after t = {since[j]:.6g} s"
+        cubic = isinstance(maneuver, Signal) and maneuver.hold == "cubic"
+        hint = "; a cubic hold overshoots its samples, a linear one does not" if cubic else ""
         raise InputError(
-            f"{maneuver}: input {name} is {value:.4g} {unit} at t = {since[j]:.6g} s; "
-            f"{definition.name} holds from {low[j]:g} to {high[j]:g} {unit}"
+            f"{maneuver}: input {quantity.name} {said}; "
+            f"{definition.name} holds from {low[j]:g} to {high[j]:g}{unit}{hint}"
         )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from vehiclemor.arguments import number, quoted, real_array
 from vehiclemor.exceptions import FileError, InputError, one_line
 from vehiclemor.files import NO_FILE
-from vehiclemor.multibody.input_choice import integral_of
+from vehiclemor.multibody.quantities import integral_of
 from vehiclemor.registry import choice
 
 # Usual separators of columns, to guess the one that is meant.

@@ -31,7 +31,7 @@ from vehiclemor.inputs.excitation import (
 )
 from vehiclemor.inputs.polynomial_loops import Pieces
 from vehiclemor.inputs.polynomials import fitted_pieces
-from vehiclemor.multibody.input_choice import integral_of
+from vehiclemor.multibody.quantities import integral_of
 from vehiclemor.registry import component
 
 MOST_CORNERS = 10_000

@@ -31,7 +31,7 @@ from vehiclemor.inputs.excitation import (
 )
 from vehiclemor.inputs.interpolation import HOLDS, interpolants, time_derivative
 from vehiclemor.inputs.polynomial_loops import Pieces
-from vehiclemor.multibody.input_choice import integral_of
+from vehiclemor.multibody.quantities import integral_of
 from vehiclemor.registry import choice
 
 # Time (s) between output times, as of the registered maneuvers of vehicles.

@@ -13,8 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import line_of_text
 from vehiclemor.exceptions import InputError, did_you_mean
-from vehiclemor.multibody.input_choice import DEFAULTS, InputChoice
-from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.quantities import DEFAULTS, InputChoice, Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr
 
@@ -155,6 +154,8 @@ class ModelDefinition(ShortRepr):
         Outputs that are zero where a wheel has left the road.
     slips
         Outputs that are the slip ratios of the wheels.
+    wheelbase
+        Parameters -> distance of the axles in m, of a vehicle.
     tabled_outputs
         Outputs whose errors are listed in tables, all by default.
     main_outputs
@@ -215,6 +216,7 @@ class ModelDefinition(ShortRepr):
     standstill: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
     slips: tuple[str, ...] = ()
+    wheelbase: Callable[[Values], float] | None = None
     tabled_outputs: tuple[str, ...] = ()
     main_outputs: tuple[str, ...] = ()
 

@@ -3,34 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from vehiclemor.exceptions import InputError, did_you_mean
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.quantities import InputChoice, integral_of
 from vehiclemor.parameters import Declared
-
-if TYPE_CHECKING:
-    from vehiclemor.multibody.definition import ModelDefinition
-
-
-@dataclass(frozen=True)
-class InputChoice:
-    """Optional inputs of a run in declared order; those in neither tuple are their defaults.
-
-    Attributes
-    ----------
-    driven
-        Inputs that change with time.
-    constant
-        Inputs whose values are parameters of the model.
-    """
-
-    driven: tuple[str, ...] = ()
-    constant: tuple[str, ...] = ()
-
-
-DEFAULTS = InputChoice()
 
 
 def driving(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinition:
@@ -62,14 +41,6 @@ def with_constants(definition: ModelDefinition, names: Iterable[str]) -> ModelDe
     constant = {*definition.choice.constant, *names}
     driven = (name for name in definition.choice.driven if name not in constant)
     return _chosen(definition, _ordered(definition, driven), _ordered(definition, constant))
-
-
-def integral_of(name: str) -> str:
-    """Name of the input whose time derivative has this name, such as s of s_dot; else empty."""
-    base, dot, order = name.rpartition("_")
-    if order == "ddot":
-        return f"{base}_dot"
-    return base if dot and order == "dot" else ""
 
 
 def _ordered(definition: ModelDefinition, names: Iterable[str]) -> tuple[str, ...]:

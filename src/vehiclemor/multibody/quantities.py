@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import GeometryError
+from vehiclemor.files import data_folder
 from vehiclemor.parameters import Declared
-from vehiclemor.resources import data_folder
 from vehiclemor.toml_files import toml_content
 
 
@@ -28,11 +28,41 @@ class Quantity:
     default: float | None = None
 
 
+@dataclass(frozen=True)
+class InputChoice:
+    """Optional inputs of a run in declared order; those in neither tuple are their defaults.
+
+    Attributes
+    ----------
+    driven
+        Inputs that change with time.
+    constant
+        Inputs whose values are parameters of the model.
+    """
+
+    driven: tuple[str, ...] = ()
+    constant: tuple[str, ...] = ()
+
+
+DEFAULTS = InputChoice()
+
+
+def integral_of(name: str) -> str:
+    """Name of the input whose time derivative has this name, such as s of s_dot; else empty."""
+    base, dot, order = name.rpartition("_")
+    if order == "ddot":
+        return f"{base}_dot"
+    return base if dot and order == "dot" else ""
+
+
 # Front left, front right, rear left, rear right.
 WHEELS = ("FL", "FR", "RL", "RR")
 
 # Outputs that are zero where a wheel has left the road.
 TIRE_LOADS = tuple(f"Fz_{wheel}" for wheel in WHEELS)
+SLIP_RATIOS = tuple(f"slip_ratio_{wheel}" for wheel in WHEELS)
+# Outputs that are zero where a vehicle has come to rest.
+STANDSTILL = ("longitudinal_speed", "lateral_speed")
 # Bounds beyond which the models mean nothing: of the longitudinal speed, and of the attitude.
 FORWARD = (0.5, math.inf)
 UPRIGHT = {"roll": (-1.2, 1.2), "pitch": (-1.2, 1.2)}

@@ -17,10 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, flag
-from vehiclemor.array_shapes import require
+from vehiclemor.arguments import file_path, flag, require
 from vehiclemor.exceptions import FileError, InputError, VehiclemorError, one_line
-from vehiclemor.files import replaceable
+from vehiclemor.files import data_folder, replaceable
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.netcdf_file import INTEGRITY, is_saved_model, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
@@ -30,7 +29,6 @@ from vehiclemor.reduction.training import training_summary
 from vehiclemor.reduction.trust import BANDS, InputRange
 from vehiclemor.reduction.validation import checked_fit, checked_settings, validated
 from vehiclemor.registry import component
-from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model

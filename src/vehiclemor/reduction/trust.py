@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vehiclemor.array_shapes import check_shapes, require
+from vehiclemor.arguments import check_shapes, require
 from vehiclemor.inputs.checks import completed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.simulation.model import Model

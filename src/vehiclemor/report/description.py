@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from vehiclemor.files import data_names
 from vehiclemor.inputs.excitation import FACTORS
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.multibody.input_choice import with_overrides
@@ -14,10 +15,9 @@ from vehiclemor.reduction.interface import never_refused
 from vehiclemor.reduction.model_file import training_of
 from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.registry import component, names, unknown
-from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build_derived
 from vehiclemor.study.plans.loading import is_study, load_studies, read_study, study_path
-from vehiclemor.study.plans.logs import LogGroup
+from vehiclemor.study.plans.logs import Log
 from vehiclemor.study.plans.study_file import (
     SETS,
     CollectionFile,
@@ -27,7 +27,7 @@ from vehiclemor.study.plans.study_file import (
     SizeFile,
     StudyFile,
 )
-from vehiclemor.study.plans.study_runs import Group, values
+from vehiclemor.study.plans.study_runs import values
 from vehiclemor.toml_files import read_toml
 
 Description = dict[str, Any]
@@ -255,19 +255,18 @@ def _grid(study: GridFile) -> Description:
 
 def _sets(study: ProtocolFile) -> Description:
     """What a study with bounds trains, chooses by and tests; scenarios are counted."""
-    parts = {s: getattr(study, s) for s in SETS}
-    counted = {s: sum(p.scenarios for p in parts[s] if isinstance(p, Group)) for s in SETS}
-    logs = [(s, part) for s in SETS for part in parts[s] if isinstance(part, LogGroup)]
+    counted = {s: sum(g.scenarios for g in getattr(study, s)) for s in SETS}
+    logs = [part.log for s in SETS for part in getattr(study, s) if isinstance(part, Log)]
     counted |= {name.replace("_", " "): draw.runs for name, draw in study.draws.items()}
     return {
         "runs": [f"{count} {purpose}" for purpose, count in counted.items() if count],
+        "logs": [*dict.fromkeys(logs)],
         "seed": study.seed,
         "version": study.version,
         "bounds": [
             {"output": output, "measure": b.measure, "bound": b.bound, "reason": b.reason}
             for output, b in study.bounds.items()
         ],
-        "logs": [{"set": s, "log": log.log, "window": f"{log.window:g} s"} for s, log in logs],
     }
 
 

@@ -15,7 +15,8 @@ from vehiclemor.codegen.kernels import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.exceptions import GeometryError, InputError, VehiclemorError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
-from vehiclemor.multibody.input_choice import DEFAULTS, driving, with_constants, with_overrides
+from vehiclemor.multibody.input_choice import driving, with_constants, with_overrides
+from vehiclemor.multibody.quantities import DEFAULTS
 from vehiclemor.parameters import (
     ParameterSet,
     load_parameters,
@@ -84,13 +85,9 @@ def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
     return _made(definition, parameters, (model.equations, model.kernel_hash))
 
 
-def with_inputs(model: Model, names: Iterable[str]) -> Any:
-    """The model whose runs drive the optional inputs among these names too, cached."""
-    return _driven(model, driving(model.definition, names))
-
-
 @lru_cache(maxsize=64)
-def _driven(model: Model, definition: ModelDefinition) -> Model:
+def _rebuilt(model: Model, definition: ModelDefinition) -> Model:
+    """The model with the inputs of another declaration of it."""
     return _with_definition(model, definition)
 
 
@@ -129,7 +126,7 @@ def _made(
         near = [_near(definition, flat, equations, digest)]
     _check_states(definition, initial)
     constants = hoisted_constants(equations, flat, solved)
-    return make(definition, equations, parameters, digest, constants, initial, *near)
+    return make(definition, equations, parameters, digest, constants, initial, _rebuilt, *near)
 
 
 def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:

@@ -10,7 +10,7 @@ from vehiclemor.arguments import loop_array, number, quoted, within
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.input_choice import DEFAULTS
+from vehiclemor.multibody.quantities import DEFAULTS
 
 LARGEST = sys.float_info.max
 # Slip ratio beyond which the longitudinal force of a tire falls: the wheel locks or spins.

@@ -276,6 +276,7 @@ class DynamicModel(Model):
             "trust": trust,
             "names": self.outputs,
             "model": self,
+            "maneuver": "" if maneuver is None else maneuver.name,
         }
         if outputs not in (None, self.outputs) and not message:
             histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]

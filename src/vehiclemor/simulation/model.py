@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -17,6 +17,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.input_choice import driving
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
@@ -57,6 +58,8 @@ class Model(ShortRepr):
         Hoisted constants of the parameter set.
     initial
         Start -> state (n,); the default first.
+    rebuilt
+        (model, declaration) -> the model with another choice of inputs, cached.
     """
 
     repr_fields = ("name", "kind", "coordinates", "inputs", "outputs", "starts")
@@ -67,6 +70,7 @@ class Model(ShortRepr):
     kernel_hash: str
     constants: np.ndarray
     initial: Mapping[str, np.ndarray]
+    rebuilt: Callable[[Any, ModelDefinition], Any] | None = None
 
     def __post_init__(self) -> None:
         """Methods share it: what a plug-in writes into it is refused."""
@@ -155,11 +159,10 @@ class Model(ShortRepr):
 
     def driving(self, names: Iterable[str]) -> Self:
         """The model whose runs drive the optional inputs among these names too, cached."""
-        if self._undriven.isdisjoint(names := [*names]):
+        names = [*names]
+        if self._undriven.isdisjoint(names) or self.rebuilt is None:
             return self
-        from vehiclemor.simulation.build import with_inputs
-
-        return with_inputs(self, names)
+        return self.rebuilt(self, driving(self.definition, names))
 
     def driven_by(self, maneuver: Any) -> Self:
         """The model that has the optional inputs which a maneuver, or one of this name, names."""

@@ -10,8 +10,7 @@ import numpy as np
 from vehiclemor.arguments import loop_array
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Prepared, Ready, ready
-from vehiclemor.codegen.operations import Kernel
-from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.operations import LANES, Kernel
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.short_repr import ShortRepr

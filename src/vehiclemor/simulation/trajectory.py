@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import quoted, real_array
-from vehiclemor.array_shapes import check_shapes
+from vehiclemor.arguments import check_shapes, quoted, real_array
 from vehiclemor.exceptions import InputError
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import choice
@@ -108,6 +107,8 @@ class Trajectory(ShortRepr):
         Of which it is.
     method
         By which it was reduced; empty for a run of the full model.
+    maneuver
+        Name of the input.
     """
 
     times: np.ndarray
@@ -124,6 +125,7 @@ class Trajectory(ShortRepr):
     names: tuple[str, ...] = ()
     model: Any = None
     method: str = ""
+    maneuver: str = ""
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None

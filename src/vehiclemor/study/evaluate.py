@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from vehiclemor.error_measures import rms
 from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, blamed
 from vehiclemor.failure import Failure, attempt
-from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.fallback import with_fallback
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank

@@ -11,8 +11,8 @@ import pandas as pd
 import xarray as xr
 
 from vehiclemor.arguments import file_path, quoted
+from vehiclemor.error_measures import max_abs, rms, signal_range
 from vehiclemor.exceptions import FileError, InputError, printable
-from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.netcdf_file import opened, read_dataset
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.results import judged_part

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.error_measures import max_abs, rms, signal_range
 from vehiclemor.failure import Failure
+from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.provenance import attributes
 from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.registry import component
-from vehiclemor.resources import data_folder
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory, trajectory_dataset, with_units
 from vehiclemor.study.experiment import Experiment

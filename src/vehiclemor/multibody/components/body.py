@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.multibody.input_choice import InputChoice
-from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, Quantity
+from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, InputChoice, Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector

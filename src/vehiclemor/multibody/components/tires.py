@@ -95,13 +95,12 @@ def magic_formula(
     slip_ratio: sp.Expr,
     slip_angle: sp.Expr,
     cos_slip_angle: sp.Expr,
-    friction: sp.Expr = sp.Integer(1),  # Factor, not 0.
+    friction: sp.Expr,  # Factor, not 0.
 ) -> TireForces:
     """Forces at combined slip; zero where the load is zero.
 
-    Friction scales the forces by similarity (Pacejka, section 4.2): F = m F_1(kappa / m, alpha / m).
-    Factors on the peaks alone would leave the weights of combined slip as they are, and 1.29 of
-    the friction ellipse would be used at m = 0.3.
+    Friction m acts by similarity (Pacejka, section 4.2): F = m F_1(kappa / m, alpha / m).
+    If it scaled the peaks alone, combined slip would use 1.29 of the friction ellipse at m = 0.3.
     """
     let = tape.let
     d = let((load - reference_load) / reference_load)
@@ -187,7 +186,7 @@ def brush(
     # kappa, and the tangent of the slip angle.
     slip_ratio: sp.Expr,
     tan_slip: sp.Expr,
-    friction: sp.Expr = sp.Integer(1),  # Factor, not 0.
+    friction: sp.Expr,  # Factor, not 0.
 ) -> TireForces:
     """Fiala's forces at combined slip: one force, along what the bristles are deflected.
 
@@ -271,9 +270,7 @@ def upright_wheel(
     pressed = let(p["tire_stiffness"] * (p["tire_radius"] - above) - p["tire_damping"] * rise)
     load = let((pressed + sp.Abs(pressed)) / 2)
     reference_load = let(p["nominal_load"] * p["load_scale"])
-    tire = magic_formula(
-        tape, p, load, reference_load, p["tire_radius"], *slips, inputs.friction
-    )
+    tire = magic_formula(tape, p, load, reference_load, p["tire_radius"], *slips, inputs.friction)
     shear = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral)
     moment = arm.cross(shear) + up * tire.aligning
     force = g.named(tape, shear + up * load)

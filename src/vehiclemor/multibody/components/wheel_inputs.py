@@ -27,9 +27,9 @@ class WheelInputs:
 
     drive: sp.Expr
     brake: sp.Expr
-    friction: sp.Expr = sp.Integer(1)
-    road: sp.Expr = sp.Integer(0)
-    road_rate: sp.Expr = sp.Integer(0)
+    friction: sp.Expr
+    road: sp.Expr
+    road_rate: sp.Expr
 
     def torque(self, tape: Tape, spin: sp.Expr) -> sp.Expr:
         """Torque of drive and brake on a wheel that spins on its carrier at so many rad/s."""

@@ -17,8 +17,7 @@ from vehiclemor.multibody.components.tires import Corner, WheelOnRoad, tilted_wh
 from vehiclemor.multibody.components.wheel_inputs import wheel_inputs
 from vehiclemor.multibody.double_wishbone.definition import POINTS
 from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SOLVED, SPINS
-from vehiclemor.multibody.input_choice import InputChoice
-from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.multibody.quantities import WHEELS, InputChoice
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
 from vehiclemor.symbolic.geometry import Vector
@@ -29,7 +28,8 @@ Parameters = Mapping[str, sp.Expr]
 # Of the corners in order: FL, FR, RL, RR; 1 on the left, -1 on the right.
 ENDS = ("front", "front", "rear", "rear")
 SIDES = (1, -1, 1, -1)
-COMBINED = False
+# Inputs with which tires slip in both directions: the paper's runs coast, and keep its Fiala tires.
+COMBINED_SLIP = ("drive_torque_", "brake_torque_", "friction_")
 FRONT_POINTS = (
     *POINTS,
     *("front_spring_chassis_point", "front_spring_arm_point"),
@@ -80,6 +80,7 @@ def vehicle(tape: Tape, choice: InputChoice) -> tuple[Vehicle, list[sp.Symbol]]:
     inputs = body.inputs(DECLARED["inputs"], choice)
     declared, solved = body.parameters(DECLARED["parameters"]), body.parameters({}, SOLVED)
     p = declared | solved
+    combined = any(name.startswith(COMBINED_SLIP) for name in (*choice.driven, *choice.constant))
     attitude = body.attitude(tape, q)
     speeds = body.speeds(tape, attitude, rates)
     frame = m.MovingFrame(
@@ -92,7 +93,7 @@ def vehicle(tape: Tape, choice: InputChoice) -> tuple[Vehicle, list[sp.Symbol]]:
     for k in range(2):
         angles = [q[j] for j in CORNER[k]]
         linkages.append(links.assembled(tape, angles, inputs.driven[0], points[k], SIDES[k]))
-    vehicle = Vehicle(attitude, frame, points, tuple(linkages), q, rates, inputs, p, COMBINED)
+    vehicle = Vehicle(attitude, frame, points, tuple(linkages), q, rates, inputs, p, combined)
     return vehicle, [*declared.values(), *inputs.constant, *solved.values()]
 
 

@@ -14,7 +14,7 @@ from vehiclemor.multibody.components.tires import Corner, kane_with_corners, tir
 from vehiclemor.multibody.high_fidelity import corners
 from vehiclemor.multibody.high_fidelity.corners import Vehicle
 from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SPINS
-from vehiclemor.multibody.input_choice import DEFAULTS, InputChoice
+from vehiclemor.multibody.quantities import DEFAULTS, InputChoice
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate, eliminate_symmetric

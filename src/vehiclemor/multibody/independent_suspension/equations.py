@@ -13,8 +13,7 @@ from vehiclemor.multibody.components.tires import (
 )
 from vehiclemor.multibody.components.wheel_inputs import WheelInputs, wheel_inputs
 from vehiclemor.multibody.independent_suspension.definition import DECLARED, Derived, derived
-from vehiclemor.multibody.input_choice import DEFAULTS, InputChoice
-from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.multibody.quantities import DEFAULTS, WHEELS, InputChoice
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric

@@ -9,9 +9,8 @@ from typing import Any
 
 from vehiclemor.arguments import file_path
 from vehiclemor.exceptions import FileError, InputError
-from vehiclemor.files import write_text
+from vehiclemor.files import data_folder, data_names, write_text
 from vehiclemor.registry import choice
-from vehiclemor.resources import data_folder, data_names
 from vehiclemor.study.plans.study_file import (
     OF_TEST,
     SETS,
