@@ -10,10 +10,10 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
+from vehiclemor.files import data_folder
 from vehiclemor.handling import steering_tests
 from vehiclemor.handling.motion import Motion
 from vehiclemor.registry import choice
-from vehiclemor.resources import data_folder
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.toml_files import FileSchema, Line, read_toml
 

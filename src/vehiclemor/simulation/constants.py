@@ -43,7 +43,7 @@ def solved_parameters(
     """What a model solves for before it can start, by name; with optional inputs at defaults."""
     if not definition.solved:
         return {}
-    defaults = {quantity.name: quantity.default for quantity in definition.optional_inputs}
+    defaults = {q.name: q.default or 0.0 for q in definition.optional_inputs}
     driven, constant = (
         [defaults[name] for name in names]
         for names in (definition.choice.driven, definition.choice.constant)
