@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from vehiclemor.study.experiment import (
     default_settings,
     make_experiment,
 )
-from vehiclemor.study.plans.logs import Window, windows
+from vehiclemor.study.plans.logs import windows
 from vehiclemor.study.plans.study_file import GridFile, MethodEntry
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER, TEXTS, Sampling, values
 from vehiclemor.study.plans.training import training_set
@@ -100,24 +100,24 @@ def _dimensions(
     return dimensions | {"label": list(study.labelled)}
 
 
-def _driven(model: Model, study: GridFile, folder: Path) -> dict[str, Window]:
+def _driven(model: Model, study: GridFile, folder: Path) -> dict[str, Scenario]:
     """What drives the runs, by its name on the axis of maneuvers."""
     if not study.logs:
         axis = study.grid.get("maneuver", [study.maneuver or model.definition.maneuver])
         names = [str(name) for name in values(axis)]
-        return {name: Window(component("maneuver", name), None) for name in names}
-    every = [window for log in study.logs for window in windows(log, folder, model.definition)]
-    driven = {window.excitation.name: window for window in every}
+        return {name: Scenario(component("maneuver", name), model.starts[0]) for name in names}
+    every = [run for log in study.logs for run in windows(model, log, folder)]
+    driven = {run.maneuver.name: run for run in every}
     if len(driven) < len(every):
         raise InputError("two windows of logs have the same name: give one log a name")
     return driven
 
 
 def _check_histories(
-    model: Model, driven: Mapping[str, Window], dimensions: Mapping[str, list[Any]]
+    model: Model, driven: Mapping[str, Scenario], dimensions: Mapping[str, list[Any]]
 ) -> None:
     """Raise `InputError` if the histories of all runs can't be held, or not side by side."""
-    first, *others = [window.excitation for window in driven.values()]
+    first, *others = [run.maneuver for run in driven.values()]
     number = math.prod(map(len, dimensions.values()))
     columns = len(model.coordinates) + len(model.speeds) + 2 * len(model.outputs)
     size = 8.0 * first.samples * columns * number
@@ -146,7 +146,7 @@ def _of_method(
     study: GridFile,
     entry: MethodEntry,
     points: Iterator[dict[str, Any]],
-    driven: Mapping[str, Window],
+    driven: Mapping[str, Scenario],
 ) -> Iterator[Experiment]:
     """Experiments of a method at some points; `InputError` if its settings fit at none of them.
 
@@ -162,9 +162,9 @@ def _of_method(
         parameters = {
             n.removeprefix(PARAMETER): v for n, v in point.items() if n.startswith(PARAMETER)
         }
-        window = driven[str(point.get("maneuver", only))]
+        run = driven[str(point.get("maneuver", only))]
         of_run = tuple(point[f] for f in FACTORS)
-        test = _checked(model, window, of_run, point["start"], overrides(parameters))
+        test = _checked(model, run, of_run, point["start"], overrides(parameters))
         training = entry.training or point.get("training", study.training)
         training = tuple(training) if isinstance(training, list) else (training,)
         learner = entry.method if "protocol" in training else ""
@@ -190,7 +190,7 @@ def _complete(model: Model, method: str, given: tuple[tuple[str, Any], ...], pre
 
 @lru_cache(maxsize=4096)
 def _checked(
-    model: Model, window: Window, factors: tuple[float, float], start: str, parameters: Overrides
+    model: Model, run: Scenario, factors: tuple[float, float], start: str, parameters: Overrides
 ) -> Scenario:
     """A test scenario; `InputError` if the model can't be built or run so."""
     try:
@@ -198,8 +198,8 @@ def _checked(
     except VehiclemorError as error:
         given = ", ".join(f"{name} = {value}" for name, value in parameters)
         raise InputError(f"{given}: {error}") from None
-    excitation = window.excitation.perturbed(*factors)
-    scenario = Scenario(excitation, start, window.speed, parameters)
+    driven = run.maneuver.perturbed(*factors)
+    scenario = replace(run, maneuver=driven, start=start, parameters=parameters)
     check(model, scenario)
     return scenario
 

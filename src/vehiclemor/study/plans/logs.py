@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -12,12 +12,12 @@ from pydantic import BeforeValidator, Field
 from vehiclemor.arguments import within
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.columns import UNITS, csv_samples
-from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.signal import many_signals
 from vehiclemor.inputs.steering import ramp
-from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import choice
+from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.study_runs import DECIMALS, Limit, list_of
+from vehiclemor.study.scenario import Scenario
 from vehiclemor.toml_files import FileSchema, Line
 
 # A step in time of more than so many usual ones is a gap.
@@ -57,6 +57,7 @@ Column = Annotated[LogColumn, BY_NAME]
 class Log(FileSchema):
     """Windows of a measured file; a column is a name, or a table with unit and scale."""
 
+    maneuver: ClassVar[str] = ""
     # Windows are counted when the file is read.
     scenarios: ClassVar[int] = 0
 
@@ -83,21 +84,15 @@ class Log(FileSchema):
     rate: Limit = Field(50.0, description="1/s, samples taken of the log if it has so many")
 
 
-class Window(NamedTuple):
-    """What drives a run, and its speed in m/s if that is not the model's."""
-
-    excitation: Excitation
-    speed: float | None
-
-
-def windows(log: Log, folder: Path, definition: ModelDefinition) -> list[Window]:
-    """Windows of a log of a folder for a model, with every amplitude and speed.
+def windows(model: Model, log: Log, folder: Path) -> list[Scenario]:
+    """Runs of a model by the windows of a log of a folder, with every amplitude and speed.
 
     `InputError` if a column, a unit or an input of the model is unknown, times don't increase,
     values are missing or not finite, or no window fits.
     """
-    defaults = {q.name: q.default or 0.0 for q in (*definition.inputs, *definition.optional_inputs)}
-    straight = [defaults[choice(f"input of {definition.name}", n, defaults)] for n in log.inputs]
+    inputs_of_model = (*model.definition.inputs, *model.definition.optional_inputs)
+    defaults = {quantity.name: quantity.default or 0.0 for quantity in inputs_of_model}
+    straight = [defaults[choice(f"input of {model.name}", name, defaults)] for name in log.inputs]
     clock, *columns = _read(log, folder / log.log).T
     begins = _begins(log, folder / log.log, clock)
     rate = min(log.rate, 1.0 / float(np.median(np.diff(clock))))
@@ -114,12 +109,13 @@ def windows(log: Log, folder: Path, definition: ModelDefinition) -> list[Window]
         chosen = speed[:, 0] if log.speed_column.of == "first" else speed.mean(axis=1)
         speeds = chosen.round(DECIMALS)[:, None].tolist()
     signals = many_signals(times, inputs, "cubic", inputs=[*log.inputs])
-    found = []
+    runs: list[Scenario] = []
     for signal, begin, of_window in zip(signals, begins.round(6), speeds, strict=True):
         named = replace(signal, name=f"{log.name or log.log}:{begin:.9g}")
         for amplitude, speed in product(log.amplitude or [1.0], of_window):
-            found.append(Window(named.perturbed(amplitude=amplitude), speed))
-    return found
+            driven = named.perturbed(amplitude=amplitude)
+            runs.append(Scenario(driven, model.starts[0], speed))
+    return runs
 
 
 def _read(log: Log, path: Path) -> np.ndarray:

@@ -163,8 +163,7 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
             raise InputError(f"label {label!r} is used twice (of full order with the tolerance)")
     if straight:
         boxes = [box for draw in draws.values() for box in draw.boxes]
-        listed = [p for p in (*definition.test, *definition.outside) if isinstance(p, Group)]
-        driven = {part.maneuver for part in (*listed, *boxes)}
+        driven = {part.maneuver for part in (*definition.test, *definition.outside, *boxes)}
         choice("maneuver of a test, in straight", straight.maneuver, sorted(driven))
     for target in definition.targets:
         known = ["equal accuracy", "within bounds", *rows]
@@ -197,12 +196,8 @@ def _checked(
 
 def _of_group(model: Model, group: Group | Log, folder: Path = Path()) -> list[Scenario]:
     """Every point of a group from every start, or every window of a log of a folder."""
-    usual_speed = own_speed(model)
     if isinstance(group, Log):
-        return [
-            Scenario(excitation, model.starts[0], usual_speed if speed is None else speed)
-            for excitation, speed in windows(group, folder, model.definition)
-        ]
+        return windows(model, group, folder)
     lists = group.frequency or [1.0], group.amplitude or [1.0]
     # A point may leave the speed to the model.
     speeds = [[speed] for speed in group.speed] or [[]]
@@ -210,6 +205,7 @@ def _of_group(model: Model, group: Group | Log, folder: Path = Path()) -> list[S
     points = group.points or [[frequency, size, *speed] for frequency, size, speed in products]
     samples = itertools.product(*group.parameters.values())
     tables = [overrides(dict(zip(group.parameters, sample, strict=True))) for sample in samples]
+    usual_speed = own_speed(model)
     return [
         Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else usual_speed, table)
         for point in points
