@@ -256,5 +256,7 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
     yield "figure-14-spread", partial(spread, "figure-14-spread")
     yield "truck-ranks", partial(measure, "truck.ranks", "worst_relative_error")
     yield "size", sizes
-    for kind, model in product(("predictive", "contenders", "logs"), names("model")):
+    for kind, model in product(("predictive", "contenders"), names("model")):
         yield f"{kind}-{model}", protocol
+    for model in VEHICLES:
+        yield f"logs-{model}", protocol

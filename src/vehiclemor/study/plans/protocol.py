@@ -140,7 +140,7 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
         parts = [_checked(model, f"{key}, group {n}", make, group) for n, group in groups]
         sets[key] = tuple(itertools.chain(*parts))
     seen: dict[tuple, str] = {}
-    labels: set[str] = set()
+    run_labels: set[str] = set()
     for key, part in sets.items():
         for scenario in part:
             # What a method has learned from or was chosen by can't test it.
@@ -149,24 +149,24 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
             if run in seen and not (_measured(scenario) and seen[run] == key):
                 raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
             seen[run] = key
-            if scenario.label in labels:
+            if scenario.label in run_labels:
                 raise InputError(f"{key}: ({scenario.label}) are two runs: give one log a name")
-            labels.add(scenario.label)
+            run_labels.add(scenario.label)
     draws = definition.draws
     for key, draw in draws.items():
         for number, box in enumerate(draw.boxes, start=1):
             _checked(model, f"{key}, box {number}", _corners, box)
     entries = tuple(_entry(model, entry, sets["training"]) for entry in definition.methods)
-    rows = [label for entry in entries for label in entry.row_labels]
-    for label in rows:
-        if rows.count(label) > 1:
+    labels = [label for entry in entries for label in entry.row_labels]
+    for label in labels:
+        if labels.count(label) > 1:
             raise InputError(f"label {label!r} is used twice (of full order with the tolerance)")
     if straight:
         boxes = [box for draw in draws.values() for box in draw.boxes]
         driven = {part.maneuver for part in (*definition.test, *definition.outside, *boxes)}
         choice("maneuver of a test, in straight", straight.maneuver, sorted(driven))
     for target in definition.targets:
-        known = ["equal accuracy", "within bounds", *rows]
+        known = ["equal accuracy", "within bounds", *labels]
         if definition.extends and target.against not in known:
             (base,) = load_studies(definition.extends).values()
             raise InputError(
