@@ -12,7 +12,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 import vehiclemor as vm
@@ -80,6 +79,21 @@ def grid(prefix: str, variables: Callable[[xr.Dataset], Variables], data: xr.Dat
     return cells(prefix, by_output(runs(data, variables(data))))
 
 
+# Measure -> its values in a study.
+MEASURES: dict[str, Callable[[xr.Dataset], xr.DataArray]] = {
+    "largest_share": lambda data: data["max_error"] / data["signal_range"],
+    "worst_relative_error": lambda data: (data["rms_error"] / data["signal_range"]).max("output"),
+    # Where the vehicle is at the end.
+    ASIDE: lambda data: data["outputs"].sel(output=ASIDE, drop=True).isel(time=-1, drop=True),
+    f"{ASIDE}.max_error": lambda data: data["max_error"].sel(output=ASIDE, drop=True),
+}
+
+
+def measure(prefix: str, name: str, data: xr.Dataset) -> Any:
+    """A measure of every run of a study."""
+    return grid(prefix, lambda study: {name: MEASURES[name](study)}, data)
+
+
 def errors(dataset: xr.Dataset) -> Variables:
     """Errors of every run, and what its loop counts."""
     wanted = ("rms_error", "iterations", "growth_rate")
@@ -95,26 +109,6 @@ def over_published(model: str, dataset: xr.Dataset) -> Variables:
     return errors(dataset) | {"over_published": largest}
 
 
-def largest_share(dataset: xr.Dataset) -> Variables:
-    """Largest errors over the signal's range."""
-    return {"largest_share": dataset["max_error"] / dataset["signal_range"]}
-
-
-def last_position(dataset: xr.Dataset) -> Variables:
-    """Where the vehicle is at the end of every run."""
-    return {ASIDE: dataset["outputs"].sel(output=ASIDE, drop=True).isel(time=-1, drop=True)}
-
-
-def furthest_aside(dataset: xr.Dataset) -> Variables:
-    """Largest errors of the lateral position."""
-    return {f"{ASIDE}.max_error": dataset["max_error"].sel(output=ASIDE, drop=True)}
-
-
-def worst_of_truck(dataset: xr.Dataset) -> Variables:
-    """Largest error over the range of its output."""
-    return {"worst_relative_error": (dataset["rms_error"] / dataset["signal_range"]).max("output")}
-
-
 def perturbed(prefix: str, dataset: xr.Dataset) -> Iterator[Entry]:
     """Errors of every run; least and largest ratio of POD's to those of replay."""
     yield from grid(prefix, errors, dataset)
@@ -122,8 +116,7 @@ def perturbed(prefix: str, dataset: xr.Dataset) -> Iterator[Entry]:
     pod, replay = rms.sel(label="pod"), rms.sel(label="replay")
     over_replay = (pod / replay).where(replay > 0.0)
     for name, ratio in (("over_replay", over_replay), ("replay_over", 1.0 / over_replay)):
-        for output in ratio["output"].values:
-            values = ratio.sel(output=output)
+        for output, values in ratio.groupby("output"):
             yield slug(prefix, "pod", output, f"{name}_smallest"), values.min()
             yield slug(prefix, "pod", output, f"{name}_largest"), values.max()
 
@@ -143,13 +136,12 @@ def spread(prefix: str, dataset: xr.Dataset) -> Iterator[Entry]:
 def orders(dataset: xr.Dataset) -> Iterator[Entry]:
     """Errors over orders and signs of the equations; those of the natural order."""
     yield from spread("equation-order", dataset)
-    ended = dataset["status"].squeeze(drop=True)
-    diverged = (ended == "diverged").sum("equation_seed").to_series()
-    natural = dataset["rms_error"].sel(equation_seed=0).squeeze(drop=True)
-    for output in dataset["output"].values:
-        table = pd.DataFrame({"natural": natural.sel(output=output).to_series()})
-        table = table.assign(diverged=diverged).add_prefix(f"{output}.")
-        yield from cells("equation-order", table)
+    diverged = (dataset["status"] == "diverged").sum("equation_seed")
+    natural = dataset["rms_error"].sel(equation_seed=0, drop=True)
+    for label, output in product(dataset["label"].values, dataset["output"].values):
+        head, at = ("equation-order", label, output), {"label": label}
+        yield slug(*head, "diverged"), diverged.sel(at).item()
+        yield slug(*head, "natural"), natural.sel(at | {"output": output}).item()
 
 
 def settings(model: str, dataset: xr.Dataset) -> Iterator[Entry]:
@@ -189,16 +181,13 @@ def times(model: str, dataset: xr.Dataset) -> Iterator[Entry]:
 
 
 def sizes(dataset: xr.Dataset) -> Iterator[Entry]:
-    """What a reduction gains on each mesh; of a vehicle its chosen model."""
+    """What a reduction gains on each mesh."""
     for row in size_rows(dataset):
-        kind, mesh, label = row["mesh_kind"], f"n{row['coordinates']}", row["label"]
-        if kind == "vehicle":
-            mesh, label = row["mesh"], "chosen"
-        yield from ((slug("size", mesh, label, name), value) for name, value in row.items())
-        yield slug("size", mesh, "coordinates"), row["coordinates"]
-        yield slug("size", mesh, "full_order", "seconds"), row["full_seconds"]
-        yield slug("size", kind, "full_order", "growth"), row["growth_full"]
-        yield slug("size", kind, label, "growth"), row["growth"]
+        head = "size", f"n{row['coordinates']}"
+        yield from ((slug(*head, row["label"], name), value) for name, value in row.items())
+        yield slug(*head, "coordinates"), row["coordinates"]
+        yield slug(*head, "full_order", "seconds"), row["full_seconds"]
+        yield slug("size", row["mesh_kind"], "full_order", "growth"), row["growth_full"]
 
 
 def comparison(results: Path) -> Iterator[Entry]:
@@ -249,7 +238,7 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
     for model, name in NOMINAL.items():
         yield name, partial(grid, f"nominal.{model}", partial(over_published, model))
         yield f"timing-{model}", partial(times, model)
-    yield "figure-11", partial(grid, "figure-11", largest_share)
+    yield "figure-11", partial(measure, "figure-11", "largest_share")
     yield "figure-11-control-period", partial(grid, f"control_period.{SUSPENSION}", errors)
     yield "vehicle-control-period", partial(grid, f"control_period.{VEHICLE}", errors)
     for name in ("figure-13-frequency", "figure-13-amplitude"):
@@ -257,12 +246,12 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
     for model, short in VEHICLES.items():
         yield f"{short}-perturbations", partial(perturbed, f"perturbed.{model}")
         yield f"{short}-settings", partial(settings, model)
-        yield f"{short}-zero-steer", partial(grid, f"zero_steer.{model}", last_position)
+        yield f"{short}-zero-steer", partial(measure, f"zero_steer.{model}", ASIDE)
     for name in ("unseen-inputs", "unseen-inputs-ranks"):
-        yield name, partial(grid, "unseen", furthest_aside)
+        yield name, partial(measure, "unseen", f"{ASIDE}.max_error")
     yield "equation-order", orders
     yield "figure-14-spread", partial(spread, "figure-14-spread")
-    yield "truck-ranks", partial(grid, "truck.ranks", worst_of_truck)
+    yield "truck-ranks", partial(measure, "truck.ranks", "worst_relative_error")
     yield "size", sizes
     for kind, model in product(("predictive", "contenders"), names("model")):
         yield f"{kind}-{model}", protocol

@@ -17,16 +17,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor import VehiclemorError
+from vehiclemor import VehiclemorError, errors
 from vehiclemor.api import RESULTS, reduce
 from vehiclemor.exceptions import FileError
-from vehiclemor.files import make_folder
+from vehiclemor.files import data_folder, make_folder
 from vehiclemor.provenance import code_digest
 from vehiclemor.reduction.model_file import content
 from vehiclemor.reduction.reduced_model import ReducedOrderModel, load, shipped_folder
-from vehiclemor.resources import data_folder
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.experiment import Settings
+from vehiclemor.study.plans.choice import errors_by
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names
 from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.scenario import Scenario, parameters_of, start_of
@@ -100,24 +100,18 @@ def stale(name: str, choice: Choice) -> list[str]:
 
 def in_bounds(protocol: Protocol, run: Trajectory, other: Trajectory) -> float:
     """Largest difference of two runs in the measures of a protocol, in its bounds."""
-    found = []
-    for output, limit in protocol.definition.bounds.items():
-        off = np.abs(run[output] - other[output])
-        size = float(off.max() if limit.measure == "max" else np.sqrt(np.mean(off**2)))
-        if limit.measure == "relative":
-            size /= float(np.ptp(other[output]))
-        found.append(size / limit.bound)
-    return max(found)
+    apart, bounds = errors(run, other), protocol.definition.bounds.items()
+    return max(float(errors_by(apart, output, b.measure)) / b.bound for output, b in bounds)
 
 
 def difference(choice: Choice, one: ReducedOrderModel, other: ReducedOrderModel) -> float:
     """Largest difference of two models in validation runs, in bounds."""
-    found = []
+    largest = 0.0
     for scenario in choice.protocol.sets["validation"][:COMPARED]:
         start = start_of(choice.protocol.model, scenario)
         runs = (rom.simulate(scenario.maneuver, start) for rom in (one, other))
-        found.append(in_bounds(choice.protocol, *runs))
-    return max(found)
+        largest = max(largest, in_bounds(choice.protocol, *runs))
+    return largest
 
 
 def main() -> int:

@@ -26,7 +26,9 @@ FIGURES: Mapping[str, Entry] = {
     "figure-04": Entry(vehicles.figure_pitch_and_yaw, ["figures-2-4"], {"errors": True}),
     "figure-05": Entry(schematics.figure_schematic, options={"name": "suspension"}),
     "figure-06": Entry(suspension.figure_histories, ["figures-6-7"], {"study": "figures-6-7"}),
-    "figure-07": Entry(suspension.figure_errors, ["figures-6-7"]),
+    "figure-07": Entry(
+        suspension.figure_histories, ["figures-6-7"], {"study": "figures-6-7", "errors": True}
+    ),
     "figure-08": Entry(schematics.figure_schematic, options={"name": "high_fidelity"}),
     "figure-09": Entry(vehicles.figure_paths, ["figures-9-10"], {"study": "figures-9-10"}),
     "figure-10": Entry(vehicles.figure_speeds, ["figures-9-10"]),

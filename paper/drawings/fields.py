@@ -6,19 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from drawings.look import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    PINK,
-    RED,
-    THIN,
-    TWO,
-    Results,
-    decades,
-    legend,
-    lettered,
-)
+from drawings import look
 from vehiclemor.report.figures.costs import figure_size as figure_of_sizes
 from vehiclemor.report.figures.theme import tick_decades
 from vehiclemor.report.labels import declared
@@ -33,9 +21,9 @@ MODELS = {
 }
 
 
-def figure_pareto(results: Results) -> Figure:
+def figure_pareto(results: look.Results) -> Figure:
     """Worst error on the test set over the time of a whole call: every method, all four models."""
-    figure, grid = lettered(1, 4, TWO, 2.9, MODELS.values())
+    figure, grid = look.lettered(1, 4, look.TWO, 2.9, MODELS.values())
     for axis, model in zip(grid.flat, MODELS, strict=True):
         methods: dict[tuple[str, str], dict[str, Any]] = {}
         for study in (f"contenders-{model}", f"predictive-{model}"):
@@ -49,14 +37,14 @@ def figure_pareto(results: Results) -> Figure:
         for row in rows:
             if row["role"] != FULL_ORDER and row["method"] != "replay":
                 _draw_row(axis, row)
-        axis.axhline(1.0, **THIN)
+        axis.axhline(1.0, **look.THIN)
         axis.set_xscale("log")
         axis.set_yscale("log")
         axis.set_ylim(bottom=max(axis.get_ylim()[0], 1e-3))
-        decades(axis.yaxis, 1)
+        look.decades(axis.yaxis, 1)
         axis.set_xlabel("whole call (ms)")
     grid[0, 0].set_ylabel("worst error / bound")
-    legend(figure, grid.flat, 5)
+    look.legend(figure, grid.flat, 5)
     return figure
 
 
@@ -76,10 +64,10 @@ def _draw_row(axis: Any, row: Mapping[str, Any]) -> None:
         axis.plot(1e3 * row["seconds"], row["score"], label="chosen by validation", **ring)
 
 
-def figure_size(results: Results) -> Figure:
+def figure_size(results: look.Results) -> Figure:
     """CPU time of a whole run over the number of coordinates, and what reduction gains."""
     figure = figure_of_sizes(results["size"])
-    figure.set_size_inches(TWO, 2.8)
+    figure.set_size_inches(look.TWO, 2.8)
     # Room for the names of the vehicles.
     figure.axes[1].set_ylim(bottom=0.2)
     return figure
@@ -90,19 +78,19 @@ SHOWN = {"": (0.1, 2e-8), "-steps": (0.1, 1e-9), "-batch": (0.1, 2e-8)}
 # Beginning of a label in the results of the peers -> colour, dashes, text; later ones win.
 PEERS: Mapping[str, tuple[str, Any, str]] = {
     "ours": ("black", "-", "fastest here"),
-    "CVODE in C": (RED, "-", "CVODE, C by hand"),
-    "CasADi CVODES": (BLUE, "-", "CasADi CVODES"),
-    "CasADi Runge-Kutta": (BLUE, "--", "CasADi Runge-Kutta"),
-    "scikit-sundae": (GREEN, "-", "scikit-sundae"),
-    "SciPy": (PINK, "-", "SciPy, best"),
-    "JAX": (ORANGE, "-", "JAX diffrax"),
+    "CVODE in C": (look.RED, "-", "CVODE, C by hand"),
+    "CasADi CVODES": (look.BLUE, "-", "CasADi CVODES"),
+    "CasADi Runge-Kutta": (look.BLUE, "--", "CasADi Runge-Kutta"),
+    "scikit-sundae": (look.GREEN, "-", "scikit-sundae"),
+    "SciPy": (look.PINK, "-", "SciPy, best"),
+    "JAX": (look.ORANGE, "-", "JAX diffrax"),
 }
 
 
 def figure_peers(results: Mapping[str, Any]) -> Figure:
     """CPU time over error of both vehicles in other tools: a run, a step and a run of a batch."""
     texts = ["a run", "a step of 10 ms", "a run of a batch of 200"] * 2
-    figure, grid = lettered(2, 3, TWO, 3.6, texts, sharex="col")
+    figure, grid = look.lettered(2, 3, look.TWO, 3.6, texts, sharex="col")
     models = "independent_suspension_vehicle", "high_fidelity_vehicle"
     for row, model in zip(grid, models, strict=True):
         for axis, part in zip(row, ("", "-steps", "-batch"), strict=True):
@@ -117,7 +105,7 @@ def figure_peers(results: Mapping[str, Any]) -> Figure:
         row[0].set_ylabel(f"{MODELS[model]}\nCPU time (ms)")
     for axis in grid[-1]:
         axis.set_xlabel("largest error of the position (m)")
-    legend(figure, grid.flat, 4)
+    look.legend(figure, grid.flat, 4)
     return figure
 
 

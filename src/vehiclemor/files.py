@@ -1,4 +1,4 @@
-"""Files: what is read, what may be replaced, and writing under a temporary name first."""
+"""Files: where data are, what is read and replaced, and writing under a temporary name first."""
 
 import os
 import secrets
@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 from vehiclemor.exceptions import FileError, MachineError, machine_reason
@@ -15,6 +16,23 @@ from vehiclemor.exceptions import FileError, MachineError, machine_reason
 # Beginning of temporary names; and age (s) of a file that nobody is writing any more.
 TEMPORARY, OLD = ".partial-", 3600.0
 NO_FILE = "it is a folder, pipe or device, not a file"
+
+
+@cache
+def data_folder() -> Path:
+    """Folder with `parameters`, `studies`, `protocols` and all other data; or `FileError`."""
+    package = Path(__file__).resolve().parent
+    for folder in (package / "data", package.parents[1] / "data"):
+        if (folder / "parameters").is_dir():
+            return folder
+    raise FileError(
+        f"the data files are missing: neither {package / 'data'} nor a checkout has them"
+    )
+
+
+def data_names(kind: str) -> list[str]:
+    """Names (without ending) of the data files of one kind, sorted."""
+    return sorted(path.stem for path in (data_folder() / kind).glob("*.toml"))
 
 
 def make_folder(folder: Path) -> None:

@@ -19,11 +19,11 @@ from vehiclemor.cli import main, studies
 from vehiclemor.cli.app import COMMANDS, ended
 from vehiclemor.cli.options import key_values
 from vehiclemor.exceptions import MachineError
+from vehiclemor.files import data_names
 from vehiclemor.parameters import load_parameters
 from vehiclemor.reduction.methods import replay
 from vehiclemor.registry import component, names
 from vehiclemor.report.description import SCHEMAS
-from vehiclemor.resources import data_names
 from vehiclemor.study import run as study_run
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import load_protocol

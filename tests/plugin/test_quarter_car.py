@@ -16,11 +16,11 @@ import vehiclemor as vm
 from vehiclemor import registry
 from vehiclemor.cli import main
 from vehiclemor.contracts import check_method
+from vehiclemor.files import data_folder
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
-from vehiclemor.resources import data_folder
 from vehiclemor.simulation.build import build
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")

@@ -7,11 +7,7 @@ import pytest
 
 from tests.oracles import high_fidelity_vehicle as oracle
 from tests.oracles.high_fidelity_data import AXLES, NO_DAMPERS, PARAMETERS
-from tests.oracles.projected_simulation import (
-    simulate_projected,
-    without_stabilisation,
-)
-from vehiclemor.inputs.maneuver import Maneuver
+from tests.oracles.projected_simulation import simulate_projected, without_stabilisation
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.control_periods import whole_space
@@ -26,28 +22,11 @@ STARTS = ("equilibrium", "dropped")
 LANE_CHANGE = component("maneuver", "rack_lane_change")
 STRAIGHT = component("maneuver", "rack_straight_ahead")
 REST = np.zeros(3)
-TIMES = np.array([0.05, 0.3, 0.9, 1.7, 2.6, 3.4, 4.0])
 
 
 @pytest.fixture(scope="module")
 def vehicle() -> DynamicModel:
     return build(NAME)
-
-
-def integrate(
-    model: DynamicModel,
-    maneuver: Maneuver,
-    start: np.ndarray,
-    times: np.ndarray = TIMES,
-    solver: str = "dopri5",
-    tolerance: float = 1e-9,
-    longest_step: float | None = None,
-) -> Trajectory:
-    found = model.integrate(
-        maneuver, start, whole_space(2 * N), Solver(solver, tolerance, times, longest_step)
-    )
-    assert found.status == "ok", found.message
-    return found
 
 
 def series(path: Trajectory, model: DynamicModel, *names: str) -> np.ndarray:
@@ -71,7 +50,7 @@ def test_energy_is_conserved_in_flight_without_dampers():
     start[2] = 10.0
     start[N + 3 : N + 6] = 0.3, 0.2, 0.4
     times = np.linspace(0.0, 1.0, 41)
-    path = integrate(model, STRAIGHT, start, times, tolerance=1e-11)
+    path = model.simulate(STRAIGHT, start, times, "dopri5", 1e-11)
     assert not loads(path, model).any()
     assert np.abs(path.states[:, [10, 17, 20, 21]]).max(axis=0) == pytest.approx(0.75, abs=0.05)
 
@@ -103,7 +82,7 @@ def test_violations_decay_as_the_gains_say_and_grow_without_them(vehicle):
         without_stabilisation(vehicle): position + rate * t,
     }
     for model, expected in laws.items():
-        path = integrate(model, STRAIGHT, x, times, tolerance=1e-11)
+        path = model.simulate(STRAIGHT, x, times, "dopri5", 1e-11)
         found = np.array([model.violations(state, REST)[0] for state in path.states])
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
@@ -122,7 +101,7 @@ def test_the_lane_change_is_the_published_one(
     vehicle, start, lateral, at_rest_of_pulse, heading, lightest
 ):
     times = np.linspace(0.0, 10.0, 10001)
-    path = integrate(vehicle, LANE_CHANGE, vehicle.start(start), times)
+    path = vehicle.simulate(LANE_CHANGE, start, times, "dopri5", 1e-9)
     x = path.states
     assert x[-1, 1] == pytest.approx(lateral, abs=2e-8)
     assert x[4500, 1] == pytest.approx(at_rest_of_pulse, abs=1e-6)
@@ -141,11 +120,11 @@ def test_the_lane_change_is_the_published_one(
 
 def test_the_dropped_rear_wheels_are_in_the_air_for_a_while(vehicle):
     times = np.linspace(0.0, 0.2, 201)
-    path = integrate(vehicle, LANE_CHANGE, vehicle.start("dropped"), times)
+    path = vehicle.simulate(LANE_CHANGE, "dropped", times, "dopri5", 1e-9)
     aloft = (loads(path, vehicle) == 0.0).sum(axis=0) * 1e-3
     np.testing.assert_allclose(aloft, [0.0, 0.0, 0.036, 0.036], atol=1.1e-3)
     assert path.remark.startswith("off the ground for a time: RL (first at 0 s), RR")
-    assert not integrate(vehicle, LANE_CHANGE, vehicle.start()).remark
+    assert not vehicle.simulate(LANE_CHANGE, times=[0.05, 4.0]).remark
 
 
 @pytest.mark.parametrize("start", STARTS)

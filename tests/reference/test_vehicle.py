@@ -1,20 +1,15 @@
 """The 14-DOF vehicle against independent mechanics, conservation laws and other integrators."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from scipy.optimize import linear_sum_assignment
-from scipy.spatial.transform import Rotation
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.workspaces import Solver
 
 NAME = "independent_suspension_vehicle"
-COORDINATES, WHEELS = 14, 4
 LANE_CHANGE = component("maneuver", "lane_change")
 STRAIGHT = component("maneuver", "straight_ahead")
 # What the published vehicle leaves out: product of inertia and damping of the tires.
@@ -130,64 +125,6 @@ def test_second_order_form_holds_with_the_oracles_second_derivatives(vehicle):
         close(vehicle.mass_matrix(x), expected, 1e-11)
 
 
-def pinocchio_tree(p: dict[str, float], delta: float):
-    """The open tree with front wheels steered, its spin joints, places of the coordinates."""
-    d, tree, spins = oracle.derived(), pin.Model(), []
-    body = tree.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
-    inertia = np.diag([p["roll_inertia"], p["pitch_inertia"], d["Izz"]])
-    sprung = pin.Inertia(p["sprung_mass"], np.zeros(3), inertia)
-    tree.appendBodyToJoint(body, sprung, pin.SE3.Identity())
-    about, across = p["spin_inertia"], p["diametral_inertia"]
-    disc = pin.Inertia(p["unsprung_mass"], np.zeros(3), np.diag([across, about, across]))
-    # Depth first: Pinocchio numbers the joints in this order.
-    for wheel in range(WHEELS):
-        end, name, reach = ("f", "front", d["a_s"]) if wheel < 2 else ("r", "rear", -d["b_s"])
-        y = p[f"{name}_track"] / 2 * (1.0 if wheel % 2 == 0 else -1.0)
-        place = pin.SE3(np.eye(3), np.array([reach, y, -d[f"h_{end}"]]))
-        slide = tree.addJoint(body, pin.JointModelPZ(), place, f"slide_{wheel}")
-        steer = pin.SE3(pin.utils.rotate("z", delta if wheel < 2 else 0.0), np.zeros(3))
-        spins.append(tree.addJoint(slide, pin.JointModelRY(), steer, f"spin_{wheel}"))
-        tree.appendBodyToJoint(spins[-1], disc, pin.SE3.Identity())
-    order = [*range(6), *(6 + k + 4 * part for k in range(WHEELS) for part in (0, 1))]
-    return tree, spins, order
-
-
-def test_equations_of_motion_are_those_of_pinocchio(vehicle):
-    """Recursive Newton-Euler of the tree, fed with the model's accelerations and tire forces."""
-    p = {name: float(value) for name, value in vehicle.parameters.values().items()}
-    preload = oracle.per_wheel(oracle.derived(), "S0")
-    stiffness, damping = (
-        np.repeat([p[f"front_{name}"], p[f"rear_{name}"]], 2) for name in ("stiffness", "damping")
-    )
-    for x, delta in [*LARGE[:12], LARGE[-1]]:
-        q, nu = x[:14], x[14:]
-        tree, spins, order = pinocchio_tree(p, delta)
-        data, turned = tree.createData(), Rotation.from_euler("ZYX", q[3:6])
-        position = np.array([*q[:3], *turned.as_quat(), *q[order[6:]]])
-        pin.forwardKinematics(tree, data, position)
-        forces, up = outputs(vehicle, x, delta), np.array([0.0, 0.0, 1.0])
-        outside = [pin.Force.Zero() for _ in range(tree.njoints)]
-        for wheel, spin in enumerate(spins):
-            at = data.oMi[spin]
-            ahead = np.cross(at.rotation[:, 1], up)
-            ahead /= np.linalg.norm(ahead)
-            shear = forces["Fx"][wheel] * ahead + forces["Fy"][wheel] * np.cross(up, ahead)
-            moment = np.cross(-at.translation[2] * up, shear) + forces["Mz"][wheel] * up
-            push = shear + forces["Fz"][wheel] * up
-            outside[spin] = pin.Force(at.rotation.T @ push, at.rotation.T @ moment)
-        rates, found, expected = vehicle.rhs(x, delta)[14:], np.empty(14), np.zeros(14)
-        loads = pin.StdVec_Force(outside)
-        found[order] = pin.rnea(tree, data, position, nu[order], rates[order], loads)
-        # What the joints must do: nothing but the springs and dampers on the slides.
-        expected[6:10] = -preload - stiffness * q[6:10] - damping * nu[6:10]
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8)
-        # Pinocchio promises the upper triangle alone.
-        mass, upper = np.empty((14, 14)), np.triu(pin.crba(tree, data, position))
-        mass[np.ix_(order, order)] = upper + np.triu(upper, 1).T
-        per_rate = np.array([speeds(vehicle, q, e) for e in np.eye(14)]).T
-        close(second_order(vehicle, x, delta)[0], per_rate.T @ mass @ per_rate, 1e-10)
-
-
 # Equilibrium and symmetries
 
 
@@ -265,8 +202,6 @@ def test_eigenvalues_are_those_of_the_exact_jacobian(vehicle):
 
 
 def test_the_lane_change_ends_where_its_amplitude_was_calibrated(vehicle):
-    how = Solver("dopri5", 1e-10, np.array([25.0]))
-    end = vehicle.integrate(LANE_CHANGE, vehicle.start(), whole_space(28), how)
-    assert end.status == "ok", end.message
+    end = vehicle.simulate(LANE_CHANGE, times=[25.0], solver="dopri5", tolerance=1e-10)
     assert end.outputs[0, 1] == pytest.approx(3.4999973, abs=1e-6)
     assert end.outputs[0, 2] == pytest.approx(6.8e-4, abs=5e-6)

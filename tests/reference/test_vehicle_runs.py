@@ -13,9 +13,7 @@ from tests.models import CAR, FIDELITY, VEHICLES
 from tests.oracles import high_fidelity_data, vehicle_lagrange
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
-from vehiclemor.simulation.workspaces import Solver
 
 LANE_CHANGE = {
     CAR: component("maneuver", "lane_change"),
@@ -33,12 +31,10 @@ each_vehicle = pytest.mark.parametrize("name", VEHICLES)
 each_solver = pytest.mark.parametrize("solver", INTEGRATORS)
 
 
-def integrate(model, start, solver="dopri5", tolerance=1e-9, longest_step=None, factor=1.0):
+def integrate(model, start, solver="dopri5", tolerance=1e-9, longest_step=None):
     """States of the lane change, and counts."""
-    maneuver, space = LANE_CHANGE[model.name].perturbed(amplitude=factor), whole_space(len(start))
-    found = model.integrate(maneuver, start, space, Solver(solver, tolerance, TIMES, longest_step))
-    assert found.status == "ok", found.message
-    return found
+    maneuver = LANE_CHANGE[model.name]
+    return model.simulate(maneuver, start, TIMES, solver, tolerance, longest_step=longest_step)
 
 
 @cache

@@ -127,18 +127,6 @@ def test_what_is_no_file_is_refused_at_once(other, name):
             read(path)
 
 
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [("a" * 2_000_000, "bytes"), (".".join(["a"] * 50_000) + " = 1", "a key has more than")],
-    ids=["large", "deep"],
-)
-def test_study_files_that_would_take_minutes_to_read_are_refused(tmp_path, text, reason):
-    path = tmp_path / "study.toml"
-    path.write_text(text)
-    with pytest.raises(FileError, match=reason):
-        vm.status(path)
-
-
 def test_keys_of_few_parts_and_long_lists_are_read(tmp_path):
     path = tmp_path / "study.toml"
     values = ",".join(f"{1.0 + k / 100}" for k in range(60))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from vehiclemor import plugin
-from vehiclemor.resources import data_folder
+from vehiclemor.files import data_folder
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SOURCES = [

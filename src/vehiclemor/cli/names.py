@@ -12,10 +12,9 @@ from typing import Any, Literal
 from vehiclemor import api
 from vehiclemor.cli.options import All, Json, ParameterFile, Parameters, key_values
 from vehiclemor.exceptions import FileError, InputError
-from vehiclemor.files import write_whole
+from vehiclemor.files import data_folder, data_names, write_whole
 from vehiclemor.registry import GROUPS, names
 from vehiclemor.report.printing import Table, wrapped
-from vehiclemor.resources import data_folder, data_names
 
 KINDS = ("models", "methods", "maneuvers", "studies")
 # A longer name has its text right behind it.

@@ -25,6 +25,7 @@ from vehiclemor.codegen.cache import cached_by_one_thread, digest_of, from_cache
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.operations import (
     COMPARISONS,
+    LANES,
     NAMED,
     SEED,
     VECTOR_STATEMENTS,
@@ -36,9 +37,10 @@ from vehiclemor.codegen.operations import (
     uses,
 )
 from vehiclemor.codegen.sources import source_digest
-from vehiclemor.codegen.vector_lanes import DIRECTIONS, LANES
 from vehiclemor.short_repr import ShortRepr
 
+# Directions that a derivative takes at once: what they share is computed once.
+DIRECTIONS = 16
 # Up to this number, directions are computed one by one: code for many takes longer to compile.
 FEW = 4
 # Depth of the longest expression without a named value inside.

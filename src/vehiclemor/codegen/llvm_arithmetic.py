@@ -8,8 +8,7 @@ from typing import Any
 from llvmlite import ir
 
 from vehiclemor.codegen.elementary import elementary_operations
-from vehiclemor.codegen.operations import COMPARISONS
-from vehiclemor.codegen.vector_lanes import WIDTH
+from vehiclemor.codegen.operations import COMPARISONS, WIDTH
 
 FLAGS = ("contract",)
 DOUBLE = ir.DoubleType()

@@ -20,8 +20,15 @@ from vehiclemor.codegen.llvm_arithmetic import (
     constant,
     elementary,
 )
-from vehiclemor.codegen.operations import SEED, VECTOR_STATEMENTS, Kernel, Operation, is_entry
-from vehiclemor.codegen.vector_lanes import LANES, WIDTH
+from vehiclemor.codegen.operations import (
+    LANES,
+    SEED,
+    VECTOR_STATEMENTS,
+    WIDTH,
+    Kernel,
+    Operation,
+    is_entry,
+)
 
 POINTER = DOUBLE.as_pointer()
 

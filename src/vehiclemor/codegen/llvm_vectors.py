@@ -25,7 +25,7 @@ from typing import Any
 from llvmlite import ir
 
 from vehiclemor.codegen.llvm_arithmetic import DOUBLE, FLAGS, VECTOR
-from vehiclemor.codegen.vector_lanes import WIDTH, padded
+from vehiclemor.codegen.operations import WIDTH, padded
 
 WORD = ir.IntType(64)
 POINTER = DOUBLE.as_pointer()

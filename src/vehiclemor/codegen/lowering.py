@@ -19,14 +19,15 @@ from typing import Any, cast
 
 import sympy as sp
 
-from vehiclemor.codegen.operations import KINDS, Kernel, Listing, Value
-from vehiclemor.codegen.vector_lanes import LANES, SMALLEST_BATCH, WIDTH
+from vehiclemor.codegen.operations import KINDS, LANES, WIDTH, Kernel, Listing, Value
 from vehiclemor.symbolic.program import Function, Program
 
 # SymPy's name -> kind of operation.
 RENAMED = {"Abs": "abs"}
 # Powers that are products.
 LARGEST_PRODUCT = 4
+# Fewer calls of a function than this are evaluated one by one.
+SMALLEST_BATCH = 3
 # Functions that have a vector loop -> the calls whose values it gives.
 BATCHED: dict[str, tuple[type, ...]] = {"sincos": (sp.sin, sp.cos), "atan": (sp.atan,)}
 # Depth of assignments that are compared to decide whether two quantities are computed alike.

@@ -27,8 +27,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from vehiclemor.codegen.vector_lanes import padded
-
+# Elementary functions are evaluated this many at a time, so that the compiler makes one vector loop
+# of them.  Kernels along a path take as many samples.
+LANES = 8
+# Floats in a vector: half a batch; vectors of 512 bits were a fifth slower.
+WIDTH = LANES // 2
 # Before the name of an argument: the argument's direction, see `derivatives`.
 SEED = "_seed"
 FUNCTIONS = (
@@ -252,6 +255,11 @@ class Kernel:
 def _read(listed: str) -> tuple[list[Operation], list[int]]:
     operations, named = json.loads(listed)
     return [Operation(*map(_tuples, operation)) for operation in operations], named
+
+
+def padded(count: int) -> int:
+    """Length of a row of so many floats, padded to a multiple of the vectors' length."""
+    return -(-count // WIDTH) * WIDTH
 
 
 def is_entry(detail: Any) -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
 from vehiclemor.exceptions import PlugInError
-from vehiclemor.resources import data_folder
+from vehiclemor.files import data_folder
 
 PACKAGE = Path(__file__).resolve().parents[1]
 

@@ -12,8 +12,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from vehiclemor.codegen.derivatives import derivative
-from vehiclemor.codegen.operations import SEED, Kernel, Listing, Operation, Value, needed, uses
-from vehiclemor.codegen.vector_lanes import padded
+from vehiclemor.codegen.operations import (
+    SEED,
+    Kernel,
+    Listing,
+    Operation,
+    Value,
+    needed,
+    padded,
+    uses,
+)
 
 # Functions of a system.
 NAMES = ("constants", "derivative", "outputs")

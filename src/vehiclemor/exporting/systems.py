@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.codegen.operations import Kernel, Value
-from vehiclemor.codegen.vector_lanes import padded
+from vehiclemor.codegen.operations import Kernel, Value, padded
 from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.multibody.quantities import Quantity

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.array_shapes import check_shapes, require
+from vehiclemor.arguments import check_shapes, require
 from vehiclemor.codegen.loop_types import (
     Cube,
     Int,

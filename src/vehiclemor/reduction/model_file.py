@@ -17,10 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, flag
-from vehiclemor.array_shapes import require
+from vehiclemor.arguments import file_path, flag, require
 from vehiclemor.exceptions import FileError, InputError, VehiclemorError, one_line
-from vehiclemor.files import replaceable
+from vehiclemor.files import data_folder, replaceable
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.netcdf_file import INTEGRITY, is_saved_model, opened, write_dataset
 from vehiclemor.provenance import attributes, code_digest
@@ -30,7 +29,6 @@ from vehiclemor.reduction.training import training_summary
 from vehiclemor.reduction.trust import BANDS, InputRange
 from vehiclemor.reduction.validation import checked_fit, checked_settings, validated
 from vehiclemor.registry import component
-from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import shortened
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -84,6 +82,8 @@ def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
         code=code_digest(model.name, rom.method),
         date=datetime.now(UTC).isoformat(timespec="seconds"),
     )
+    if driven := model.definition.choice.driven:
+        described["driven_inputs"] = " ".join(driven)
     write_dataset(xr.Dataset(variables, attrs=described), path)
     return path
 
@@ -95,7 +95,7 @@ def read(path: Any) -> dict[str, Any]:
     try:
         method, name = str(attrs["method"]), str(attrs["model"])
         parts, settings, training, parameters = (_parsed(stored.pop(key)) for key in TEXTS)
-        model = _model(name, parameters)
+        model = _model(name, parameters, str(attrs.get("driven_inputs", "")).split())
         reduces: Method = component("method", method)
         checked_settings(reduces, model, validated(reduces, model.kind, settings))
         if not _alike(stored.pop("fingerprint"), fingerprint(model)):
@@ -167,12 +167,12 @@ def _parameters(model: Model) -> dict[str, Any]:
     return {name: entry.value for name, entry in model.parameters.entries.items()}
 
 
-def _model(name: str, parameters: Mapping[str, Any]) -> Model:
+def _model(name: str, parameters: Mapping[str, Any], driven: Sequence[str]) -> Model:
     """The model with these parameters; those of its parameter file keep their sources."""
-    model = build(name)
+    model = build(name, driven=driven)
     from_file = _parameters(model)
     changed = {key: value for key, value in parameters.items() if from_file.get(key) != value}
-    return build(name, overrides=changed) if changed else model
+    return build(name, overrides=changed, driven=driven) if changed else model
 
 
 def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -21,8 +21,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from vehiclemor.arguments import quoted
-from vehiclemor.array_shapes import require
+from vehiclemor.arguments import quoted, require
 from vehiclemor.codegen.operations import Operation, as_arrays, of_arrays
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import GROUPS

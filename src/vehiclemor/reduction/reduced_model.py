@@ -13,6 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import number, real_array
 from vehiclemor.exceptions import InputError, blamed
+from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction import model_file
@@ -22,7 +23,6 @@ from vehiclemor.reduction.training import own_speed, training_summary
 from vehiclemor.reduction.trust import InputRange
 from vehiclemor.reduction.validation import for_model, validated
 from vehiclemor.registry import choice, component
-from vehiclemor.resources import data_folder
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive, checked_array, checked_path
 from vehiclemor.simulation.linear_model import LinearModel
@@ -129,7 +129,7 @@ class ReducedOrderModel(ShortRepr):
             names = None if outputs is None else output_names(outputs)
             run = simulated(self.reduced, chosen, first, names)
         # A copy would take a twentieth of a short run.
-        run.__dict__["method"] = self.method
+        run.__dict__.update(method=self.method, maneuver=chosen.name)
         if self._lower_rank:
             run.__dict__["remark"] = "; ".join(filter(None, (run.remark, self._lower_rank)))
         if not run.trust and self._range is not None:

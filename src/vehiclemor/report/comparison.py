@@ -11,6 +11,7 @@ import xarray as xr
 import vehiclemor.report.criteria  # noqa: F401 - fills CRITERIA
 from vehiclemor.arguments import count, file_path
 from vehiclemor.exceptions import InputError
+from vehiclemor.files import data_names
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.findings import CRITERIA, Criterion, Finding, Results, judged
@@ -25,7 +26,6 @@ from vehiclemor.report.published import Claim, Number, load_published
 from vehiclemor.report.result_selection import result_kind
 from vehiclemor.report.sizes import size_rows
 from vehiclemor.report.unseen import protocol_rows
-from vehiclemor.resources import data_names
 from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.loading import is_study, load_studies

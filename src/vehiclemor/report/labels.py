@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pydantic import Field
 
+from vehiclemor.files import data_folder
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.resources import data_folder
 from vehiclemor.study.plans.study_file import MethodEntry, Settings
 from vehiclemor.toml_files import FileSchema, Line, read_toml
 

@@ -4,8 +4,8 @@ from functools import cache
 from importlib.metadata import version
 from typing import Literal
 
+from vehiclemor.files import data_folder
 from vehiclemor.registry import component, names
-from vehiclemor.resources import data_folder
 from vehiclemor.toml_files import FileSchema, Line, read_toml
 
 # Models of the paper: it says nothing about others in the registry.

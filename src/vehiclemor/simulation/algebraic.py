@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
-from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.operations import LANES
 from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation, cached

@@ -5,7 +5,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from vehiclemor.array_shapes import check_indices, check_shapes, require
+from vehiclemor.arguments import check_indices, check_shapes, require
 from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.loop_arguments import Spans, Subspaces

@@ -11,7 +11,7 @@ from vehiclemor.arguments import quoted
 from vehiclemor.codegen.derivatives import JacobianProduct, jacobian_product
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, loops
-from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.operations import LANES
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import checked_path

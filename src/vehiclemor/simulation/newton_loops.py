@@ -28,7 +28,7 @@ from vehiclemor.codegen.loop_types import (
     matrix,
     vector,
 )
-from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.operations import LANES
 from vehiclemor.simulation.integrators.dense_solves import small_solve
 
 CONVERGED, TOO_MANY_ITERATIONS, NOT_FINITE, SINGULAR, OFF_BRANCH = range(5)

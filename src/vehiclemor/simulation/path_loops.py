@@ -10,7 +10,7 @@ from vehiclemor.codegen.loop_types import (
     call_kernel,
     call_lanes,
 )
-from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.operations import LANES
 from vehiclemor.simulation.loop_arguments import (
     NODE_1,
     NODE_2,

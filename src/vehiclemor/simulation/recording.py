@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
-from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.operations import LANES
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import limits_of
 from vehiclemor.simulation.evaluation import address_of, evaluate, path_loops

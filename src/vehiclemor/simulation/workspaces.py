@@ -13,7 +13,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from vehiclemor.codegen.loops import Prepared, Ready
-from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.operations import LANES
 from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.loop_arguments import Output
 

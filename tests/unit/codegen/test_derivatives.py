@@ -5,9 +5,8 @@ import pytest
 
 from tests.oracles import complex_step
 from tests.unit.kernels import batch, kernel, sincos
-from vehiclemor.codegen.derivatives import FEW, derivative, jacobian_product
+from vehiclemor.codegen.derivatives import DIRECTIONS, FEW, derivative, jacobian_product
 from vehiclemor.codegen.operations import function
-from vehiclemor.codegen.vector_lanes import DIRECTIONS
 
 
 def everything(x, u, constants, result):

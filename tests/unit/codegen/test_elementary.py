@@ -7,8 +7,7 @@ import pytest
 from tests.unit.kernels import batch, kernel, sincos
 from vehiclemor.codegen.elementary import TAN_3_PI_8
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.operations import function
-from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.operations import LANES, function
 
 # Largest rounding error of sine's polynomials and of the last addition.
 ACCURACY = 1.7e-16

@@ -10,8 +10,7 @@ from tests.unit.kernels import kernel
 from tests.unit.programs import precise, run
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.lowering import kernels_of
-from vehiclemor.codegen.operations import Kernel, Listing
-from vehiclemor.codegen.vector_lanes import padded
+from vehiclemor.codegen.operations import Kernel, Listing, padded
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 

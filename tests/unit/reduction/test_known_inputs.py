@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from reduced_models import in_bounds
 from scipy.signal import lfilter
 
 import vehiclemor as vm
@@ -22,12 +23,7 @@ def shipped(name):
 
 def missed(rom, run, full):
     """Largest error of a run, in parts of the bounds of its model's protocol."""
-    found = 0.0
-    for output, bound in load_protocol(f"predictive-{rom.model.name}").definition.bounds.items():
-        error = (run.outputs - full.outputs)[:, rom.output_names.index(output)]
-        size = np.abs(error).max() if bound.measure == "max" else np.sqrt(np.mean(error**2))
-        found = max(found, size / bound.bound)
-    return found
+    return in_bounds(load_protocol(f"predictive-{rom.model.name}"), run, full)
 
 
 def pulse(rng):

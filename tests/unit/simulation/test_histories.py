@@ -10,9 +10,9 @@ import pytest
 
 import vehiclemor as vm
 from tests.models import CAR, FIDELITY, VEHICLES
-from vehiclemor.exceptions import ConvergenceError, InputError
+from vehiclemor.error_measures import max_abs, rms, signal_range
+from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.steering import lane_change
-from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.registry import component
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
@@ -121,12 +121,6 @@ def test_copies_hold_the_same_histories():
     for copy in (pickle.loads(pickle.dumps(kept)), replace(kept, remark="seen")):  # noqa: S301
         np.testing.assert_array_equal(copy.states, kept.states)
         np.testing.assert_allclose(copy["pitch"], kept["pitch"], rtol=1e-11)
-
-
-def test_an_unknown_output_is_refused():
-    for name in (*VEHICLES, "double_wishbone"):
-        with pytest.raises(InputError, match="steer_angle"):
-            run(name, "newton" if name == "double_wishbone" else "etdrk4")["steer_angle"]
 
 
 def test_a_run_is_no_sequence():

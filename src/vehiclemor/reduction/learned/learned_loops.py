@@ -4,7 +4,7 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-from vehiclemor.array_shapes import check_shapes, require
+from vehiclemor.arguments import check_shapes, require
 from vehiclemor.codegen.loop_types import Float, Int, IntMatrix, IntVector, Matrix, Vector, vector
 
 # Beyond this magnitude of a standardised coordinate a run has diverged.

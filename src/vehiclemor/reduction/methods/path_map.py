@@ -18,12 +18,11 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from pydantic import Field
 
-from vehiclemor.array_shapes import check_distinct_indices, check_indices, check_shapes, require
+from vehiclemor.arguments import check_distinct_indices, check_indices, check_shapes, require
 from vehiclemor.codegen.derivatives import JacobianProduct, jacobian_product
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
-from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value
-from vehiclemor.codegen.vector_lanes import padded
+from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value, padded
 from vehiclemor.exceptions import InputError, UnreachableError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from vehiclemor.array_shapes import require
+from vehiclemor.arguments import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import KINDS
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.array_shapes import check_shapes, require
+from vehiclemor.arguments import check_shapes, require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.algebraic_loops import Windows

@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.array_shapes import check_shapes, require
+from vehiclemor.arguments import check_shapes, require
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES
 from vehiclemor.short_repr import ShortRepr

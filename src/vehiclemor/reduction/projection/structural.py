@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import Field, field_validator
 
-from vehiclemor.array_shapes import require
+from vehiclemor.arguments import require
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import Structure

@@ -14,11 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.array_shapes import check_shapes, require
+from vehiclemor.arguments import check_shapes, require
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, Prepared, loops
-from vehiclemor.codegen.operations import Kernel
-from vehiclemor.codegen.vector_lanes import LANES, padded
+from vehiclemor.codegen.operations import LANES, Kernel, padded
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.trust import by_factor, inputs_beyond
 from vehiclemor.reduction.vehicle.decoding_loops import (

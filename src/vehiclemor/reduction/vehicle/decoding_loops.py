@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import Cube, Float, Int, IntVector, Matrix, Vector
-from vehiclemor.codegen.vector_lanes import LANES
+from vehiclemor.codegen.operations import LANES
 from vehiclemor.simulation.path_loops import kernel_path, lane_path
 
 # What has decayed to this part of what it was is nothing.

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.array_shapes import check_distinct_indices, require
+from vehiclemor.arguments import check_distinct_indices, require
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.operations import (
     COMPARISONS,
@@ -29,9 +29,9 @@ from vehiclemor.codegen.operations import (
     Listing,
     Operation,
     Value,
+    padded,
     pruned,
 )
-from vehiclemor.codegen.vector_lanes import padded
 from vehiclemor.simulation.evaluation import at_samples
 from vehiclemor.simulation.system import System
 

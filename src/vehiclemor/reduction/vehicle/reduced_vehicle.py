@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.array_shapes import check_shapes, require
+from vehiclemor.arguments import check_shapes, require
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost

@@ -10,12 +10,11 @@ from matplotlib.figure import Figure
 from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
 from vehiclemor.exceptions import InputError
 from vehiclemor.failure import attempt_apart
-from vehiclemor.files import make_folder
+from vehiclemor.files import data_names, make_folder
 from vehiclemor.registry import names, unknown
 from vehiclemor.report import default_studies
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.result_plot import draw, pictures_of
-from vehiclemor.resources import data_names
 from vehiclemor.study.plans.loading import is_study, refuse_doubles
 from vehiclemor.study.run import run_studies
 

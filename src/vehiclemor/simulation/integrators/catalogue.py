@@ -138,9 +138,10 @@ def time_loop(name: str, formulation: str) -> Loop:
     modules = (
         "simulation.loop_arguments",
         "inputs.polynomial_loops",
+        "simulation.integrators.contract",
         "simulation.integrators.dense_solves",
         *(f"simulation.formulations.{form}" for form in formulations),
-        *(f"simulation.integrators.{module}" for module in ("shared", *integrator(name).modules)),
+        *(f"simulation.integrators.{module}" for module in integrator(name).modules),
         "simulation.integrators.loop",
     )
     with first_use(f"the time loop of {name}"):
@@ -165,7 +166,7 @@ LOOP_SOURCES = (
     "simulation.loop_arguments",
     *(f"simulation.formulations.{name}" for name in FORMULATIONS),
     *(f"simulation.integrators.{name}" for name in INTEGRATORS),
-    *(f"simulation.integrators.{name}" for name in ("dense_solves", "explicit_pair", "shared")),
+    *(f"simulation.integrators.{name}" for name in ("contract", "dense_solves", "explicit_pair")),
     "simulation.integrators.loop",
     "simulation.path_loops",
 )

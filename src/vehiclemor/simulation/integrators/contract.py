@@ -1,8 +1,9 @@
 """What the time loop calls: seven functions of an integrator, four of a formulation.
 
-None of these is ever run.  Loops import them from here, and are compiled with the functions of the
-same name of one integrator and one formulation, see `catalogue.time_loop`.  Functions that several
-integrators share stand in `shared`, those of all explicit pairs in `explicit_pair`.
+Loops import them from here, and are compiled with the functions of the same name of one integrator
+and one formulation, see `catalogue.time_loop`.  Three are complete: an integrator that does not
+replace them takes steps of any size, and its dense output is the cubic through states and slopes at
+both ends of a step.  Functions of all explicit pairs stand in `explicit_pair`.
 
 The arguments are bundles, see `loop_arguments`: `problem` is a `Problem`, `method` a `Method`,
 `control` a `Control`; `work` is the integrator's scratch space, a named tuple with at least the
@@ -14,6 +15,9 @@ from vehiclemor.codegen.loop_types import COMPILED_ONLY
 # Vectors of every integrator's scratch space: reduced state and right-hand side at the beginning
 # of a step, both at its end, its error, and a state within the step.
 WORK = ("y", "f", "new", "f_new", "error", "middle")
+# Coefficients of the cubic, by powers of the part of a step that has passed.
+POWERS = 3
+INLINED = ("longest_step", "prepare_curve", "interpolate")
 
 
 # --- integrators ----------------------------------------------------------------------------------
@@ -31,7 +35,7 @@ def begin(problem, t, method, work):
 
 def longest_step(h, method, control, work):
     """The longest step in s that the method can take and that is not above h."""
-    raise NotImplementedError(COMPILED_ONLY)
+    return h
 
 
 def step(problem, t, h, method, work, counts):
@@ -45,13 +49,20 @@ def accept(problem, t, h, method, work, counts):
 
 
 def prepare_curve(h, method, work):
-    """Prepare dense output of an accepted step."""
-    raise NotImplementedError(COMPILED_ONLY)
+    """Prepare dense output of an accepted step: coefficients by powers of the part passed."""
+    y, new, f, f_new, curve = work.y, work.new, work.f, work.f_new, work.curve
+    for i in range(len(y)):
+        rise, before, after = new[i] - y[i], h * f[i], h * f_new[i]
+        curve[0, i] = before
+        curve[1, i] = 3.0 * rise - 2.0 * before - after
+        curve[2, i] = before + after - 2.0 * rise
 
 
 def interpolate(part, h, work):
     """State where a part of the step has passed, into `work.middle`."""
-    raise NotImplementedError(COMPILED_ONLY)
+    y, curve = work.y, work.curve
+    for i in range(len(y)):
+        work.middle[i] = y[i] + part * (curve[0, i] + part * (curve[1, i] + part * curve[2, i]))
 
 
 # --- formulations ---------------------------------------------------------------------------------

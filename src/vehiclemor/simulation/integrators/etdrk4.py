@@ -36,8 +36,7 @@ import numpy as np
 
 from vehiclemor.codegen.loop_types import IntVector, Matrix, Vector, call_kernel, matrix, vector
 from vehiclemor.inputs.polynomial_loops import input_at
-from vehiclemor.simulation.integrators.contract import rhs
-from vehiclemor.simulation.integrators.shared import POWERS
+from vehiclemor.simulation.integrators.contract import POWERS, rhs
 from vehiclemor.simulation.loop_arguments import RHS_CALLS, STEP_KERNEL
 
 # Called once in the time loop: bundles of arrays cost more to pass than they take inside.

@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.codegen.loop_types import IntVector, Matrix, Vector, matrix
-from vehiclemor.simulation.integrators.contract import rhs
+from vehiclemor.simulation.integrators.contract import POWERS, rhs
 from vehiclemor.simulation.integrators.dense_solves import factorise, substitute
-from vehiclemor.simulation.integrators.shared import POWERS
 from vehiclemor.simulation.loop_arguments import (
     FACTORISATIONS,
     JACOBIANS,

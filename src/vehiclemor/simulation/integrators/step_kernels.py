@@ -18,8 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.operations import Kernel, Listing, Value
-from vehiclemor.codegen.vector_lanes import padded
+from vehiclemor.codegen.operations import Kernel, Listing, Value, padded
 from vehiclemor.simulation.integrators import etdrk4
 
 # Vectors that a step hands back.
