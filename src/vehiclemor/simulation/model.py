@@ -283,7 +283,7 @@ class Model(ShortRepr):
 
     def bare(self, function: str) -> BareKernel:
         """`rhs`, `outputs` or another function for integrators of others, see `BareKernel`."""
-        function = "derivative" if function == "rhs" else function
+        function = "derivative" if str(function) == "rhs" else function
         self.require(function)
         return self.kernels.bare(function, self.constants)
 
