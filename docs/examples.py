@@ -13,6 +13,7 @@ ORDER = (
     "repeat_or_predict",
     "my_steering_log",
     "double_lane_change",
+    "around_a_course",
     "predictive_control",
     "thousand_maneuvers",
     "truck_on_a_road",

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.error_measures import rms
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.inputs.steering import lane_change, rack_lane_change
-from vehiclemor.metrics import rms
 from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated

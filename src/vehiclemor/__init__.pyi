@@ -9,14 +9,14 @@ from .api import run_study as run_study
 from .api import simulate as simulate
 from .api import status as status
 from .api import studies as studies
+from .error_measures import errors as errors
 from .exceptions import VehiclemorError as VehiclemorError
 from .exporting.export import export as export
+from .handling.metrics import metrics as metrics
 from .inputs.maneuver import maneuver as maneuver
 from .inputs.road import road as road
 from .inputs.signal import Signal as Signal
 from .inputs.signal import many_signals as many_signals
-from .metrics import errors as errors
-from .metrics import weighted_rms as weighted_rms
 from .reduction.reduced_model import load as load
 from .reduction.reduced_model import rom as rom
 from .report.comparison import compare as compare
@@ -24,6 +24,7 @@ from .report.figures.animation import animate as animate
 from .report.figures.catalogue import figures as figures
 from .report.page import write_report as write_report
 from .report.study_formats import convert as convert
+from .ride_comfort import weighted_rms as weighted_rms
 from .simulation.batches import simulate_many as simulate_many
 from .study.dataset import dataset as dataset
 from .study.judge import judge as judge

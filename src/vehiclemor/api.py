@@ -91,6 +91,7 @@ def model(
     name: str,
     parameters: Mapping[str, object] | None = None,
     parameter_file: str | Path | None = None,
+    inputs: Mapping[str, object] | None = None,
 ) -> Model:
     """A model ready to run: derived, compiled (or fetched from the kernel cache), parametrised.
 
@@ -102,6 +103,9 @@ def model(
         Parameter name -> value in SI units that replaces the file's.
     parameter_file
         Parameter file; the model's public data by default.
+    inputs
+        Optional input, such as the friction of a tire, -> constant value in SI units in runs that
+        don't drive it.  It is a parameter then.
 
     Raises
     ------
@@ -111,7 +115,7 @@ def model(
     from vehiclemor.simulation.build import build
 
     path = None if parameter_file is None else file_path("parameter_file", parameter_file)
-    return build(name, path, parameters)
+    return build(name, path, parameters, constant_inputs=inputs)
 
 
 def reduce(
@@ -150,7 +154,7 @@ def reduce(
     from vehiclemor.simulation.run_timer import one_thread
     from vehiclemor.study.evaluate import known_inputs
     from vehiclemor.study.plans.training import training_set
-    from vehiclemor.study.scenario import training_run
+    from vehiclemor.study.scenario import driven_by_all, training_run
 
     ready = model if isinstance(model, Model) else build(model)
     definition = component("method", method)
@@ -159,6 +163,7 @@ def reduce(
     complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
     checked_settings(definition, ready, complete)
     scenarios = training_set(ready, method, training)
+    ready = driven_by_all(ready, scenarios)
     with first_use(f"{ready.name} with {method}"), one_thread():
         runs = [training_run(ready, scenario) for scenario in scenarios]
         reduced = fitted(definition, ready, runs, complete)
@@ -259,7 +264,7 @@ def _scenario(
     from vehiclemor.study.scenario import Scenario, check
 
     chosen = model.definition.maneuver if maneuver is None else maneuver
-    base = checked_maneuver(chosen, model.definition)
+    base = checked_maneuver(chosen, model.driven_by(chosen).definition)
     start = model.starts[0] if start is None else start
     begin = start if isinstance(start, str) else tuple(model.start(start).tolist())
     pairs = zip(FACTORS, factors, strict=True)

@@ -33,6 +33,8 @@ class Declared:
         1: a scalar, given as a number; 3: a point, given as a list.
     above, at_least, at_most
         Bounds of every component, in the unit; no bound where None.
+    default
+        Value of an optional input that is a parameter; None of a parameter that files have.
     """
 
     unit: str
@@ -40,6 +42,7 @@ class Declared:
     above: float | None = None
     at_least: float | None = None
     at_most: float | None = None
+    default: float | None = None
 
 
 def point() -> Declared:
@@ -118,13 +121,14 @@ def load_parameters(
     content = read_toml(path, ParameterFile)
     if content.model != model:
         raise FileError(f"{path}: parameters of model {content.model!r}, not of {model!r}")
-    for name in [*expected, *content.parameters]:
+    in_file = {name: declared for name, declared in expected.items() if declared.default is None}
+    for name in [*in_file, *content.parameters]:
         if name not in content.parameters:
             raise FileError(f"{path}: parameters.{name} is missing")
-        if name not in expected:
+        if name not in in_file:
             raise FileError(f"{path}: parameters.{name} is not a parameter of {model}")
-    entries = {name: content.parameters[name] for name in expected}
-    for name, declared in expected.items():
+    entries = {name: content.parameters[name] for name in in_file}
+    for name, declared in in_file.items():
         entry = entries[name]
         where = f"{path}: parameters.{name}"
         if entry.unit != declared.unit:
@@ -134,7 +138,30 @@ def load_parameters(
         if complaint := _complaint(entry.value, declared):
             raise FileError(f"{where}: {complaint}")
     given = {} if overrides is None else overrides
-    return overridden(ParameterSet(model, entries), expected, given)
+    return with_entries(ParameterSet(model, entries), expected, given)
+
+
+def with_entries(
+    parameters: ParameterSet, expected: Mapping[str, Declared], overrides: Mapping[str, object]
+) -> ParameterSet:
+    """What is expected of the parameters, optional inputs at defaults, with values replaced."""
+    entries = {
+        name: parameters.entries.get(name) or _optional_input(name, declared)
+        for name, declared in expected.items()
+    }
+    return overridden(ParameterSet(parameters.model, entries), expected, overrides)
+
+
+def _optional_input(name: str, declared: Declared) -> Parameter:
+    """The entry of an optional input that is a parameter, at its default."""
+    return Parameter(
+        value=float(declared.default or 0.0),
+        unit=declared.unit,
+        source="default",
+        status="assumed",
+        symbol=name,
+        description="optional input that is constant",
+    )
 
 
 def overridden(

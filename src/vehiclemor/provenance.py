@@ -14,7 +14,7 @@ PACKAGES = ("vehiclemor", "numpy", "scipy", "sympy", "numba", "xarray", "netCDF4
 LAYERS = ("multibody", "symbolic", "codegen", "inputs", "simulation", "reduction")
 FILES = (
     "parameters.py",
-    "metrics.py",
+    "error_measures.py",
     "study/scenario.py",
     "study/experiment.py",
     "failure.py",

@@ -125,7 +125,10 @@ def test_the_rack_pulse_is_as_described_and_has_no_corner(frequency, amplitude):
     np.testing.assert_allclose(near, [expected, expected], rtol=1e-5, atol=3e-12)
 
 
-@pytest.mark.parametrize("shape", ["lane_change", "step_steer", "sine_sweep", "multisine"])
+SHAPES = ["lane_change", "step_steer", "sine_sweep", "multisine", "slow_ramp_steer", "weave"]
+
+
+@pytest.mark.parametrize("shape", [*SHAPES, "sine_with_dwell"])
 def test_racks_move_as_they_say(shape):
     rack, steering = vm.maneuver(f"rack_{shape}"), vm.maneuver(shape)
     times = np.linspace(0.0, rack.duration, 20001)
@@ -135,3 +138,20 @@ def test_racks_move_as_they_say(shape):
         np.testing.assert_allclose(higher[5:-5], wanted, atol=5e-3 * np.abs(higher).max())
     wanted = -0.0046903 / 0.0300768 * steering.at(times)[:, 0]
     np.testing.assert_allclose(place, wanted, rtol=1e-12)
+
+
+def test_sine_with_dwell_is_that_of_the_standard():
+    steer = vm.maneuver("sine_with_dwell")
+    period = 1.0 / 0.7
+    largest = np.abs(steer.at(steer.times)).max()
+
+    def at(*times: float) -> np.ndarray:
+        return steer.at(1.0 + np.array(times))[:, 0] / largest
+
+    # A sine of 0.7 Hz, held for half a second from its second peak on.
+    quarter = np.linspace(0.06, 0.7 * period, 50)
+    assert at(*quarter) == pytest.approx(np.sin(2.0 * np.pi * 0.7 * quarter), abs=1e-9)
+    assert at(*np.linspace(0.75 * period + 0.06, 0.75 * period + 0.44, 9)) == pytest.approx(-1.0)
+    last = np.linspace(0.8 * period, period - 0.06, 20)
+    assert at(*(last + 0.5)) == pytest.approx(np.sin(2.0 * np.pi * 0.7 * last), abs=1e-9)
+    assert at(-0.06, period + 0.56, 4.9) == pytest.approx(0.0, abs=1e-12)

@@ -205,6 +205,7 @@ def export(
     out: Path | None = None,
     overwrite: bool = False,
     step: float = STEP,
+    inputs: Annotated[list[str] | None, Several, Parameter(name="--input")] = None,
 ) -> None:
     """Export a model, or a reduced one, for another tool.
 
@@ -225,6 +226,8 @@ def export(
         Replace an export that is there.
     step
         Step size in s of the integrator in C and FMU.
+    inputs
+        Optional inputs of the full model that the export has, such as brake_torque_FL.
     """
     given, values = key_values("--set", settings), key_values("--parameter", parameter)
     file = Path(model).suffix == ".nc"
@@ -242,7 +245,8 @@ def export(
         out = destination(name_of(model, method), to, out, overwrite)
         if method is not None:
             chosen = vm.reduce(chosen, method, **given)
-    print(f"written: {vm.export(chosen, to, out, overwrite=overwrite, step=step)}")
+    written = vm.export(chosen, to, out, overwrite=overwrite, step=step, inputs=inputs or ())
+    print(f"written: {written}")
 
 
 def dataset(model: str, *, out: Path | None = None) -> None:

@@ -49,6 +49,7 @@ def run(
         Address of a dask scheduler whose workers compute.
     """
     from vehiclemor.report.frames import counted_ends
+    from vehiclemor.report.screens import counts_text
     from vehiclemor.study.run import run_studies
 
     began, errors = time.perf_counter(), 0
@@ -64,6 +65,8 @@ def run(
         ends = zip(dataset["status"].values.flat, dataset["message"].values.flat, strict=True)
         _print_reasons(Counter(end for end in ends if end[0] in ("rejected", "error")))
         errors += int((dataset["status"] == "error").sum())
+        if "scenario_set" in dataset:
+            print(counts_text(dataset))
     print(f"{time.perf_counter() - began:.1f} s")
     return FAILED if errors else 0
 

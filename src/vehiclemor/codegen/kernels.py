@@ -198,8 +198,11 @@ class Derivation(ShortRepr):
         return Kernels(self.sources.values())
 
 
-def derivation(name: str, derive: Callable[[], Program]) -> Derivation:
-    """The derivation of a model: from disk, or by `derive` and then written there."""
+def derivation(name: str, derive: Callable[[], Program], choice: str = "") -> Derivation:
+    """The derivation of a model: from disk, or by `derive` and then written there.
+
+    Choice tells apart what one function derives for other arguments.
+    """
 
     def make() -> bytes:
         # Nothing else is symbolic: a model that was derived before starts without SymPy.
@@ -207,16 +210,17 @@ def derivation(name: str, derive: Callable[[], Program]) -> Derivation:
 
         return json.dumps([asdict(kernel) for kernel in kernels_of(derive()).values()]).encode()
 
-    return _read(from_cache(_file(name, derive), make))
+    return _read(from_cache(_file(name, derive, choice), make))
 
 
-def is_derived(name: str, derive: Callable[[], Program]) -> bool:
+def is_derived(name: str, derive: Callable[[], Program], choice: str = "") -> bool:
     """Whether the derivation of a model is on disk."""
-    return (cache_folder() / _file(name, derive)).exists()
+    return (cache_folder() / _file(name, derive, choice)).exists()
 
 
-def _file(name: str, derive: Callable[[], Program]) -> str:
-    parts = source_digest(LAYERS), plug_in_digest((derive,)), name, f"sympy {version('sympy')}"
+def _file(name: str, derive: Callable[[], Program], choice: str) -> str:
+    sources = source_digest(LAYERS), plug_in_digest((derive,))
+    parts = *sources, name, choice, f"sympy {version('sympy')}"
     return f"derivations/{name}_{digest_of(parts)}.json"
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from vehiclemor.arguments import file_path, flag, number, quoted, within
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import begins_with, make_folder, replaceable, write_whole
+from vehiclemor.inputs.columns import listed
 from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def export(
     *,
     overwrite: bool = False,
     step: float = STEP,
+    inputs: str | Sequence[str] = (),
 ) -> Any:
     """A full or reduced model for another tool.
 
@@ -67,6 +69,9 @@ def export(
         Whether an export that is there is replaced.
     step
         Of the integrator that C and FMU bring along, in s (Runge-Kutta of order 4).
+    inputs
+        Optional inputs of a full model that the export has behind those of every run, such as
+        `brake_torque_FL`.
 
     Returns
     -------
@@ -87,7 +92,7 @@ def export(
         from vehiclemor.simulation.build import build
 
         model = build(model)
-    system = system_of(model)
+    system = system_of(_with_inputs(model, listed(inputs)))
     path: Any = None
     if out is not None or to in FILES:
         path = destination(system.name, to, out, overwrite)
@@ -108,6 +113,21 @@ def export(
     if path is None:
         return exported
     return write_whole(path, lambda temporary: exported.save(str(temporary)))
+
+
+def _with_inputs(
+    model: Model | ReducedOrderModel, names: Sequence[str]
+) -> Model | ReducedOrderModel:
+    """A model with these inputs; `InputError` if it can't have one of them."""
+    from vehiclemor.simulation.model import Model
+
+    if not names or not isinstance(full := getattr(model, "model", model), Model):
+        return model
+    # A reduced model has the inputs of its training.
+    optional = full.definition.optional_inputs if full is model else ()
+    for name in names:
+        choice("input", name, (*full.inputs, *(quantity.name for quantity in optional)))
+    return full.driving(names) if full is model else model
 
 
 def destination(name: str, to: str, out: str | Path | None, overwrite: bool) -> Path:

@@ -111,7 +111,8 @@ def variables_of(system: ExportedSystem) -> dict[int, Variable]:
         named = f"der(state.{q.name})", f"{q.unit}/s", f"rate of: {q.long_name}"
         variables.append(Variable(*named, *of_states, "calculated", None, reference))
     variables += [
-        Variable(q.name, q.unit, q.long_name, "input", "continuous", "", 0.0) for q in system.inputs
+        Variable(q.name, q.unit, q.long_name, "input", "continuous", "", q.default or 0.0)
+        for q in system.inputs
     ]
     variables += [
         Variable(q.name, q.unit, q.long_name, "output", "continuous", "calculated")

@@ -23,11 +23,17 @@ def checked_maneuver(maneuver: str | Excitation, definition: ModelDefinition) ->
     return _checked(maneuver, definition)
 
 
+def completed(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
+    """A maneuver with all inputs of a model in its order, those that it lacks at their defaults."""
+    names = tuple(quantity.name for quantity in definition.inputs)
+    return maneuver.for_inputs(names, tuple(q.default or 0.0 for q in definition.inputs))
+
+
 # A maneuver is checked once for all its runs, and so is a signal that has been completed.
 @cached
 def _checked(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
     names = tuple(quantity.name for quantity in definition.inputs)
-    complete = maneuver.for_inputs(names)
+    complete = completed(maneuver, definition)
     if complete.inputs != names:
         raise InputError(
             f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "
@@ -58,11 +64,19 @@ def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
         )
     if len(outside):
         j = outside[since[outside].argmin()]
-        name, unit = definition.inputs[j].name, definition.inputs[j].unit
-        value = maneuver.at(since[j : j + 1])[0, j]
+        quantity, value = definition.inputs[j], maneuver.at(since[j : j + 1])[0, j]
+        unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+        said = f"is {value:.4g}{unit} at t = {since[j]:.6g} s"
+        if low[j] <= value <= high[j]:
+            # It only just leaves there.
+            extent = maneuver.extent
+            value = extent.low[j] if extent.low[j] < low[j] else extent.high[j]
+            said = f"reaches {value:.4g}{unit} after t = {since[j]:.6g} s"
+        cubic = isinstance(maneuver, Signal) and maneuver.hold == "cubic"
+        hint = "; a cubic hold overshoots its samples, a linear one does not" if cubic else ""
         raise InputError(
-            f"{maneuver}: input {name} is {value:.4g} {unit} at t = {since[j]:.6g} s; "
-            f"{definition.name} holds from {low[j]:g} to {high[j]:g} {unit}"
+            f"{maneuver}: input {quantity.name} {said}; "
+            f"{definition.name} holds from {low[j]:g} to {high[j]:g}{unit}{hint}"
         )
 
 

@@ -12,12 +12,14 @@ import numpy as np
 from vehiclemor.arguments import number, quoted, real_array
 from vehiclemor.exceptions import FileError, InputError, one_line
 from vehiclemor.files import NO_FILE
+from vehiclemor.multibody.quantities import integral_of
 from vehiclemor.registry import choice
 
 # Usual separators of columns, to guess the one that is meant.
 SEPARATORS = ",;\t| "
 # Units of logged inputs -> SI.
-UNITS = {"SI": 1.0, "deg": np.pi / 180.0, "mm": 1e-3}
+UNITS = {"SI": 1.0, "rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "mm": 1e-3}
+UNITS |= {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "s": 1.0, "ms": 1e-3}
 
 
 def csv_samples(
@@ -61,9 +63,9 @@ def csv_samples(
     table.columns = table.columns.astype(str)
     columns = inputs if isinstance(inputs, Mapping) else {name: name for name in listed(inputs)}
     columns = columns or {name: name for name in table if name != time}
-    for name in listed([time, *columns.values()]):
+    options = [*columns] if isinstance(inputs, Mapping) else ["inputs"] * len(columns)
+    for option, name in zip(["time", *options], listed([time, *columns.values()]), strict=True):
         if name not in table:
-            option = "time" if name == time else "inputs"
             known = f"set {option}= to one of {', '.join(table)}"
             raise InputError(f"{path}: there is no column {quoted(name)}: {known}")
         if table[name].dtype.kind not in "iuf":
@@ -118,14 +120,6 @@ def column_names(inputs: Any, columns: int) -> tuple[str, ...]:
     if len(set(names)) < len(names) or len(names) not in (0, columns):
         raise InputError(f"a signal of {columns} columns can't be named {quoted(names)}")
     return names
-
-
-def integral_of(name: str) -> str:
-    """Name of the input whose time derivative has this name, such as s of s_dot; else empty."""
-    base, dot, order = name.rpartition("_")
-    if order == "ddot":
-        return f"{base}_dot"
-    return base if dot and order == "dot" else ""
 
 
 def derivative_order(name: str, inputs: Sequence[str]) -> int:

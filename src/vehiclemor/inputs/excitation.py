@@ -98,9 +98,12 @@ class Excitation(ShortRepr):
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Self:
         """The excitation with its factors set; `InputError` if one is out of its bounds."""
 
-    def for_inputs(self, names: tuple[str, ...]) -> Self:  # noqa: ARG002
-        """The excitation of a model with these inputs."""
-        return self
+    @abstractmethod
+    def for_inputs(self, names: tuple[str, ...], defaults: tuple[float, ...] = ()) -> Self:
+        """The excitation of a model with these inputs, those that it lacks at their defaults.
+
+        Defaults are 0 by default.  An excitation that gives further inputs is returned as it is.
+        """
 
     def subdivided(self, parts: int) -> Self:
         """The same inputs, each interval between output times divided into so many parts."""

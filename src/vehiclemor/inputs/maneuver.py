@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from itertools import islice
 from typing import Any
 
@@ -31,6 +31,7 @@ from vehiclemor.inputs.excitation import (
 )
 from vehiclemor.inputs.polynomial_loops import Pieces
 from vehiclemor.inputs.polynomials import fitted_pieces
+from vehiclemor.multibody.quantities import integral_of
 from vehiclemor.registry import component
 
 MOST_CORNERS = 10_000
@@ -136,6 +137,21 @@ class Maneuver(Excitation):
             )
         return values
 
+    def for_inputs(self, names: tuple[str, ...], defaults: tuple[float, ...] = ()) -> Maneuver:
+        """The maneuver with all inputs of a model; itself where it can't be completed.
+
+        What it lacks is at its default, 0 by default; a derivative of what it gives is not.
+        """
+        lacking = [name for name in names if name not in self.inputs]
+        derived = any(integral_of(name) in self.inputs for name in lacking)
+        if self.inputs == names or derived or not {*self.inputs} <= {*names}:
+            return self
+        values = tuple(defaults) or (0.0,) * len(names)
+        signal = _completed(self.signal, self.inputs, names, values)
+        at_zero = not any(dict(zip(names, values, strict=True))[name] for name in lacking)
+        linear = self.linear_in_amplitude and at_zero
+        return replace(self, inputs=names, signal=signal, linear_in_amplitude=linear)
+
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Maneuver:
         """The maneuver with its factors set; `InputError` if one is out of its bounds."""
         return replace(self, frequency_factor=frequency, amplitude_factor=amplitude)
@@ -162,6 +178,31 @@ class Maneuver(Excitation):
             return None
         unit = self.perturbed(self.frequency_factor)
         return unit if _is_linear(unit) else None
+
+
+# One function for equal arguments: maneuvers with the same functions are equal.
+@lru_cache(maxsize=CACHED)
+def _completed(
+    signal: Callable[..., np.ndarray],
+    given: tuple[str, ...],
+    names: tuple[str, ...],
+    defaults: tuple[float, ...],
+) -> Callable[..., np.ndarray]:
+    """A signal with a column for each of the names, constant where it has none."""
+    columns = tuple(names.index(name) for name in given)
+    return partial(_filled, signal, columns, defaults)
+
+
+def _filled(
+    signal: Callable[..., np.ndarray],
+    columns: tuple[int, ...],
+    defaults: tuple[float, ...],
+    times: np.ndarray,
+    *factors: float,
+) -> np.ndarray:
+    values = np.tile(np.array(defaults), (len(times), 1))
+    values[:, columns] = signal(times, *factors)
+    return values
 
 
 @lru_cache(maxsize=CACHED)

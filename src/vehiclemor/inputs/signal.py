@@ -15,7 +15,6 @@ from vehiclemor.inputs.columns import (
     column_names,
     csv_samples,
     derivative_order,
-    integral_of,
     listed,
     sample_arrays,
     unit_factor,
@@ -32,6 +31,7 @@ from vehiclemor.inputs.excitation import (
 )
 from vehiclemor.inputs.interpolation import HOLDS, interpolants, time_derivative
 from vehiclemor.inputs.polynomial_loops import Pieces
+from vehiclemor.multibody.quantities import integral_of
 from vehiclemor.registry import choice
 
 # Time (s) between output times, as of the registered maneuvers of vehicles.
@@ -107,8 +107,8 @@ class Signal(Excitation):
             ends the run; `cubic`, the spline with continuous second derivatives.
         inputs
             Names of the columns; by default they are all inputs of a model, in its order.  Further
-            inputs of a model are 0, but derivatives of one that is given (`s_dot` and `s_ddot` of
-            `s`) follow from it; that needs a cubic hold.
+            inputs of a model are 0 or at their default, but derivatives of one that is given
+            (`s_dot` and `s_ddot` of `s`) follow from it; that needs a cubic hold.
         output_step
             About the time in s between output times.
 
@@ -175,13 +175,13 @@ class Signal(Excitation):
             duration=float(self.nominal_pieces.edges[-1]) / frequency,
         )
 
-    def for_inputs(self, names: tuple[str, ...]) -> Signal:
+    def for_inputs(self, names: tuple[str, ...], defaults: tuple[float, ...] = ()) -> Signal:
         """The signal with all inputs of a model, in its order; `InputError` if they don't fit."""
         names = listed(names)
-        return self if self.inputs == names else self._completed(names)
+        return self if self.inputs == names else self._completed(names, defaults)
 
     @cached
-    def _completed(self, names: tuple[str, ...]) -> Signal:
+    def _completed(self, names: tuple[str, ...], defaults: tuple[float, ...]) -> Signal:
         columns = self.nominal_pieces.coefficients.shape[1]
         needed = ", ".join(names)
         if not self.inputs:
@@ -197,17 +197,21 @@ class Signal(Excitation):
                     f"{self} gives input {name!r}, the model needs {needed}: "
                     f"say which column is which input"
                 )
-        coefficients = np.stack([self._column(name) for name in names], axis=1)
+        values = dict(zip(names, defaults, strict=False))
+        columns = [self._column(name, values.get(name, 0.0)) for name in names]
+        coefficients = np.stack(columns, axis=1)
         pieces = self.nominal_pieces._replace(coefficients=coefficients)
         return replace(self, inputs=names, nominal_pieces=pieces)
 
-    def _column(self, name: str) -> np.ndarray:
+    def _column(self, name: str, default: float) -> np.ndarray:
         """Coefficients (pieces, degree + 1) of an input, at factors of 1."""
         pieces, order = self.nominal_pieces, 0
         while name not in self.inputs:
             lower = integral_of(name)
             if not lower:
-                return np.zeros_like(pieces.coefficients[:, 0])
+                constant = np.zeros_like(pieces.coefficients[:, 0])
+                constant[:, 0] = default
+                return constant
             name, order = lower, order + 1
         if order and self.hold != "cubic":
             raise InputError(f"{self}: derivatives of {name} follow from a cubic hold alone")
@@ -269,7 +273,7 @@ class Signal(Excitation):
         inputs
             Columns to take, or input -> column where they have other names; all by default.
         unit
-            Of these columns: `SI`, `deg` or `mm`.
+            Of these columns: `SI`, `rad`, `deg`, `m`, `mm`, `m/s`, `km/h`, `mph`.
         ratio
             Divides them, as a steering ratio does the angle of a steering wheel.
         hold, output_step, name

@@ -1,9 +1,17 @@
-"""Open-loop steering of the vehicles: lane change, straight ahead, step, sine sweep, multisine.
+"""Open-loop steering of the vehicles: lane change, straight ahead, and tests of the standards.
 
 Each shape is smooth to its second derivative, since a steering rack whose velocity jumps would need
 an infinite force.  ISO 7401 (lateral transient response): a step to a lateral acceleration of
 4 m/s^2, sine sweeps, and signals of several frequencies.  The amplitudes give 4 m/s^2 (step) and
 about 2 m/s^2 (sweep, multisine) at 20 m/s.
+
+ISO 4138 (steady turn): steering that rises slowly, to about 4 m/s^2.  ISO 13674-1 (on-centre
+handling): weave at 0.2 Hz and 1 m/s^2.  49 CFR 571.126 (FMVSS 126) and UN R140 (stability control):
+one period of a sine of 0.7 Hz that dwells at its second peak for 0.5 s; the amplitude factor counts
+multiples of the steering that gives 0.3 g in a slow ramp at 80 km/h.
+
+The cars coast from the speed of the parameter `initial_speed`, 20 m/s by default; the standards
+ask for 80 km/h (ISO 7401, FMVSS 126) and 100 km/h (ISO 13674-1).
 """
 
 from collections.abc import Callable
@@ -32,11 +40,20 @@ RATE = 50
 STEP_SIZE = 0.9
 SWEEP_SIZE = 0.4
 MULTISINE_SIZE = 0.16
+WEAVE_SIZE = 0.22
+DWELL_SIZE = 0.56
 # Frequencies (Hz) of sweep and multisine.
 SWEEP_FIRST, SWEEP_LAST = 0.2, 1.6
 MULTISINE = np.array([0.15, 0.35, 0.6, 0.95, 1.4])
 # Phases after M. R. Schroeder, IEEE Trans. Inf. Theory 16 (1970), 85-89: a low peak.
 PHASES = -np.pi * np.arange(5) * np.arange(1, 6) / 5
+# Slow ramp: size after a second.  Weave: frequency in Hz.
+RAMP_RATE, RAMP_DURATION = 0.05, 21.0
+WEAVE_FREQUENCY, WEAVE_DURATION = 0.2, 22.0
+# Sine with dwell: frequency in Hz, length of the dwell, of the transition into and out of it (s).
+DWELL_FREQUENCY, DWELL, TRANSITION, DWELL_DURATION = 0.7, 0.5, 0.1, 6.0
+# Periods of the sine before the dwell.
+BEFORE_DWELL = 0.75
 
 # (Times (n,) in s, frequency factor) -> signal (n, 3) with first and second derivatives.
 Shape = Callable[[np.ndarray, float], np.ndarray]
@@ -61,6 +78,13 @@ def ramp(part: np.ndarray, length: float) -> np.ndarray:
     slope = 30.0 * z**2 * (1.0 - z) ** 2 / length
     change = 60.0 * z * (1.0 - z) * (1.0 - 2.0 * z) / length**2
     return np.column_stack([value, slope, change])
+
+
+def _slope(times: np.ndarray, length: float) -> np.ndarray:
+    """Integral (n, 3) of `ramp` over times in s: from 0 on it rises, after `length` at rate 1."""
+    z = np.clip(times / length, 0.0, 1.0)
+    risen = length * z**4 * (2.5 - 3.0 * z + z**2) + np.maximum(times - length, 0.0)
+    return np.column_stack([risen, ramp(times / length, length)[:, :2]])
 
 
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -98,6 +122,38 @@ def _multisine(times: np.ndarray, frequency: float) -> np.ndarray:
     return MULTISINE_SIZE * _product(ramp(t / ONSET, ONSET), waves)
 
 
+def _slow_ramp(times: np.ndarray, frequency: float) -> np.ndarray:
+    return RAMP_RATE * frequency * _slope(times - BEGIN, ONSET)
+
+
+def _weave(times: np.ndarray, frequency: float) -> np.ndarray:
+    t, rate = times - BEGIN, np.full(len(times), 2.0 * np.pi * WEAVE_FREQUENCY * frequency)
+    return WEAVE_SIZE * _product(ramp(t / ONSET, ONSET), _sine(rate * t, rate, 0.0))
+
+
+def _dwell_times(frequency: float) -> np.ndarray:
+    """Times (4,) in s at which the sine begins, dwells, goes on and ends."""
+    peak, end = BEFORE_DWELL / DWELL_FREQUENCY, 1.0 / DWELL_FREQUENCY + DWELL
+    return BEGIN + np.array([0.0, peak, peak + DWELL, end]) / frequency
+
+
+def _sine_with_dwell(times: np.ndarray, frequency: float) -> np.ndarray:
+    """The phase goes on at a constant rate, but for the dwell, and starts and stops smoothly."""
+    length = TRANSITION / frequency
+    begin, dwell, go_on, end = (
+        _slope(times - at + length / 2.0, length) for at in _dwell_times(frequency)
+    )
+    phase, rate, change = (
+        2.0 * np.pi * DWELL_FREQUENCY * frequency * (begin - dwell + go_on - end).T
+    )
+    return DWELL_SIZE * _sine(phase, rate, change)
+
+
+def _dwell_corners(frequency: float) -> tuple[float, ...]:
+    half = TRANSITION / (2.0 * frequency)
+    return tuple(np.add.outer(_dwell_times(frequency), [-half, half]).ravel().tolist())
+
+
 def _steered(
     name: str,
     summary: str,
@@ -105,8 +161,9 @@ def _steered(
     corners: Callable[[float], tuple[float, ...]],
     duration: float = DURATION,
     rack_summary: str = "",
+    rack_duration: float = 0.0,
 ) -> tuple[Maneuver, Maneuver]:
-    """Steering angle of the 14-DOF vehicle; the rack and its rates instead, no longer than 10 s."""
+    """Steering angle of the 14-DOF vehicle; the rack and its rates instead, as long by default."""
 
     def angle(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         return amplitude * LANE_CHANGE_AMPLITUDE * shape(times, frequency)[:, :1]
@@ -117,7 +174,7 @@ def _steered(
     samples = round(duration * RATE) + 1
     steered = Maneuver(name, summary, angle, ("delta",), duration, samples, corners)
     steered = replace(steered, linear_in_amplitude=True)
-    duration = min(duration, DURATION)
+    duration = rack_duration or duration
     return steered, replace(
         steered,
         name=f"rack_{name}",
@@ -142,6 +199,7 @@ lane_change, rack_lane_change = _steered(
     lambda frequency: (BEGIN, BEGIN + LANE_CHANGE_LENGTH / frequency),
     LANE_CHANGE_DURATION,
     "single lane change of 3.5 m at 20 m/s, a pulse of the rack of 2.5 s from 1 s on, 10 s",
+    DURATION,
 )
 straight_ahead, rack_straight_ahead = _steered(
     "straight_ahead",
@@ -150,6 +208,7 @@ straight_ahead, rack_straight_ahead = _steered(
     smooth,
     LANE_CHANGE_DURATION,
     "rack held in the middle, 10 s",
+    DURATION,
 )
 step_steer, rack_step_steer = _steered(
     "step_steer",
@@ -163,4 +222,25 @@ sine_sweep, rack_sine_sweep = _steered(
 )
 multisine, rack_multisine = _steered(
     "multisine", "steering at five frequencies from 0.15 to 1.4 Hz, 10 s", _multisine, _onset
+)
+slow_ramp_steer, rack_slow_ramp_steer = _steered(
+    "slow_ramp_steer",
+    "steering that rises slowly to about 4 m/s^2 at 20 m/s (ISO 4138), coasting, 21 s",
+    _slow_ramp,
+    _onset,
+    RAMP_DURATION,
+)
+weave, rack_weave = _steered(
+    "weave",
+    "steering to and fro at 0.2 Hz to 1 m/s^2 at 20 m/s (ISO 13674-1), 22 s",
+    _weave,
+    _onset,
+    WEAVE_DURATION,
+)
+sine_with_dwell, rack_sine_with_dwell = _steered(
+    "sine_with_dwell",
+    "sine of 0.7 Hz that dwells 0.5 s at its second peak (FMVSS 126, UN R140), 6 s",
+    _sine_with_dwell,
+    _dwell_corners,
+    DWELL_DURATION,
 )

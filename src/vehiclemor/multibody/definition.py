@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import line_of_text
 from vehiclemor.exceptions import InputError, did_you_mean
-from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.quantities import DEFAULTS, InputChoice, Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr
 
@@ -92,8 +93,9 @@ class ModelDefinition(ShortRepr):
     maneuver
         Name of the nominal maneuver.
     coordinates, speeds, inputs, outputs
-        Quantities in order.  A state is the coordinates and, after them, as many speeds; models of
-        kind `ae` have no speeds.  Coordinates of a structure have no names: there are none.
+        Quantities in order; inputs are those of every run.  A state is the coordinates and, after
+        them, as many speeds; models of kind `ae` have no speeds.  Coordinates of a structure have
+        no names: there are none.
     equations
         Residual equations with their units (kind `ae`).
     constraints
@@ -111,8 +113,13 @@ class ModelDefinition(ShortRepr):
         Values with their sources; the package's own data by default.
     joints
         Names of the moving points and directions that the function `joints` returns (kind `ae`).
+    optional_inputs
+        Inputs with defaults.  A run that names them drives them: they follow the others then.
+    choice
+        Which of these are driven, and which are parameters; see `input_choice`.
     derive
-        Derives the program of the equations; parameters stay symbols.
+        Derives the program of the equations; parameters stay symbols.  With optional inputs it is
+        a function of the choice, whose default is `DEFAULTS`.
     check
         Raises `GeometryError` where no such vehicle can exist.
     design_coordinates
@@ -140,8 +147,15 @@ class ModelDefinition(ShortRepr):
     validity
         Output or input -> (smallest, largest) value in its unit at which the model means anything.
         A run that leaves that of an output has diverged, an input beyond its range is refused.
+    standstill
+        Outputs that are the forward and the lateral speed: where the first falls below its range
+        and the second is as small, the vehicle has stopped, and the run has not diverged.
     loads
         Outputs that are zero where a wheel has left the road.
+    slips
+        Outputs that are the slip ratios of the wheels.
+    wheelbase
+        Parameters -> distance of the axles in m, of a vehicle.
     tabled_outputs
         Outputs whose errors are listed in tables, all by default.
     main_outputs
@@ -176,7 +190,9 @@ class ModelDefinition(ShortRepr):
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
     parameters: Mapping[str, Declared]
-    derive: Callable[[], Program]
+    derive: Callable[..., Program]
+    optional_inputs: tuple[Quantity, ...] = ()
+    choice: InputChoice = DEFAULTS
     speeds: tuple[Quantity, ...] = ()
     equations: tuple[Quantity, ...] = ()
     joints: tuple[str, ...] = ()
@@ -197,7 +213,10 @@ class ModelDefinition(ShortRepr):
     heading_pairs: tuple[tuple[str, str], ...] = ()
     error_scale: Mapping[str, float] = field(default_factory=dict)
     validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    standstill: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
+    slips: tuple[str, ...] = ()
+    wheelbase: Callable[[Values], float] | None = None
     tabled_outputs: tuple[str, ...] = ()
     main_outputs: tuple[str, ...] = ()
 
@@ -214,14 +233,17 @@ class ModelDefinition(ShortRepr):
             raise InputError(
                 f"model {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}"
             )
-        for kind in ("coordinates", "speeds", "inputs", "outputs"):
+        for kind in ("coordinates", "speeds", "inputs", "optional_inputs", "outputs"):
             quantities = getattr(self, kind)
             if not all(isinstance(quantity, Quantity) for quantity in quantities):
                 raise InputError(f"model {self.name!r}: {kind} must be quantities with units")
             names = [quantity.name for quantity in quantities]
-            optional = kind == "speeds" or (kind == "coordinates" and self.kind == "structural")
+            optional = kind in ("speeds", "optional_inputs") or (
+                kind == "coordinates" and self.kind == "structural"
+            )
             if len(set(names)) != len(names) or not (names or optional):
                 raise InputError(f"model {self.name!r}: {kind} are missing or named twice: {names}")
+        self._check_optional_inputs()
         for name, declared in self.parameters.items():
             if not isinstance(declared, Declared):
                 raise InputError(
@@ -245,10 +267,31 @@ class ModelDefinition(ShortRepr):
         self._known("heading_pairs", (n for pair in self.heading_pairs for n in pair), self.states)
         self._known("error_scale", self.error_scale, self.states)
         self._known("online", self.online, self.parameters)
-        self._known("validity", self.validity, outputs | {q.name for q in self.inputs})
+        inputs = {q.name for q in (*self.inputs, *self.optional_inputs)}
+        self._known("validity", self.validity, outputs | inputs)
+        self._known("standstill", self.standstill, outputs)
         self._known("loads", self.loads, outputs)
+        self._known("slips", self.slips, outputs)
         self._known("tabled_outputs", self.tabled_outputs, outputs)
         self._known("main_outputs", self.main_outputs, self.tabled_outputs or outputs)
+
+    def _check_optional_inputs(self) -> None:
+        """Refuse optional inputs without a default, and names that stand for something else."""
+        driven = {*self.choice.driven}
+        taken = {*self.parameters, *(q.name for q in self.inputs)} - {
+            *driven,
+            *self.choice.constant,
+        }
+        for quantity in self.optional_inputs:
+            if quantity.default is None or not math.isfinite(quantity.default):
+                raise InputError(
+                    f"model {self.name!r}: the optional input {quantity.name!r} has no default"
+                )
+            if quantity.name in taken:
+                raise InputError(
+                    f"model {self.name!r}: {quantity.name!r} is an optional input and another one, "
+                    "or a parameter"
+                )
 
     def _known(self, where: str, names: Iterable[str], known: Iterable[str]) -> None:
         allowed = set(known)

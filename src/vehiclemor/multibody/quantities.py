@@ -1,7 +1,7 @@
 """Quantities of models and what their parameters share, without any symbols."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -17,11 +17,42 @@ from vehiclemor.toml_files import toml_content
 
 @dataclass(frozen=True)
 class Quantity:
-    """Name, SI unit and meaning of one coordinate, input or output."""
+    """Name, SI unit and meaning of one coordinate, input or output.
+
+    Optional inputs have a default: their value in a run that neither drives nor sets them.
+    """
 
     name: str
     unit: str
     long_name: str
+    default: float | None = None
+
+
+@dataclass(frozen=True)
+class InputChoice:
+    """Optional inputs of a run in declared order; those in neither tuple are their defaults.
+
+    Attributes
+    ----------
+    driven
+        Inputs that change with time.
+    constant
+        Inputs whose values are parameters of the model.
+    """
+
+    driven: tuple[str, ...] = ()
+    constant: tuple[str, ...] = ()
+
+
+DEFAULTS = InputChoice()
+
+
+def integral_of(name: str) -> str:
+    """Name of the input whose time derivative has this name, such as s of s_dot; else empty."""
+    base, dot, order = name.rpartition("_")
+    if order == "ddot":
+        return f"{base}_dot"
+    return base if dot and order == "dot" else ""
 
 
 # Front left, front right, rear left, rear right.
@@ -29,9 +60,27 @@ WHEELS = ("FL", "FR", "RL", "RR")
 
 # Outputs that are zero where a wheel has left the road.
 TIRE_LOADS = tuple(f"Fz_{wheel}" for wheel in WHEELS)
+SLIP_RATIOS = tuple(f"slip_ratio_{wheel}" for wheel in WHEELS)
+# Outputs that are zero where a vehicle has come to rest.
+STANDSTILL = ("longitudinal_speed", "lateral_speed")
 # Bounds beyond which the models mean nothing: of the longitudinal speed, and of the attitude.
 FORWARD = (0.5, math.inf)
 UPRIGHT = {"roll": (-1.2, 1.2), "pitch": (-1.2, 1.2)}
+# Optional inputs at each wheel: name, unit, meaning, default, range of validity.  Slopes are up to
+# 0.1, which is 5 m/s at 50 m/s; torques beyond these ranges are in another unit.
+_AT_WHEEL = (
+    ("drive_torque_{}", "N m", "torque of the drive on the {} wheel", 0.0, (-2e4, 2e4)),
+    (
+        "brake_torque_{}",
+        "N m",
+        "torque of the brake on the {} wheel, against its spin",
+        0.0,
+        (0, 2e4),
+    ),
+    ("friction_{}", "1", "factor on the friction of the {} tire", 1.0, (0.05, 1.5)),
+    ("road_{}", "m", "height of the road under the {} wheel", 0.0, (-0.5, 0.5)),
+    ("road_{}_dot", "m/s", "rate of the height of the road under the {} wheel", 0.0, (-5.0, 5.0)),
+)
 # How the start `dropped` differs from straight running.
 DROP = ("drop_height", "drop_pitch")
 # Coefficients of the Fiala tire.
@@ -41,6 +90,21 @@ FIALA = (
 )
 # Share by which a published moment of inertia may break the triangle inequality.
 ROUNDED = 0.01
+
+
+def _optional_inputs() -> Iterator[tuple[Quantity, tuple[float, float]]]:
+    for name, unit, meaning, default, valid in _AT_WHEEL:
+        for wheel in WHEELS:
+            yield Quantity(name.format(wheel), unit, meaning.format(wheel), default), valid
+    meaning = "force on the sprung body's centre of mass along the chassis, drag is negative"
+    yield Quantity("body_force_x", "N", meaning, 0.0), (-1e5, 1e5)
+
+
+# What drives, brakes and lifts a vehicle, and where these inputs mean anything.
+OPTIONAL_INPUTS, OPTIONAL_RANGES = (
+    tuple(quantity for quantity, _ in _optional_inputs()),
+    {quantity.name: valid for quantity, valid in _optional_inputs()},
+)
 
 
 def declared(model: str) -> dict[str, Any]:
@@ -54,13 +118,13 @@ def declared(model: str) -> dict[str, Any]:
     return tables
 
 
-def equations_of(package: str) -> Callable[[], Any]:
+def equations_of(package: str) -> Callable[..., Any]:
     """What derives by the module `equations` of a package; SymPy is imported when it is called."""
     return partial(_derived, f"vehiclemor.multibody.{package}.equations")
 
 
-def _derived(module: str) -> Any:
-    return import_module(module).derive()
+def _derived(module: str, *choice: Any) -> Any:
+    return import_module(module).derive(*choice)
 
 
 def check_moments(name: str, moments: np.ndarray) -> None:

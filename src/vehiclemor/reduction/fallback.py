@@ -16,7 +16,7 @@ from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
 # What users step and ask is the reduced model.
 STEPPED = ("states", "begin", "step", "rates", "sensitivities", "decode", "trust")
@@ -58,7 +58,7 @@ class FallbackModel(ShortRepr):
     ) -> Trajectory:
         """The reduced run; where it can't be trusted, that of the full order."""
         run = simulated(self.reduced, maneuver, start, outputs)
-        if run.status == "ok" and run.trust:
+        if run.status in WITHOUT_COMPLAINT and run.trust and not run.trust.reason:
             return run
         # A model without a trust indicator is trusted nowhere.
         reason = run.message or "the reduced model does not judge itself"

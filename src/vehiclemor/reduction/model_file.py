@@ -82,6 +82,8 @@ def write(rom: Any, path: Any, overwrite: bool = False) -> Path:
         code=code_digest(model.name, rom.method),
         date=datetime.now(UTC).isoformat(timespec="seconds"),
     )
+    if driven := model.definition.choice.driven:
+        described["driven_inputs"] = " ".join(driven)
     write_dataset(xr.Dataset(variables, attrs=described), path)
     return path
 
@@ -93,7 +95,7 @@ def read(path: Any) -> dict[str, Any]:
     try:
         method, name = str(attrs["method"]), str(attrs["model"])
         parts, settings, training, parameters = (_parsed(stored.pop(key)) for key in TEXTS)
-        model = _model(name, parameters)
+        model = _model(name, parameters, str(attrs.get("driven_inputs", "")).split())
         reduces: Method = component("method", method)
         checked_settings(reduces, model, validated(reduces, model.kind, settings))
         if not _alike(stored.pop("fingerprint"), fingerprint(model)):
@@ -165,12 +167,12 @@ def _parameters(model: Model) -> dict[str, Any]:
     return {name: entry.value for name, entry in model.parameters.entries.items()}
 
 
-def _model(name: str, parameters: Mapping[str, Any]) -> Model:
+def _model(name: str, parameters: Mapping[str, Any], driven: Sequence[str]) -> Model:
     """The model with these parameters; those of its parameter file keep their sources."""
-    model = build(name)
+    model = build(name, driven=driven)
     from_file = _parameters(model)
     changed = {key: value for key, value in parameters.items() if from_file.get(key) != value}
-    return build(name, overrides=changed) if changed else model
+    return build(name, overrides=changed, driven=driven) if changed else model
 
 
 def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:

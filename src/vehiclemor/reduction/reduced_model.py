@@ -129,7 +129,7 @@ class ReducedOrderModel(ShortRepr):
             names = None if outputs is None else output_names(outputs)
             run = simulated(self.reduced, chosen, first, names)
         # A copy would take a twentieth of a short run.
-        run.__dict__["method"] = self.method
+        run.__dict__.update(method=self.method, maneuver=chosen.name)
         if self._lower_rank:
             run.__dict__["remark"] = "; ".join(filter(None, (run.remark, self._lower_rank)))
         if not run.trust and self._range is not None:

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from vehiclemor.arguments import check_shapes, require
+from vehiclemor.inputs.checks import completed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trust
@@ -146,7 +147,7 @@ class InputRange:
 
     def trust(self, model: Model, maneuver: Excitation, speed: float) -> Trust:
         """How far a run with an initial speed in m/s goes in the range."""
-        maneuver = maneuver.for_inputs(model.inputs)
+        maneuver = completed(maneuver, model.definition)
         if model.kind == "ae":
             times, inputs = maneuver.recorded_inputs
             ranges = self._samples(model.inputs, inputs, times)
@@ -216,7 +217,7 @@ def input_range(
 
     Of `follows_time` see `Method`.
     """
-    maneuvers = [maneuver.for_inputs(model.inputs) for maneuver, _ in runs]
+    maneuvers = [completed(maneuver, model.definition) for maneuver, _ in runs]
     speeds = [speed for _, speed in runs]
     low, high = min(speeds), max(speeds)
     middle = 0.5 * (low + high)

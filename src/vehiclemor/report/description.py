@@ -1,6 +1,6 @@
 """What a name stands for: model, method, maneuver, study, or the schema of a file."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from vehiclemor.files import data_names
 from vehiclemor.inputs.excitation import FACTORS
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
-from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.input_choice import with_overrides
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path
 from vehiclemor.reduction.interface import never_refused
 from vehiclemor.reduction.model_file import training_of
@@ -46,7 +46,16 @@ KINDS = {
     "structural": "sparse matrices M q'' + D q' + K q, and forces at ports",
 }
 UNKNOWN = "known once the model has been simulated"
-QUANTITIES = ("inputs", "outputs", "coordinates", "speeds", "equations", "constraints", "ports")
+QUANTITIES = (
+    "inputs",
+    "optional_inputs",
+    "outputs",
+    "coordinates",
+    "speeds",
+    "equations",
+    "constraints",
+    "ports",
+)
 # Values of an axis that are printed.
 SHOWN = 40
 
@@ -74,7 +83,7 @@ def _model(
     name: str, overrides: Mapping[str, object] | None, parameter_file: Path | None
 ) -> Description:
     """Kind, parameters, starts, inputs, outputs and states of a model, and what reduces it."""
-    definition: ModelDefinition = component("model", name)
+    definition: ModelDefinition = with_overrides(component("model", name), overrides or {})
     path = parameter_file or definition.parameter_file or parameter_path(name)
     parameters = load_parameters(name, definition.parameters, path, overrides)
     accepted = {method: _accepts(method, definition)[0] for method in names("method")}
@@ -98,7 +107,7 @@ def _model(
         "methods": [method for method, answer in accepted.items() if answer == "yes"],
         f"methods that may fit ({UNKNOWN})": [m for m, a in accepted.items() if a == "?"],
         **shipped,
-        **{kind: _quantities(getattr(definition, kind)) for kind in QUANTITIES},
+        **{kind: _quantities(definition, kind) for kind in QUANTITIES},
         "parameter file": str(path),
         "parameters": [
             {"name": parameter, "value": entry.value, "unit": entry.unit}
@@ -113,8 +122,15 @@ def _model(
     }
 
 
-def _quantities(quantities: Iterable[Quantity]) -> list[dict[str, str]]:
-    return [{"name": q.name, "unit": q.unit, "meaning": q.long_name} for q in quantities]
+def _quantities(definition: ModelDefinition, kind: str) -> list[dict[str, Any]]:
+    rows = []
+    for q in getattr(definition, kind):
+        row = {"name": q.name, "unit": q.unit, "meaning": q.long_name}
+        if q.default is not None:
+            low, high = definition.validity.get(q.name, (None, None))
+            row |= {"default": q.default, "bounds": _bounds(None, low, high)}
+        rows.append(row)
+    return rows
 
 
 def _accepts(method_name: str, definition: ModelDefinition) -> tuple[str, str]:

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from vehiclemor.arguments import file_path, quoted
+from vehiclemor.error_measures import errors
 from vehiclemor.exceptions import InputError
-from vehiclemor.metrics import errors
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import unknown
 from vehiclemor.report.labels import Kind

@@ -37,11 +37,12 @@ CONTINUED = 0.5
 
 
 def protocol_rows(dataset: xr.Dataset) -> list[Row]:
-    """Rows of one protocol, by `kind`: `method`, then `target` and `bound` of what was chosen."""
+    """Rows of one protocol, by `kind`: `method`, `count`; of what was chosen `target`, `bound`."""
     protocol = protocol_of(dataset)
     methods = method_rows(dataset, protocol)
     rows = methods + target_rows(dataset, protocol, methods)
     rows += [row for method in methods if method["winner"] for row in bound_rows(protocol, method)]
+    rows += count_rows(dataset, protocol)
     head = {"study": str(dataset.attrs["study"]), "model": protocol.model}
     return [head | row for row in rows]
 
@@ -86,20 +87,14 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
         "rank": int(part["effective_rank"]),
         "winner": bool(part["winner"]),
         "test_set": str(dataset.attrs["test_set"]),
-        "runs": part.sizes["scenario"],
+        **tested.counts,
         "apart": int((sets == judged_set(set(sets))).sum()) - part.sizes["scenario"],
-        "misses": int(tested.missed.sum()),
         "misses_at_ten": int((tested.scores > 10.0).sum()),
-        "silent": int(tested.undetected.sum()),
-        "flagged": int(tested.warned.sum()),
         "score": float(tested.scores.max()),
         # What has come to its end, trusted or not.
         "stable_share": float(np.isfinite(tested.scores).mean()),
         "failure": _failure(part),
-        "outside_runs": len(outside.scores),
-        "outside_misses": int(outside.missed.sum()),
-        "outside_silent": int(outside.undetected.sum()),
-        "outside_flagged": int(outside.warned.sum()),
+        **{f"outside_{name}": number for name, number in outside.counts.items()},
         "validation_score": float(part["validation_score"]),
         "offline_seconds": float(part["offline_seconds"]),
         "chosen_settings": _chosen_settings(json.loads(part["validation"].item())),
@@ -114,6 +109,18 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
     times = {n: float(part[n].mean()) for n in (*CLOCKS, "seconds_lower", "seconds_upper")}
     spread = times.pop("seconds_upper") - times.pop("seconds_lower")
     return row | times | {"spread": spread / times["seconds"] if times["seconds"] > 0.0 else 0.0}
+
+
+def count_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> Iterator[Row]:
+    """How many runs of each reduced model are right, warned and so on: of each maneuver or log."""
+    part = judged_part(dataset)
+    part = part.isel(label=part["role"].values != FULL_ORDER)
+    driven = part["maneuver"].values
+    for name in dict.fromkeys(driven):
+        for label in part["label"].values:
+            runs = part.sel(label=label).isel(scenario=driven == name)
+            counts = outcomes(runs, protocol.bounds).counts
+            yield {"kind": "count", "item": name, "label": str(label), **counts}
 
 
 def _chosen_settings(candidates: list[Row]) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from vehiclemor.arguments import MOST_JOBS, count, quoted, real_array
 from vehiclemor.exceptions import ConvergenceError, InputError, VehiclemorError
 from vehiclemor.failure import Failure, attempt
+from vehiclemor.inputs.checks import completed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.provenance import attributes
@@ -104,6 +105,9 @@ def simulate_many(
     full = getattr(given, "model", given)
     if not isinstance(full, Model):
         raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
+    if given is full and isinstance(signals, Sequence):
+        driven = (name for signal in signals for name in getattr(signal, "inputs", ()))
+        given = full = full.driving(driven)
     runs, names = _count_of(signals, full), _names(full, outputs)
     kept, rows = _kept_times(times, signals)
     begins = _starts_of(starts, runs, full)
@@ -167,7 +171,7 @@ def _count_of(signals: Any, model: Model) -> int:
     for run, signal in enumerate(signals):
         if not isinstance(signal, Excitation):
             raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
-        if signal.for_inputs(model.inputs).inputs != model.inputs:
+        if completed(signal, model.definition).inputs != model.inputs:
             raise InputError(
                 f"signals[{run}]: {signal} gives inputs {', '.join(signal.inputs)}, "
                 f"{model.name} needs {', '.join(model.inputs)}"

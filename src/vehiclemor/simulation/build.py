@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import real_array
+from vehiclemor.arguments import quoted, real_array
 from vehiclemor.codegen.kernels import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.exceptions import GeometryError, InputError, VehiclemorError, blamed
 from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
-from vehiclemor.parameters import ParameterSet, load_parameters, overridden, parameter_path
+from vehiclemor.multibody.input_choice import driving, with_constants, with_overrides
+from vehiclemor.multibody.quantities import DEFAULTS
+from vehiclemor.parameters import (
+    ParameterSet,
+    load_parameters,
+    overridden,
+    parameter_path,
+    with_entries,
+)
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
@@ -39,25 +47,57 @@ SMALLEST_SINGULAR_VALUE = 1e-8
 
 
 def build(
-    name: str, parameter_file: Path | None = None, overrides: Mapping[str, object] | None = None
+    name: str,
+    parameter_file: Path | None = None,
+    overrides: Mapping[str, object] | None = None,
+    *,
+    constant_inputs: Mapping[str, object] | None = None,
+    driven: Iterable[str] = (),
 ) -> Model:
     """Derive (or fetch), compile and parametrise a registered model.
 
-    The parameter file is the registered one by default, overrides are values in SI units by name.
-    `InputError` if the name or an override is wrong; another `VehiclemorError` if the parameters
-    can't be read, or the model can't be assembled from them or can't stand.
+    The parameter file is the registered one by default, overrides are values in SI units by name,
+    of parameters and of optional inputs that are constant.  Constant inputs are such values too;
+    runs drive the optional inputs `driven`.  `InputError` if a name or an override is wrong;
+    another `VehiclemorError` if the parameters can't be read, or the model can't be assembled from
+    them or can't stand.
     """
-    definition: ModelDefinition = component("model", name)
+    definition: ModelDefinition = driving(component("model", name), driven)
+    inputs = {} if constant_inputs is None else constant_inputs
+    if not isinstance(inputs, Mapping):
+        raise InputError(f"inputs must be a mapping of values by name, not {quoted(inputs)}")
+    definition = with_constants(definition, inputs)
+    if isinstance(overrides, Mapping):
+        definition = with_overrides(definition, overrides)
+        overrides = {**overrides, **inputs}
     path = parameter_file or definition.parameter_file
-    parameters = load_parameters(name, definition.parameters, path, overrides)
+    parameters = load_parameters(name, definition.parameters, path, overrides or inputs)
     with first_use(name):
         return _made(definition, parameters)
 
 
 def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
     """The model with some of its parameters changed: name -> value in SI units; see `build`."""
-    parameters = overridden(model.parameters, model.definition.parameters, overrides)
-    return _made(model.definition, parameters, (model.equations, model.kernel_hash))
+    definition = with_overrides(model.definition, overrides)
+    if definition is not model.definition:
+        return _with_definition(model, definition, overrides)
+    parameters = overridden(model.parameters, definition.parameters, overrides)
+    return _made(definition, parameters, (model.equations, model.kernel_hash))
+
+
+@lru_cache(maxsize=64)
+def _rebuilt(model: Model, definition: ModelDefinition) -> Model:
+    """The model with the inputs of another declaration of it."""
+    return _with_definition(model, definition)
+
+
+def _with_definition(
+    model: Model, definition: ModelDefinition, overrides: Mapping[str, object] | None = None
+) -> Model:
+    """A model with the same parameters, but for what another choice of inputs adds or drops."""
+    parameters = with_entries(model.parameters, definition.parameters, overrides or {})
+    with first_use(model.name):
+        return _made(definition, parameters)
 
 
 def _made(
@@ -75,7 +115,7 @@ def _made(
     if definition.kind == "ae":
         with blamed(f"model {name!r}: design_coordinates", definition.design_coordinates):
             initial = {DESIGN_START: real_array(definition.design_coordinates(parameters.values()))}
-    equations, digest = derived or compiled(name, definition.derive, loops)
+    equations, digest = derived or compiled(definition, loops)
     check_equations(definition, equations)
     with blamed(f"model {name!r}: solve_equilibrium", definition.solve_equilibrium):
         values |= solved_parameters(definition, flat, equations)
@@ -86,7 +126,7 @@ def _made(
         near = [_near(definition, flat, equations, digest)]
     _check_states(definition, initial)
     constants = hoisted_constants(equations, flat, solved)
-    return make(definition, equations, parameters, digest, constants, initial, *near)
+    return make(definition, equations, parameters, digest, constants, initial, _rebuilt, *near)
 
 
 def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:
@@ -182,7 +222,7 @@ def _kept(definition: ModelDefinition, _: bytes) -> Model:
 def build_derived(name: str) -> Model | None:
     """A model that was derived before; deriving one takes long where it is only described."""
     definition: ModelDefinition = component("model", name)
-    return build(name) if is_derived(name, definition.derive) else None
+    return build(name) if is_derived(name, *_derivation(definition)) else None
 
 
 def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
@@ -221,10 +261,19 @@ def _check_states(definition: ModelDefinition, initial: Mapping[str, np.ndarray]
 
 
 def compiled(
-    name: str, derive: Callable[[], Program], loops: Sequence[str] = LOOP_SOURCES
+    definition: ModelDefinition, loops: Sequence[str] = LOOP_SOURCES
 ) -> tuple[Derivation, str]:
     """Derivation of a model, and the hash of its source and of the loops that run it."""
+    name, derive = definition.name, definition.derive
     with blamed(f"model {name!r}: its equations can't be derived", derive):
-        equations = derivation(name, derive)
+        equations = derivation(name, *_derivation(definition))
     text = f"{equations.source}\n{loops_digest(loops)}"
     return equations, hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _derivation(definition: ModelDefinition) -> tuple[Callable[[], Program], str]:
+    """What derives a model with its choice of inputs, and the name of the choice."""
+    derive, choice = definition.derive, definition.choice
+    if choice == DEFAULTS:
+        return derive, ""
+    return partial(derive, choice), repr(choice)

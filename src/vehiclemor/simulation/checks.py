@@ -10,8 +10,11 @@ from vehiclemor.arguments import loop_array, number, quoted, within
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.quantities import DEFAULTS
 
 LARGEST = sys.float_info.max
+# Slip ratio beyond which the longitudinal force of a tire falls: the wheel locks or spins.
+LARGE_SLIP = 0.2
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
@@ -106,14 +109,30 @@ def _shared(times: np.ndarray) -> np.ndarray:
 
 
 def limits_of(definition: ModelDefinition) -> tuple[list[str], tuple[str, ...], np.ndarray]:
-    """Names of outputs with a range of validity; these and, behind them, loads; limits (k, 2)."""
+    """Outputs with a range of validity; these and, behind them, loads and slips; limits (k, 2)."""
     names = [quantity.name for quantity in definition.outputs]
     # An input is checked before the run.
     valid = {name: r for name, r in definition.validity.items() if name in names}
     # The smallest positive number: no load is none.
     ranges = [*valid.values(), *((5e-324, np.inf) for _ in definition.loads)]
-    watched = *valid, *definition.loads
+    slips = watched_slips(definition)
+    ranges += [(-LARGE_SLIP, LARGE_SLIP)] * len(slips)
+    watched = *valid, *definition.loads, *slips
     return list(valid), watched, np.array(ranges, dtype=float).reshape(-1, 2)
+
+
+def watched_slips(definition: ModelDefinition) -> tuple[str, ...]:
+    """Slip ratios in which a locked or spinning wheel shows; none where steering alone drives."""
+    return () if definition.choice == DEFAULTS else definition.slips
+
+
+def stopped(definition: ModelDefinition, name: str, speeds: np.ndarray) -> bool:
+    """Whether a vehicle has stopped that has left the range of an output at these speeds (2,)."""
+    if name not in definition.standstill[:1]:
+        return False
+    slowest = definition.validity[name][0]
+    forward, lateral = speeds
+    return bool(forward < slowest and abs(lateral) < slowest)
 
 
 def left_validity(definition: ModelDefinition, name: str, value: float, time: float) -> str:
@@ -123,13 +142,24 @@ def left_validity(definition: ModelDefinition, name: str, value: float, time: fl
     return f"{message}; the model holds from {low:g} to {high:g}"
 
 
-def lifted_wheels(loads: Sequence[str], first: Sequence[int], times: np.ndarray) -> str:
-    """Which wheels have been off the ground, and when first; empty if none."""
-    if min(first, default=len(times)) == len(times):
-        return ""
-    off = [
-        f"{name.removeprefix('Fz_')} (first at {times.item(sample):.4g} s)"
-        for name, sample in zip(loads, first, strict=True)
+def wheel_remarks(
+    definition: ModelDefinition, first: Sequence[int], times: np.ndarray
+) -> list[str]:
+    """Which wheels have lifted, locked or spun, and when first, by the first sample of each."""
+    loads, slips = definition.loads, watched_slips(definition)
+    remarks = []
+    if off := _wheels(loads, first[: len(loads)], times):
+        remarks.append(f"off the ground for a time: {off}")
+    if sliding := _wheels(slips, first[len(loads) :], times):
+        remarks.append(f"slip beyond {LARGE_SLIP:g}, locked or spinning: {sliding}")
+    return remarks
+
+
+def _wheels(outputs: Sequence[str], first: Sequence[int], times: np.ndarray) -> str:
+    """Wheels with a first sample inside the run, and its time; empty if there is none."""
+    parts = [
+        f"{name.rpartition('_')[2]} (first at {times.item(sample):.4g} s)"
+        for name, sample in zip(outputs, first, strict=True)
         if sample < len(times)
     ]
-    return f"off the ground for a time: {', '.join(off)}"
+    return ", ".join(parts)

@@ -40,14 +40,21 @@ def hoisted_constants(
 def solved_parameters(
     definition: ModelDefinition, flat: np.ndarray, equations: Derivation
 ) -> dict[str, float]:
-    """What a model solves for before it can start, by name."""
+    """What a model solves for before it can start, by name; with optional inputs at defaults."""
     if not definition.solved:
         return {}
+    defaults = {q.name: q.default or 0.0 for q in definition.optional_inputs}
+    driven, constant = (
+        [defaults[name] for name in names]
+        for names in (definition.choice.driven, definition.choice.constant)
+    )
+    # Parameters that are inputs come last.
+    parameters = np.concatenate([flat[: len(flat) - len(constant)], constant])
 
     def derivative(solved: list[float], x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        result = np.empty(len(x))
-        constants = hoisted_constants(equations, flat, solved)
-        equations.kernels.call("derivative", x, u, constants, result)
+        result, inputs = np.empty(len(x)), np.concatenate([u, driven])
+        constants = hoisted_constants(equations, parameters, solved)
+        equations.kernels.call("derivative", x, inputs, constants, result)
         return result
 
     return definition.solve_equilibrium(values_of(definition, flat), derivative)

@@ -13,7 +13,7 @@ from vehiclemor.arguments import loop_array, number
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.simulation.checks import left_validity, lifted_wheels
+from vehiclemor.simulation.checks import left_validity, stopped, wheel_remarks
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.evaluation import By, chosen
 from vehiclemor.simulation.integrators.catalogue import integrator
@@ -24,6 +24,7 @@ from vehiclemor.simulation.recording import Recorder, Recording
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import (
     DYNAMIC_COUNTS,
+    WITHOUT_COMPLAINT,
     Names,
     Start,
     Trajectory,
@@ -94,6 +95,7 @@ class DynamicModel(Model):
             self.active,
             self.rotating,
             partners=partners(self.definition.states),
+            reference_inputs=self.inputs_at_rest,
         )
 
     def rhs(self, x: Any, u: Any) -> np.ndarray:
@@ -116,13 +118,13 @@ class DynamicModel(Model):
     def linearise(self, state: Start | None = None, inputs: Any = None) -> LinearModel:
         """Linear model at a state or start, the first by default, and inputs, 0 by default."""
         x = self.start(state)
-        u = self._inputs([0.0] * len(self.inputs) if inputs is None else inputs)
+        u = self._inputs(self.inputs_at_rest if inputs is None else inputs)
         point = x, u, self.rhs(x, u), self.outputs_at(x[None], u[None])[0]
         return LinearModel.of(self, self.definition.states, point)
 
     def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
         """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""
-        inputs = np.zeros(len(self.inputs)) if u is None else u
+        inputs = self.inputs_at_rest if u is None else u
         return self.evaluated("second_order", x, inputs)[:, :-1]
 
     def descriptor(self, x: Any, u: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -142,7 +144,7 @@ class DynamicModel(Model):
 
     def speeds_of_rates(self, x: Any) -> np.ndarray:
         """Speeds (n,) where x (2 n,) holds the rates of the coordinates instead."""
-        return self.evaluated("speeds", x, np.zeros(len(self.inputs)))
+        return self.evaluated("speeds", x, self.inputs_at_rest)
 
     def simulate(
         self,
@@ -164,6 +166,10 @@ class DynamicModel(Model):
         begin
             Time in s at which the run begins with the start, in mid-maneuver if it isn't 0.
         """
+        driven = self.driven_by(maneuver)
+        if driven is not self:
+            how = times, solver, tolerance, outputs, longest_step, begin
+            return driven.simulate(maneuver, start, *how)
         solver = REFERENCE_SOLVER if solver is None else solver
         integrator(solver)
         trajectory = self.integrate(
@@ -179,7 +185,7 @@ class DynamicModel(Model):
             ),
             None if outputs is None else output_names(outputs),
         )
-        if trajectory.status != "ok":
+        if trajectory.status not in WITHOUT_COMPLAINT:
             raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)
         return trajectory
 
@@ -242,26 +248,35 @@ class DynamicModel(Model):
         limited, message, end = len(recorder.limited), run.failure, len(times)
         points = states[: run.rows], at_points[: run.rows], run.point_of_sample
         left = min(first[:limited], default=end)
+        status, reached = "diverged" if message else "ok", end
         if message:
             # From the failure on there are no numbers, which says nothing of limits.
             reached = int(np.isfinite(Recording(recorder, *points).state_history[:, 0]).sum())
             first = [end if sample == reached else sample for sample in first]
-        elif left < end:
+        if left < reached:
             name = recorder.limited[first.index(left)]
-            value = Recording(recorder, *points).columns((name,))[left, 0]
-            message = left_validity(self.definition, name, value, times[left])
-        lifted = lifted_wheels(self.definition.loads, first[limited:], times)
+            ended = Recording(recorder, *points).columns((name, *self.definition.standstill))[left]
+            if stopped(self.definition, name, ended[1:]):
+                # At rest the slip is so stiff that a solver may fail there.
+                status, message = "stopped", f"the vehicle stops at t = {times[left]:.4g} s"
+            elif not message:
+                message = left_validity(self.definition, name, ended[0], times[left])
+                status = "diverged"
+        remarks = wheel_remarks(self.definition, first[limited:], times)
+        if remark:
+            remarks.append(remark)
         fields = {
             "times": times,
             "inputs": inputs,
             "counts": dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
             "seconds": run.seconds,
-            "status": "diverged" if message else "ok",
+            "status": status,
             "message": message,
-            "remark": f"{lifted}; {remark}" if lifted and remark else lifted or remark,
+            "remark": "; ".join(remarks),
             "trust": trust,
             "names": self.outputs,
             "model": self,
+            "maneuver": "" if maneuver is None else maneuver.name,
         }
         if outputs not in (None, self.outputs) and not message:
             histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]
@@ -270,7 +285,7 @@ class DynamicModel(Model):
         else:
             points = points[0][:, :n], *points[1:]
             recording = Recording(recorder, *(array.copy() for array in points))
-            if left < end and not run.failure:
+            if left < end and (status == "stopped" or not run.failure):
                 # What follows means nothing.
                 recording.end = left
             trajectory = Trajectory.of(**fields, recording=recording)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.inputs.maneuver import registered
 from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.input_choice import driving
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
@@ -56,6 +58,8 @@ class Model(ShortRepr):
         Hoisted constants of the parameter set.
     initial
         Start -> state (n,); the default first.
+    rebuilt
+        (model, declaration) -> the model with another choice of inputs, cached.
     """
 
     repr_fields = ("name", "kind", "coordinates", "inputs", "outputs", "starts")
@@ -66,6 +70,7 @@ class Model(ShortRepr):
     kernel_hash: str
     constants: np.ndarray
     initial: Mapping[str, np.ndarray]
+    rebuilt: Callable[[Any, ModelDefinition], Any] | None = None
 
     def __post_init__(self) -> None:
         """Methods share it: what a plug-in writes into it is refused."""
@@ -101,6 +106,11 @@ class Model(ShortRepr):
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs."""
         return tuple(q.name for q in self.definition.inputs)
+
+    @cached_property
+    def inputs_at_rest(self) -> np.ndarray:
+        """Inputs (number of inputs,) of a run that drives nothing: their defaults, else 0."""
+        return np.array([quantity.default or 0.0 for quantity in self.definition.inputs])
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
@@ -140,6 +150,27 @@ class Model(ShortRepr):
     def kernels(self) -> Kernels:
         """Kernels of the equations, each compiled when it is first used."""
         return self.equations.kernels
+
+    @cached_property
+    def _undriven(self) -> frozenset[str]:
+        """Names of optional inputs that no run of this model drives."""
+        optional = (quantity.name for quantity in self.definition.optional_inputs)
+        return frozenset(optional).difference(self.inputs)
+
+    def driving(self, names: Iterable[str]) -> Self:
+        """The model whose runs drive the optional inputs among these names too, cached."""
+        names = [*names]
+        if self._undriven.isdisjoint(names) or self.rebuilt is None:
+            return self
+        return self.rebuilt(self, driving(self.definition, names))
+
+    def driven_by(self, maneuver: Any) -> Self:
+        """The model that has the optional inputs which a maneuver, or one of this name, names."""
+        if not self._undriven:
+            return self
+        if isinstance(maneuver, str):
+            maneuver = registered(maneuver)
+        return self.driving(maneuver.inputs) if isinstance(maneuver, Excitation) else self
 
     def start(self, name: Start | None = None) -> np.ndarray:
         """State (n,) of an initial condition, the first by default, or a copy of the one given."""

@@ -51,7 +51,7 @@ class System(ShortRepr):
     kernels: Kernels
     constants: np.ndarray
     inputs: int
-    reference: np.ndarray  # State (dim,) at which the Jacobian is frozen, all inputs zero.
+    reference: np.ndarray  # State (dim,) at which the Jacobian is frozen.
     # Magnitude of each state (dim,) below which errors are measured absolutely.
     error_scale: np.ndarray
     active: np.ndarray  # Numbers of the states that the right-hand side depends on.
@@ -59,6 +59,8 @@ class System(ShortRepr):
     rotating: np.ndarray
     # Number of the state that each becomes in the mirror image; empty where there is none.
     partners: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    # Inputs at which the Jacobian is frozen; zeros where none are given.
+    reference_inputs: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Refuse kernels that reach beyond what loops give them: they don't look."""
@@ -96,8 +98,9 @@ class System(ShortRepr):
 
     @cached_property
     def frozen_jacobian(self) -> np.ndarray:
-        """Jacobian (dim, dim) at the reference state, no inputs."""
-        return self.jacobian(self.reference, np.zeros(self.inputs))
+        """Jacobian (dim, dim) at the reference state and inputs."""
+        inputs = self.reference_inputs if len(self.reference_inputs) else np.zeros(self.inputs)
+        return self.jacobian(self.reference, inputs)
 
     @cached_property
     def _ready(self) -> dict[tuple, Ready]:

@@ -27,9 +27,11 @@ SAME_TIME = 1e-9
 Start = str | tuple[float, ...] | np.ndarray
 # Outputs, coordinates or speeds; all outputs where there are none.
 Names = str | Sequence[str] | None
-STATUSES = ("ok", "untrusted", "diverged", "unreachable", "rejected", "error")
+STATUSES = ("ok", "untrusted", "stopped", "diverged", "unreachable", "rejected", "error")
+# Of a run without complaint; `stopped` the vehicle has come to rest, where its model ends.
+WITHOUT_COMPLAINT = ("ok", "stopped")
 # Of a run that has come to its end; `untrusted` it has left what its model knows, and says so.
-FINISHED = ("ok", "untrusted")
+FINISHED = (*WITHOUT_COMPLAINT, "untrusted")
 # What the solvers of a kind of model count: name -> meaning.
 ALGEBRAIC_COUNTS = {
     "iterations": "solver iterations",
@@ -91,7 +93,8 @@ class Trajectory(ShortRepr):
     seconds
         CPU time of the thread in the compiled loop; 0 where nothing was computed.
     status
-        One of `STATUSES`; from the failure on, a diverged trajectory is not a number.
+        One of `STATUSES`; from the failure on a diverged trajectory is not a number, from its stop
+        on a stopped one.
     message
         Why it is not ok, empty if it is.
     remark
@@ -104,6 +107,8 @@ class Trajectory(ShortRepr):
         Of which it is.
     method
         By which it was reduced; empty for a run of the full model.
+    maneuver
+        Name of the input.
     """
 
     times: np.ndarray
@@ -120,6 +125,7 @@ class Trajectory(ShortRepr):
     names: tuple[str, ...] = ()
     model: Any = None
     method: str = ""
+    maneuver: str = ""
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None
@@ -218,6 +224,13 @@ class Trajectory(ShortRepr):
     def finished(self) -> bool:
         """Whether the run has come to its end, trusted or not."""
         return self.status in FINISHED
+
+    @property
+    def samples_to_stop(self) -> int:
+        """Number of samples before the vehicle stops; all of a run that does not stop."""
+        if self.status != "stopped":
+            return len(self.times)
+        return int(np.isfinite(self.outputs[:, 0]).sum())
 
     def judged(self, trust: Trust | None) -> Trajectory:
         """The same with what its model tells of it; untrusted if that is that it has left."""

@@ -110,7 +110,8 @@ def _write(protocol: Protocol, folder: Path) -> None:
         for output, bound in definition.bounds.items():
             runs[output].attrs |= {"bound": bound.bound, "bound_measure": bound.measure}
         if name == "test":
-            apart = reasons(protocol, evaluate(second)) if drawn else [""] * len(labels)
+            screened = drawn or "test" in protocol.screened
+            apart = reasons(protocol, evaluate(second)) if screened else [""] * len(labels)
             runs = runs.assign(variables({"apart": np.array(apart, object)}, "run"))
         runs.attrs |= attributes(
             f"{name} runs of {protocol.study}",

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from vehiclemor.error_measures import rms
 from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, blamed
 from vehiclemor.failure import Failure, attempt
-from vehiclemor.metrics import rms
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.fallback import with_fallback
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
@@ -23,12 +23,13 @@ from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import one_thread
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Trajectory
 from vehiclemor.study.experiment import Experiment, default_settings, for_method
 from vehiclemor.study.result import Outcome, result_dataset
 from vehiclemor.study.scenario import (
     Overrides,
     Scenario,
+    driven_by_all,
     in_training,
     model_of_run,
     speed_of,
@@ -91,6 +92,7 @@ def evaluate(
 
 def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> xr.Dataset:
     test = experiment.test
+    model = driven_by_all(model, (*experiment.training, *test))
     tested = model_of_run(model, test[0])
     if refused := refusal(model, experiment):
         return result_dataset(tested, experiment, [refused] * len(test), refused)
@@ -136,7 +138,7 @@ def reference_run(model: Model, scenario: Scenario) -> Trajectory:
     trajectory = model_of_run(model, scenario).simulate(
         scenario.maneuver, start_of(model, scenario)
     )
-    if trajectory.status != "ok":
+    if trajectory.status not in WITHOUT_COMPLAINT:
         raise ConvergenceError(trajectory.message)
     return trajectory
 
@@ -245,7 +247,7 @@ def _tested(
         checked_run(tested, scenario.maneuver, start, reduced)
         fit.warm = True
     run = checked_run(tested, scenario.maneuver, start, reduced)
-    if run.finished and not np.isfinite(run.outputs).all():
+    if run.finished and not np.isfinite(run.outputs[: run.samples_to_stop]).all():
         run = replace(run, status="diverged", message="an output is not finite")
     if remark := lower_rank(experiment.settings, reduced):
         run = replace(run, remark="; ".join(filter(None, (run.remark, remark))))

@@ -11,8 +11,8 @@ import pandas as pd
 import xarray as xr
 
 from vehiclemor.arguments import file_path, quoted
+from vehiclemor.error_measures import max_abs, rms, signal_range
 from vehiclemor.exceptions import FileError, InputError, printable
-from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.netcdf_file import opened, read_dataset
 from vehiclemor.study.plans.choice import outcomes
 from vehiclemor.study.plans.results import judged_part
@@ -141,10 +141,7 @@ def _row(label: str, part: xr.Dataset, bounds: Bounds) -> dict[str, Any]:
     return {
         "kind": "method",
         "label": label,
-        "runs": len(ends.scores),
-        "misses": int(ends.missed.sum()),
-        "silent": int(ends.undetected.sum()),
-        "flagged": int(ends.warned.sum()),
+        **ends.counts,
         "score": float(ends.scores.max()),
         "median_score": float(np.median(ends.scores)),
         "output": max(worst, key=lambda name: worst[name]),

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vehiclemor.error_measures import max_abs, rms, signal_range
 from vehiclemor.failure import Failure
 from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.provenance import attributes
 from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.registry import component
@@ -152,7 +152,9 @@ def _missing(model: Model, maneuver: Excitation, failure: Failure) -> Trajectory
 def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
     """What is known of any run, by names of variables; no errors without a reference."""
     run, full, trust = outcome.trajectory, outcome.reference, outcome.trajectory.trust
-    outputs, times = run.outputs, run.times
+    # Errors are those until the first of both has stopped.
+    end = min(run.samples_to_stop, len(run.times) if full is None else full.samples_to_stop)
+    outputs, times = run.outputs[:end], run.times[:end]
     early = np.searchsorted(times, FIRST_SECONDS, side="right")
     landed = np.searchsorted(times, min(LANDED, times[-1]))
     measured: dict[str, object] = {
@@ -169,16 +171,16 @@ def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
     for name in model.counts:
         measured[name] = run.counts.get(name, 0)
     if full is not None:
-        error = outputs - full.outputs
+        error = outputs - full.outputs[:end]
         measured |= {
             "rms_error": rms(error),
             "max_error": max_abs(error),
-            "signal_range": signal_range(full.outputs),
+            "signal_range": signal_range(full.outputs[:end]),
         }
         if model.coordinates:
-            measured["rms_coordinate_error"] = rms(run.coordinates - full.coordinates)
+            measured["rms_coordinate_error"] = rms((run.coordinates - full.coordinates)[:end])
         if model.speeds:
-            measured["rms_speed_error"] = rms(run.speeds - full.speeds)
+            measured["rms_speed_error"] = rms((run.speeds - full.speeds)[:end])
     return measured
 
 

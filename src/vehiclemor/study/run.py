@@ -91,7 +91,7 @@ def _plan(name: str, path: Path, definition: StudyFile, seed: int | None) -> Pla
     large = definition.points >= LARGE
     text = f"{name}: checking {definition.points} grid points"
     with announced(text) if large else nullcontext():
-        grid = expand(name, definition)
+        grid = expand(name, definition, path.parent)
     return Plan(name, definition, partial(run_grid, grid), grid.experiments.keys)
 
 

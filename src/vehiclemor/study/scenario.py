@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.checks import check_resolved, checked_maneuver
+from vehiclemor.inputs.checks import check_resolved, checked_maneuver, completed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.reduction.training import SPEED, TrainingRun, own_speed
@@ -163,8 +163,13 @@ def parameters_of(model: Model) -> Values:
 
 
 def model_of_run(model: Model, scenario: Scenario) -> Model:
-    """The model with the parameters of a scenario."""
-    return with_parameters(model, scenario.parameters)
+    """The model with the parameters of a scenario, whose maneuver drives it."""
+    return with_parameters(model.driven_by(scenario.maneuver), scenario.parameters)
+
+
+def driven_by_all(model: Model, scenarios: Sequence[Scenario]) -> Model:
+    """The model with all optional inputs that some scenarios drive."""
+    return model.driving(name for scenario in scenarios for name in scenario.maneuver.inputs)
 
 
 # More than the runs of a protocol, over which all rows go.
@@ -209,7 +214,7 @@ def _alike(model: Model, run: Scenario, test: Scenario) -> bool:
     known, tested = run.maneuver.times, test.maneuver.times
     # Most differ at a few times already.
     for times in (tested[:: max(len(tested) // FEW, 1)], tested, known[known <= last]):
-        learnt, used = (s.maneuver.for_inputs(model.inputs).at(times) for s in (run, test))
+        learnt, used = (completed(s.maneuver, model.definition).at(times) for s in (run, test))
         if np.abs(learnt - used).max() > ROUNDING * np.abs(used).max():
             return False
     one, other = model_of_run(model, run), model_of_run(model, test)
@@ -219,7 +224,7 @@ def _alike(model: Model, run: Scenario, test: Scenario) -> bool:
 
 def check(model: Model, scenario: Scenario) -> None:
     """Raise `InputError` if the model can't be run in the scenario."""
-    checked_maneuver(scenario.maneuver, model.definition)
+    checked_maneuver(scenario.maneuver, model.driven_by(scenario.maneuver).definition)
     check_resolved(scenario.maneuver)
     if scenario.speed is not None and own_speed(model) is None:
         raise InputError(f"{model.name} has no {SPEED}: a scenario of it has no speed")

@@ -43,7 +43,7 @@ def truck(**overrides):
 
 @lru_cache
 def ported(overrides):
-    equations, _ = compiled("flexible_truck", DEFINITION.derive)
+    equations, _ = compiled(DEFINITION)
     return equations, hoisted_constants(equations, parameters(**dict(overrides)).flat(), [])
 
 

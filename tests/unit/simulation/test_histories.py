@@ -10,9 +10,9 @@ import pytest
 
 import vehiclemor as vm
 from tests.models import CAR, FIDELITY, VEHICLES
+from vehiclemor.error_measures import max_abs, rms, signal_range
 from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.steering import lane_change
-from vehiclemor.metrics import max_abs, rms, signal_range
 from vehiclemor.registry import component
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.multibody.quantities import Quantity
+from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, InputChoice, Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
@@ -19,6 +19,33 @@ from vehiclemor.symbolic.tape import Tape
 def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
     """A symbol for each quantity, real."""
     return [sp.Symbol(quantity.name, real=True) for quantity in quantities]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Inputs in the equations.
+
+    Attributes
+    ----------
+    values
+        Name -> symbol; the default of an optional input that is neither driven nor a parameter.
+    driven, constant
+        Symbols of the argument `u`, and of parameters behind those that the model declares.
+    """
+
+    values: dict[str, sp.Expr]
+    driven: list[sp.Symbol]
+    constant: list[sp.Symbol]
+
+
+def inputs(every_run: Sequence[Quantity], choice: InputChoice) -> Inputs:
+    """Inputs of every run and the optional ones of vehicles, as the choice has them."""
+    values: dict[str, sp.Expr] = {q.name: sp.nsimplify(q.default) for q in OPTIONAL_INPUTS}
+    optional = [q for q in OPTIONAL_INPUTS if q.name in choice.driven]
+    driven = symbols([*every_run, *optional])
+    constant = symbols([q for q in OPTIONAL_INPUTS if q.name in choice.constant])
+    values |= {symbol.name: symbol for symbol in (*driven, *constant)}
+    return Inputs(values, driven, constant)
 
 
 def parameters(

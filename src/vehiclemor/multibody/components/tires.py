@@ -10,14 +10,15 @@ slides to the left.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from vehiclemor.multibody.components.body import Attitude
+from vehiclemor.multibody.components.wheel_inputs import WheelInputs
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
-from vehiclemor.symbolic.mechanics import Body, kane
+from vehiclemor.symbolic.mechanics import ZERO, Body, kane
 from vehiclemor.symbolic.tape import Tape
 
 # Keeps 0/0 from a wheel without load and slip; nothing else notices it.
@@ -54,12 +55,15 @@ class Corner:
     bodies: tuple[Body, ...]
     spring: sp.Expr  # Generalised force of the spring-damper on the coordinate that it acts on.
     wheel: WheelOnRoad
+    shaft: Vector = ZERO  # Torque of a half shaft on the wheel in N m, the chassis bears it.
 
 
 def kane_with_corners(
     tape: Tape, chassis: Body, corners: Sequence[Corner], springs: Sequence[int], speeds: int
 ) -> tuple[list[list[sp.Expr]], list[sp.Expr]]:
     """Mass matrix and forces of all bodies; springs act on the coordinates of these numbers."""
+    for corner in corners:
+        chassis = replace(chassis, moment=chassis.moment - corner.shaft)
     bodies = [chassis, *(part for corner in corners for part in corner.bodies)]
     mass, force = kane(tape, speeds, bodies)
     for number, corner in zip(springs, corners, strict=True):
@@ -91,11 +95,17 @@ def magic_formula(
     slip_ratio: sp.Expr,
     slip_angle: sp.Expr,
     cos_slip_angle: sp.Expr,
+    friction: sp.Expr,  # Factor, not 0.
 ) -> TireForces:
-    """Forces at combined slip; zero where the load is zero."""
+    """Forces at combined slip; zero where the load is zero.
+
+    Friction m acts by similarity (Pacejka, section 4.2): F = m F_1(kappa / m, alpha / m).
+    If it scaled the peaks alone, combined slip would use 1.29 of the friction ellipse at m = 0.3.
+    """
     let = tape.let
     d = let((load - reference_load) / reference_load)
-    kappa, alpha = slip_ratio, slip_angle
+    kappa, alpha = let(slip_ratio / friction), let(slip_angle / friction)
+    grip = let(load * friction)
 
     # Longitudinal.  Stiffness and peak are per load, so that their quotient has no 0/0.
     peak = let(c["PDX1"] + c["PDX2"] * d)
@@ -103,7 +113,7 @@ def magic_formula(
     curvature = let(c["PEX1"] + d * (c["PEX2"] + c["PEX3"] * d))
     b = let(stiffness / (c["PCX1"] * peak))
     bent = let(c["PCX1"] * _arc(tape, let(b * kappa), curvature))
-    longitudinal = let(let(load * peak) * let(sp.sin(bent)))
+    longitudinal = let(let(grip * peak) * let(sp.sin(bent)))
 
     # Lateral: sin(2 arctan x) = 2 x / (1 + x^2).
     peak = let(c["PDY1"] + c["PDY2"] * d)
@@ -113,7 +123,7 @@ def magic_formula(
     stiffness = let(2 * c["PKY1"] / (c["PKY2"] * (1 + x * x)))
     b = let(stiffness / (c["PCY1"] * peak))
     bent = let(c["PCY1"] * _arc(tape, let(b * alpha), curvature))
-    lateral = let(let(load * peak) * let(sp.sin(bent)))
+    lateral = let(let(grip * peak) * let(sp.sin(bent)))
 
     # Weights of combined slip: cos(arctan x) = 1 / sqrt(1 + x^2).
     b = let(c["RBX1"] / sp.sqrt(let(1 + (c["RBX2"] * kappa) ** 2)))
@@ -152,10 +162,7 @@ def fiala(
     the friction coefficient alone.
     """
     let = tape.let
-    combined = let(sp.sqrt(let(slip_ratio**2 + tan_slip**2)))
-    sliding = let(minimum(tape, combined, sp.Integer(1)))
-    fall = let(c["largest_friction"] - c["smallest_friction"])
-    limit = let(load * let(c["largest_friction"] - fall * sliding))
+    limit = _friction_force(tape, c, load, slip_ratio, tan_slip)
 
     # With w = kappa / max(|kappa|, kappa*) both cases of the law are one expression.
     critical = let(limit / (2 * c["longitudinal_slip_stiffness"]))
@@ -170,6 +177,52 @@ def fiala(
     lateral = let(-share * let(3 - 3 * size + size * size))
     aligning = let(share * c["tire_width"] * let(left * left * left))
     return TireForces(longitudinal, lateral, aligning)
+
+
+def brush(
+    tape: Tape,
+    c: Mapping[str, sp.Expr],  # Coefficients `FIALA`.
+    load: sp.Expr,  # Vertical force in N.
+    # kappa, and the tangent of the slip angle.
+    slip_ratio: sp.Expr,
+    tan_slip: sp.Expr,
+    friction: sp.Expr,  # Factor, not 0.
+) -> TireForces:
+    """Fiala's forces at combined slip: one force, along what the bristles are deflected.
+
+    The brush model (Pacejka, section 3.2) with two stiffnesses.  Without longitudinal slip it is
+    `fiala`, with both slips the friction is used once.
+    """
+    let = tape.let
+    limit = let(friction * _friction_force(tape, c, load, slip_ratio, tan_slip))
+    along = let(c["longitudinal_slip_stiffness"] * slip_ratio)
+    across = let(c["cornering_stiffness"] * tan_slip)
+    # With s = |(X, Y)| and y = min(s / 3 L, 1), F = L (3 y - 3 y^2 + y^3) along (X, Y) / s: what
+    # divides by s is written without it.
+    size, most = let(sp.sqrt(let(along**2 + across**2))), let(3 * limit)
+    inverse = let(1 / (maximum(tape, most, size) + NOTHING))
+    y = let(size * inverse)
+    share = let(limit * inverse)
+    per_deflection, left = let(share * let(3 - 3 * y + y * y)), let(1 - y)
+    arm = let(c["tire_width"] * let(left * left * left))
+    return TireForces(
+        let(along * per_deflection), let(-across * per_deflection), let(across * share * arm)
+    )
+
+
+def _friction_force(
+    tape: Tape,
+    c: Mapping[str, sp.Expr],
+    load: sp.Expr,
+    slip_ratio: sp.Expr,
+    tan_slip: sp.Expr,
+) -> sp.Expr:
+    """Largest force in N of Fiala's tire, which falls with the combined slip."""
+    let = tape.let
+    combined = let(sp.sqrt(let(slip_ratio**2 + tan_slip**2)))
+    sliding = let(minimum(tape, combined, sp.Integer(1)))
+    fall = let(c["largest_friction"] - c["smallest_friction"])
+    return let(load * let(c["largest_friction"] - fall * sliding))
 
 
 def maximum(tape: Tape, a: sp.Expr, b: sp.Expr) -> sp.Expr:
@@ -193,13 +246,14 @@ def upright_wheel(
     velocity: Vector,
     rotation: Vector,
     p: Mapping[str, sp.Expr],  # Parameters of the vehicle.
+    inputs: WheelInputs,
 ) -> WheelOnRoad:
     """A wheel whose effective radius is the height of its centre, with the Magic Formula.
 
     The vertical load has no arm.
     """
     let, up = tape.let, chassis.road_normal
-    above = let(height + let(up @ hub))
+    above = let(height + let(up @ hub) - inputs.road)
     along = g.named(tape, axle.cross(up))
     inverse = let(1 / g.length(tape, along))
     heading = g.named(tape, along * inverse)
@@ -209,14 +263,14 @@ def upright_wheel(
     forward = let(heading @ velocity)
     speed = let(sp.sqrt(let(forward**2 + p["slip_speed"] ** 2)))
     lateral = let(let(leftward @ sliding) / speed)
-    rise = let(up @ velocity)
+    rise = let(let(up @ velocity) - inputs.road_rate)
     ratio, angle = let(-let(heading @ sliding) / speed), let(sp.atan(lateral))
     slips = ratio, angle, let(1 / sp.sqrt(let(1 + lateral**2)))
 
     pressed = let(p["tire_stiffness"] * (p["tire_radius"] - above) - p["tire_damping"] * rise)
     load = let((pressed + sp.Abs(pressed)) / 2)
     reference_load = let(p["nominal_load"] * p["load_scale"])
-    tire = magic_formula(tape, p, load, reference_load, p["tire_radius"], *slips)
+    tire = magic_formula(tape, p, load, reference_load, p["tire_radius"], *slips, inputs.friction)
     shear = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral)
     moment = arm.cross(shear) + up * tire.aligning
     force = g.named(tape, shear + up * load)
@@ -233,6 +287,8 @@ def tilted_wheel(
     turning: Vector,
     spin: sp.Expr,  # Spin of the wheel on its carrier in rad/s.
     p: Mapping[str, sp.Expr],  # Parameters of the vehicle.
+    inputs: WheelInputs,
+    combined: bool,  # Whether forces are those of `brush`, else of `fiala`.
 ) -> WheelOnRoad:
     """A wheel with camber and Fiala's tire.
 
@@ -246,16 +302,19 @@ def tilted_wheel(
     heading = g.named(tape, across * inverse)
     leftward = g.named(tape, up.cross(heading))
     down = g.named(tape, axle.cross(heading))
-    radius = let(height * inverse)
+    radius = let((height - inputs.road) * inverse)
     arm = g.named(tape, down * radius)
     sliding = g.named(tape, velocity + turning.cross(arm))
     forward, lateral = let(sliding @ heading), let(sliding @ leftward)
-    rise = let(sliding @ up)
+    rise = let(let(sliding @ up) - inputs.road_rate)
 
     load = vertical_load(tape, radius, rise * inverse, p)
     per_speed = let(1 / maximum(tape, let(sp.Abs(forward)), p["slip_speed"]))
     ratio, tan_slip = let(let(spin * radius - forward) * per_speed), let(lateral * per_speed)
-    tire = fiala(tape, p, load, ratio, tan_slip)
+    if combined:
+        tire = brush(tape, p, load, ratio, tan_slip, inputs.friction)
+    else:
+        tire = fiala(tape, p, load, ratio, tan_slip)
     force = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral + up * load)
     moment = g.named(tape, arm.cross(force) + up * tire.aligning)
     return WheelOnRoad(tire, load, ratio, tan_slip, force, moment)

@@ -14,8 +14,10 @@ import sympy as sp
 from vehiclemor.multibody.components import body
 from vehiclemor.multibody.components import linkage as links
 from vehiclemor.multibody.components.tires import Corner, WheelOnRoad, tilted_wheel
+from vehiclemor.multibody.components.wheel_inputs import wheel_inputs
 from vehiclemor.multibody.double_wishbone.definition import POINTS
 from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SOLVED, SPINS
+from vehiclemor.multibody.quantities import WHEELS, InputChoice
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics as m
 from vehiclemor.symbolic.geometry import Vector
@@ -26,6 +28,8 @@ Parameters = Mapping[str, sp.Expr]
 # Of the corners in order: FL, FR, RL, RR; 1 on the left, -1 on the right.
 ENDS = ("front", "front", "rear", "rear")
 SIDES = (1, -1, 1, -1)
+# Inputs with which tires slip in both directions: the paper's runs coast, and keep its Fiala tires.
+COMBINED_SLIP = ("drive_torque_", "brake_torque_", "friction_")
 FRONT_POINTS = (
     *POINTS,
     *("front_spring_chassis_point", "front_spring_arm_point"),
@@ -46,11 +50,17 @@ class Vehicle:
     frame: m.MovingFrame
     points: tuple[dict[str, Vector], ...]  # Design points of the four corners, chassis frame.
     linkages: tuple[links.Linkage, ...]
-    # Coordinates and their rates; displacement, velocity and acceleration of the rack.
+    # Coordinates and their rates.
     q: Sequence[sp.Symbol]
     rates: Sequence[sp.Symbol]
-    rack: Sequence[sp.Symbol]
+    inputs: body.Inputs
     p: Parameters
+    combined: bool  # Whether tires have the forces of `brush`, else those of `fiala`.
+
+    @property
+    def rack(self) -> list[sp.Symbol]:
+        """Displacement, velocity and acceleration of the rack."""
+        return self.inputs.driven[:3]
 
     @property
     def speeds(self) -> list[sp.Expr]:
@@ -64,10 +74,13 @@ class Vehicle:
         return links.linkage_motions(tape, self.linkages[k], q, corner_rates, self.rack[1:])
 
 
-def vehicle(tape: Tape) -> tuple[Vehicle, list[sp.Symbol]]:
+def vehicle(tape: Tape, choice: InputChoice) -> tuple[Vehicle, list[sp.Symbol]]:
     """The vehicle, and the symbols of its parameters in order."""
-    q, rates, rack = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds", "inputs"))
-    p = body.parameters(DECLARED["parameters"], SOLVED)
+    q, rates = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds"))
+    inputs = body.inputs(DECLARED["inputs"], choice)
+    declared, solved = body.parameters(DECLARED["parameters"]), body.parameters({}, SOLVED)
+    p = declared | solved
+    combined = any(name.startswith(COMBINED_SLIP) for name in (*choice.driven, *choice.constant))
     attitude = body.attitude(tape, q)
     speeds = body.speeds(tape, attitude, rates)
     frame = m.MovingFrame(
@@ -79,9 +92,9 @@ def vehicle(tape: Tape) -> tuple[Vehicle, list[sp.Symbol]]:
     linkages = []
     for k in range(2):
         angles = [q[j] for j in CORNER[k]]
-        linkages.append(links.assembled(tape, angles, rack[0], points[k], SIDES[k]))
-    vehicle = Vehicle(attitude, frame, points, tuple(linkages), q, rates, rack, p)
-    return vehicle, list(p.values())
+        linkages.append(links.assembled(tape, angles, inputs.driven[0], points[k], SIDES[k]))
+    vehicle = Vehicle(attitude, frame, points, tuple(linkages), q, rates, inputs, p, combined)
+    return vehicle, [*declared.values(), *inputs.constant, *solved.values()]
 
 
 def _design_points(tape: Tape, p: Parameters) -> tuple[dict[str, Vector], ...]:
@@ -158,11 +171,11 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
         linkage.carrier_lever(tape, points["wheel_centre"]),
         g.column(linkage.carrier, 1),
     )
-    carrier, wheel = _wheeled_body(tape, v, k, wheeled)
+    carrier, wheel, shaft = _wheeled_body(tape, v, k, wheeled)
     lever = linkage.lower.lever(tape, points["front_spring_arm_point"])
     moment = _spring(tape, v, k, linkage.lower.rear, lever, motions.lower)
     bodies = (arm("upper", motions.upper), arm("lower", motions.lower), carrier, rod)
-    return Corner(bodies, moment, wheel)
+    return Corner(bodies, moment, wheel, shaft)
 
 
 def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner:
@@ -194,14 +207,17 @@ def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner
         lever("rear_wheel_centre"),
         axis,
     )
-    arm, wheel = _wheeled_body(tape, v, k, wheeled)
+    arm, wheel, shaft = _wheeled_body(tape, v, k, wheeled)
     moment = _spring(tape, v, k, pivot, lever("rear_spring_arm_point"), turn)
-    return Corner((arm,), moment, wheel)
+    return Corner((arm,), moment, wheel, shaft)
 
 
-def _wheeled_body(tape: Tape, v: Vehicle, k: int, part: _WheelCarrier) -> tuple[Body, WheelOnRoad]:
-    """A carrier or arm together with its wheel, and the wheel on the road."""
-    frame, axle, spin = v.frame, part.axle, SPINS[k]
+def _wheeled_body(
+    tape: Tape, v: Vehicle, k: int, part: _WheelCarrier
+) -> tuple[Body, WheelOnRoad, Vector]:
+    """A carrier or arm with its wheel, the wheel on the road, torque of the half shaft on it."""
+    frame, axle, spin = v.frame, part.axle, v.rates[SPINS[k]]
+    inputs = wheel_inputs(v.inputs.values, WHEELS[k])
     levers = (part.to_centre, part.to_wheel)
     positions = [g.named(tape, part.base + lever) for lever in levers]
     centre, wheel = (
@@ -210,23 +226,25 @@ def _wheeled_body(tape: Tape, v: Vehicle, k: int, part: _WheelCarrier) -> tuple[
     )
     turning = frame.angular_velocity_of(tape, part.turn)
     height = tape.let(v.q[2] + tape.let(v.attitude.road_normal @ positions[1]))
-    on_road = tilted_wheel(
-        tape, v.attitude.road_normal, height, axle, wheel.value, turning.value, v.rates[spin], v.p
-    )
+    motion = axle, wheel.value, turning.value, spin
+    on_road = tilted_wheel(tape, v.attitude.road_normal, height, *motion, v.p, inputs, v.combined)
     force, moment = on_road.force, on_road.moment
     arm = g.named(tape, positions[1] - positions[0])
     inertia = v.p[f"{ENDS[k]}_wheel_spin_inertia"]
-    rotor = Rotor(spin, v.rates[spin], axle, inertia, tape.let(moment @ axle), turning.bias)
+    about_axle = tape.let(tape.let(moment @ axle) + inputs.torque(tape, spin))
+    rotor = Rotor(SPINS[k], spin, axle, inertia, about_axle, turning.bias)
+    # The caliper of a brake sits on the carrier: its torque is an inner one, a half shaft's is not.
+    shaft = g.named(tape, axle * inputs.drive)
     body = Body(
         part.mass,
         centre,
         force,
         m.with_inertia(tape, part.tensor, turning),
         part.tensor,
-        g.named(tape, moment + arm.cross(force)),
+        g.named(tape, moment + arm.cross(force) + shaft),
         rotor,
     )
-    return body, on_road
+    return body, on_road, shaft
 
 
 def _spring(tape: Tape, v: Vehicle, k: int, pivot: Vector, lever: Vector, turn: Motion) -> sp.Expr:

@@ -18,6 +18,10 @@ from vehiclemor.multibody.definition import Derivative, ModelDefinition
 from vehiclemor.multibody.double_wishbone.definition import POINTS, check_linkage, tie_rod_angles
 from vehiclemor.multibody.quantities import (
     FORWARD,
+    OPTIONAL_INPUTS,
+    OPTIONAL_RANGES,
+    SLIP_RATIOS,
+    STANDSTILL,
     TIRE_LOADS,
     UPRIGHT,
     WHEELS,
@@ -192,6 +196,7 @@ DEFINITION = ModelDefinition(
     summary="vehicle with 26 coordinates and 12 constraints, double wishbones, Fiala tires (DAE)",
     maneuver="rack_lane_change",
     **DECLARED,
+    optional_inputs=OPTIONAL_INPUTS,
     derive=equations_of("high_fidelity"),
     check=check,
     starts=starts,
@@ -209,8 +214,12 @@ DEFINITION = ModelDefinition(
         "longitudinal_speed": FORWARD,
         **{f"steer_{wheel}": (-1.1, 1.1) for wheel in WHEELS[:2]},
         **UPRIGHT,
+        **OPTIONAL_RANGES,
     },
+    standstill=STANDSTILL,
     loads=TIRE_LOADS,
+    slips=SLIP_RATIOS,
+    wheelbase=lambda p: wheel_places(p)[0][0] - wheel_places(p)[1][0],
     tabled_outputs=(
         "lateral_speed",
         "vertical_speed",

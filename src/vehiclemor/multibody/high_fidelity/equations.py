@@ -14,6 +14,7 @@ from vehiclemor.multibody.components.tires import Corner, kane_with_corners, tir
 from vehiclemor.multibody.high_fidelity import corners
 from vehiclemor.multibody.high_fidelity.corners import Vehicle
 from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SPINS
+from vehiclemor.multibody.quantities import DEFAULTS, InputChoice
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate, eliminate_symmetric
@@ -28,10 +29,10 @@ ORDER = (*SPINS, *ARMS, *range(6))
 PIVOTS = ((3, 4), (5, 5), (0, 1), (1, 2), (2, 3), (4, 0))
 
 
-def derive() -> Program:
+def derive(choice: InputChoice = DEFAULTS) -> Program:
     """Derive accelerations, outputs, and the unsolved descriptor form; parameters stay symbols."""
     tape = Tape()
-    vehicle, parameters = corners.vehicle(tape)
+    vehicle, parameters = corners.vehicle(tape, choice)
     p, q, rates, speeds = vehicle.p, vehicle.q, vehicle.rates, vehicle.speeds
     n, count = len(q), len(DECLARED["constraints"])
     free = [free_rate(k, rate) for k, rate in enumerate(rates)]
@@ -71,7 +72,7 @@ def derive() -> Program:
     ]
     return assemble(
         tape,
-        {"x": [*q, *rates], "u": vehicle.rack},
+        {"x": [*q, *rates], "u": vehicle.inputs.driven},
         parameters,
         {
             "derivative": ([*rates, *accelerations], (2 * n,)),
@@ -135,7 +136,7 @@ def _kane(
     chassis = mechanics.Body(
         v.p["chassis_mass"],
         v.frame.origin(tape),
-        mechanics.ZERO,
+        g.vector((v.inputs.values["body_force_x"], 0, 0)),
         v.frame.rotation(tape, inertia),
         inertia,
     )

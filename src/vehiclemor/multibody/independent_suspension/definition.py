@@ -16,6 +16,10 @@ from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.multibody.quantities import (
     FORWARD,
+    OPTIONAL_INPUTS,
+    OPTIONAL_RANGES,
+    SLIP_RATIOS,
+    STANDSTILL,
     TIRE_LOADS,
     UPRIGHT,
     WHEELS,
@@ -109,6 +113,7 @@ DEFINITION = ModelDefinition(
     summary="vehicle with independent suspension, 14 degrees of freedom, Magic Formula tires (ODE)",
     maneuver="lane_change",
     **DECLARED,
+    optional_inputs=OPTIONAL_INPUTS,
     derive=equations_of("independent_suspension"),
     check=check,
     starts=starts,
@@ -116,8 +121,16 @@ DEFINITION = ModelDefinition(
     planar=("X", "Y", "psi"),
     # Slip needs forward motion, the contact point lies below the wheel centre.
     # Steering as far as that of the car (CommonRoad, BMW 320i).
-    validity={"longitudinal_speed": FORWARD, **UPRIGHT, "delta": (-1.066, 1.066)},
+    validity={
+        "longitudinal_speed": FORWARD,
+        **UPRIGHT,
+        "delta": (-1.066, 1.066),
+        **OPTIONAL_RANGES,
+    },
+    standstill=STANDSTILL,
     loads=TIRE_LOADS,
+    slips=SLIP_RATIOS,
+    wheelbase=lambda p: p["front_axle_distance"] + p["rear_axle_distance"],
     tabled_outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
     main_outputs=("pitch", "yaw", "lateral_position"),
 )

@@ -11,7 +11,9 @@ from vehiclemor.multibody.components.tires import (
     tire_outputs,
     upright_wheel,
 )
+from vehiclemor.multibody.components.wheel_inputs import WheelInputs, wheel_inputs
 from vehiclemor.multibody.independent_suspension.definition import DECLARED, Derived, derived
+from vehiclemor.multibody.quantities import DEFAULTS, WHEELS, InputChoice
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
@@ -19,14 +21,17 @@ from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 
-def derive() -> Program:
+def derive(choice: InputChoice = DEFAULTS) -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
     tape = Tape()
-    vehicle = _vehicle(tape)
+    vehicle = _vehicle(tape, choice)
     q, nu, attitude = vehicle.q, vehicle.nu, vehicle.attitude
     sprung = _sprung_body(tape, vehicle)
     wheels = [_wheel(tape, vehicle, number) for number in range(4)]
     mass, force = kane_with_corners(tape, sprung, wheels, range(6, 10), len(nu))
+    for row, spin, inputs in zip(range(10, 14), nu[10:], vehicle.at_wheels, strict=True):
+        # Reactions act on the carrier, which does not turn in the chassis.
+        force[row] = tape.let(force[row] + inputs.torque(tape, spin))
     # Spins and travels couple to the chassis alone: what is left of it is 6 x 6.
     order = [*range(10, 14), *range(6, 10), *range(6)]
     solved = eliminate_symmetric(tape, mass, force, order)
@@ -35,8 +40,8 @@ def derive() -> Program:
     n = len(q)
     return assemble(
         tape,
-        {"x": [*q, *nu], "u": [vehicle.delta]},
-        list(vehicle.p.values()),
+        {"x": [*q, *nu], "u": vehicle.inputs.driven},
+        [*vehicle.p.values(), *vehicle.inputs.constant],
         {
             "derivative": ([*rates, *(solved[k] for k in range(n))], (2 * n,)),
             "outputs": (
@@ -57,10 +62,15 @@ class _Vehicle:
     attitude: body.Attitude
     q: list[sp.Symbol]
     nu: list[sp.Symbol]
-    delta: sp.Symbol
+    inputs: body.Inputs
     p: dict[str, sp.Symbol]
     # What follows from the parameters; distances, depths and preloads stand on the tape.
     derived: Derived
+
+    @property
+    def at_wheels(self) -> list[WheelInputs]:
+        """Optional inputs at the four wheels."""
+        return [wheel_inputs(self.inputs.values, wheel) for wheel in WHEELS]
 
     @property
     def weight(self) -> g.Vector:
@@ -68,16 +78,17 @@ class _Vehicle:
         return self.attitude.road_normal * -self.p["gravity"]
 
 
-def _vehicle(tape: Tape) -> _Vehicle:
+def _vehicle(tape: Tape, choice: InputChoice) -> _Vehicle:
     """The sprung body on the road."""
-    q, nu, (delta,) = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds", "inputs"))
+    q, nu = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds"))
+    inputs = body.inputs(DECLARED["inputs"], choice)
     p = body.parameters(DECLARED["parameters"])
     attitude, d = body.attitude(tape, q), derived(p)
     pairs = {
         k: tuple(map(tape.let, getattr(d, k))) for k in ("sprung_distance", "depth", "preload")
     }
     frame = mechanics.MovingFrame(g.vector(nu[:3]), g.vector(nu[3:6]))
-    return _Vehicle(frame, attitude, q, nu, delta, p, replace(d, **pairs))
+    return _Vehicle(frame, attitude, q, nu, inputs, p, replace(d, **pairs))
 
 
 def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
@@ -90,7 +101,8 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
     mass = v.p["sprung_mass"]
     origin = v.frame.origin(tape)
     rotation = v.frame.rotation(tape, inertia)
-    return mechanics.Body(mass, origin, v.weight * mass, rotation, inertia)
+    pushed = g.vector((v.inputs.values["body_force_x"], 0, 0))
+    return mechanics.Body(mass, origin, v.weight * mass + pushed, rotation, inertia)
 
 
 def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> Corner:
@@ -106,13 +118,15 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> Corner:
             tape.let(travel - d.depth[end]),
         )
     )
-    steer = (tape.let(sp.sin(v.delta)), tape.let(sp.cos(v.delta)))
+    delta = v.inputs.values["delta"]
+    steer = (tape.let(sp.sin(delta)), tape.let(sp.cos(delta)))
     axle = g.vector((-steer[0], steer[1], 0) if front else (0, 1, 0))
     upwards = mechanics.along(mechanics.free_rate(6 + wheel, rate), mechanics.UNIT[2])
     centre = frame.point(tape, hub, upwards)
     about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
     rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
-    on_road = upright_wheel(tape, v.attitude, v.q[2], hub, axle, centre.value, rotation.value, p)
+    motion = hub, axle, centre.value, rotation.value
+    on_road = upright_wheel(tape, v.attitude, v.q[2], *motion, p, v.at_wheels[wheel])
     mass = p["unsprung_mass"]
     applied = g.named(tape, on_road.force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate

@@ -205,7 +205,7 @@ class DynamicProjection(ReducedSystem):
     def _reduced_rates(self, window: int, y: np.ndarray) -> np.ndarray:
         """Rates of the reduced states y (dim,) of one window, all inputs zero."""
         model, spaces, n, dim = self.model, self.spaces, len(self.model.coordinates), len(y)
-        mean, no_input = spaces.means[window], np.zeros(len(model.inputs))
+        mean, no_input = spaces.means[window], model.inputs_at_rest
         trial, test = spaces.trial_basis[window, :dim], spaces.test_basis[window, :dim]
         if spaces.formulation == "state":
             return test @ model.rhs(mean + y @ trial, no_input)

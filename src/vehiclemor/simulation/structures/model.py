@@ -17,8 +17,8 @@ from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import (
     checked_inputs,
     left_validity,
-    lifted_wheels,
     limits_of,
+    wheel_remarks,
 )
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
@@ -331,7 +331,7 @@ class StructuralModel(Model):
                 self.definition, name, columns[left, first.index(left)], times[left]
             )
             histories[left:] = np.nan
-        lifted = lifted_wheels(self.definition.loads, first[len(limited) :], times)
+        remarks = wheel_remarks(self.definition, first[len(limited) :], times)
         run = Trajectory.of(
             times=times,
             inputs=inputs,
@@ -342,7 +342,7 @@ class StructuralModel(Model):
             seconds=seconds,
             status="diverged" if failure else "ok",
             message=failure,
-            remark="; ".join(filter(None, (lifted, remark))),
+            remark="; ".join(filter(None, (*remarks, remark))),
             trust=None,
             names=self.outputs,
             model=self,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from vehiclemor.simulation.trajectory import FINISHED
+from vehiclemor.simulation.trajectory import FINISHED, WITHOUT_COMPLAINT
 from vehiclemor.study.experiment import Settings
 from vehiclemor.study.plans.protocol import Entry, Protocol
 from vehiclemor.study.plans.study_file import Bound
@@ -114,13 +114,25 @@ class Outcomes(NamedTuple):
     warned: np.ndarray
     undetected: np.ndarray
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many runs there are, and of these how many are right, and so on."""
+        return {
+            "runs": len(self.scores),
+            "right": int((~self.missed).sum()),
+            "misses": int(self.missed.sum()),
+            "silent": int(self.undetected.sum()),
+            "flagged": int(self.warned.sum()),
+        }
+
 
 def outcomes(dataset: xr.Dataset, bounds: Mapping[str, Bound]) -> Outcomes:
     """Outcomes of a row in its scenarios."""
     multiples, status = scores(dataset, bounds), dataset["status"].values
     missed = ~(multiples <= 1.0)
-    warned = (status != "ok") | np.isfinite(dataset["trusted_until"].values)
-    return Outcomes(multiples, missed, warned, missed & (status == "ok"))
+    complete = np.isin(status, WITHOUT_COMPLAINT)
+    warned = ~complete | np.isfinite(dataset["trusted_until"].values)
+    return Outcomes(multiples, missed, warned, missed & complete)
 
 
 def choose(results: Sequence[Validation]) -> int:

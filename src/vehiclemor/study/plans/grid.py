@@ -2,14 +2,16 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vehiclemor.exceptions import FileError, GeometryError, InputError, PlugInError, VehiclemorError
+from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -20,6 +22,7 @@ from vehiclemor.study.experiment import (
     default_settings,
     make_experiment,
 )
+from vehiclemor.study.plans.logs import Window, windows
 from vehiclemor.study.plans.study_file import GridFile, MethodEntry
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER, TEXTS, Sampling, values
 from vehiclemor.study.plans.training import training_set
@@ -48,19 +51,28 @@ class Grid:
     experiments: dict[str, Experiment]
 
 
-def expand(name: str, study: GridFile) -> Grid:
-    """All experiments of a study; `FileError` if it names something unknown or unfit."""
+def expand(name: str, study: GridFile, folder: Path = Path()) -> Grid:
+    """All experiments of a study, whose logs are in a folder.
+
+    `FileError` if it names something unknown or unfit.
+    """
     try:
         model = build(study.model, overrides=study.parameters)
         samples = sampled(study.sampling) if study.sampling else {}
         dimensions = _dimensions(model, study, samples)
+        measured = _windows(model, study, folder)
+        if measured:
+            dimensions = {"maneuver": [*measured]} | dimensions
         if study.keep == "trajectories":
-            _check_histories(model, study, dimensions)
+            names = dimensions.get("maneuver", [study.maneuver or model.definition.maneuver])
+            driven = [measured[n].signal if measured else component("maneuver", n) for n in names]
+            _check_histories(model, driven, math.prod(map(len, dimensions.values())))
         keys = np.empty([len(entry) for entry in dimensions.values()], KEY)
         experiments: dict[str, Experiment] = {}
         axes = {name: points for name, points in dimensions.items() if name != "label"}
         for number, entry in enumerate(study.methods):
-            of_method = list(_of_method(model, study, entry, _points(axes, samples)))
+            points = _points(axes, samples)
+            of_method = list(_of_method(model, study, entry, points, measured))
             # Settings that a method does not have give no further experiments of it.
             experiments |= {experiment.key: experiment for experiment in of_method}
             keys_of_method = np.array([experiment.key for experiment in of_method], KEY)
@@ -91,11 +103,18 @@ def _dimensions(
     return dimensions | {"label": list(study.labelled)}
 
 
-def _check_histories(model: Model, study: GridFile, dimensions: Mapping[str, list[Any]]) -> None:
-    """Raise `InputError` if the histories of all runs can't be held, or not side by side."""
-    names = dimensions.get("maneuver", [study.maneuver or model.definition.maneuver])
-    first, *others = [component("maneuver", name) for name in names]
-    number = math.prod(map(len, dimensions.values()))
+def _windows(model: Model, study: GridFile, folder: Path) -> dict[str, Window]:
+    """Windows of all logs of a study by their names."""
+    every = [part for log in study.logs for part in windows(log, folder, model.definition)]
+    by_name = {window.signal.name: window for window in every}
+    if len(by_name) < len(every):
+        raise InputError("logs: two windows have the same name: give one log a name")
+    return by_name
+
+
+def _check_histories(model: Model, driven: Sequence[Excitation], number: int) -> None:
+    """Raise `InputError` if the histories of so many runs can't be held, or not side by side."""
+    first, *others = driven
     columns = len(model.coordinates) + len(model.speeds) + 2 * len(model.outputs)
     size = 8.0 * first.samples * columns * number
     if size > MOST_BYTES:
@@ -119,7 +138,11 @@ def _points(
 
 
 def _of_method(
-    model: Model, study: GridFile, entry: MethodEntry, points: Iterator[dict[str, Any]]
+    model: Model,
+    study: GridFile,
+    entry: MethodEntry,
+    points: Iterator[dict[str, Any]],
+    measured: Mapping[str, Window],
 ) -> Iterator[Experiment]:
     """Experiments of a method at some points; `InputError` if its settings fit at none of them.
 
@@ -134,10 +157,10 @@ def _of_method(
         parameters = {
             n.removeprefix(PARAMETER): v for n, v in point.items() if n.startswith(PARAMETER)
         }
-        maneuver = point.get("maneuver", study.maneuver or model.definition.maneuver)
-        test = _checked(
-            model, maneuver, tuple(point[f] for f in FACTORS), point["start"], overrides(parameters)
-        )
+        name = point.get("maneuver", study.maneuver or model.definition.maneuver)
+        driven = measured[name] if measured else Window(component("maneuver", name), None)
+        factors_of_run = tuple(point[f] for f in FACTORS)
+        test = _checked(model, driven, factors_of_run, point["start"], overrides(parameters))
         training = entry.training or point.get("training", study.training)
         training = tuple(training) if isinstance(training, list) else (training,)
         learner = entry.method if "protocol" in training else ""
@@ -163,7 +186,7 @@ def _complete(model: Model, method: str, given: tuple[tuple[str, Any], ...], pre
 
 @lru_cache(maxsize=4096)
 def _checked(
-    model: Model, maneuver: str, factors: tuple[float, float], start: str, parameters: Overrides
+    model: Model, driven: Window, factors: tuple[float, float], start: str, parameters: Overrides
 ) -> Scenario:
     """A test scenario; `InputError` if the model can't be built or run so."""
     try:
@@ -171,7 +194,8 @@ def _checked(
     except VehiclemorError as error:
         given = ", ".join(f"{name} = {value}" for name, value in parameters)
         raise InputError(f"{given}: {error}") from None
-    scenario = Scenario.of(maneuver, factors, start, None, parameters)
+    excitation = driven.signal.perturbed(*factors)
+    scenario = Scenario(excitation, start, driven.speed, parameters)
     check(model, scenario)
     return scenario
 

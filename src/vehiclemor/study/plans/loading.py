@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,13 @@ from vehiclemor.arguments import file_path
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import data_folder, data_names, write_text
 from vehiclemor.registry import choice
-from vehiclemor.study.plans.study_file import CollectionFile, StudyFile, schema_of
+from vehiclemor.study.plans.study_file import (
+    OF_TEST,
+    SETS,
+    CollectionFile,
+    StudyFile,
+    schema_of,
+)
 from vehiclemor.toml_files import FileSchema, fitting, toml_content
 
 # Between entries of a long list.
@@ -59,6 +66,7 @@ def _merged(path: Path, readers: tuple[Path, ...] = ()) -> dict[str, Any]:
     try:
         if extended:
             base = _other_content(extended, readers)
+            _move_logs(base, study_path(extended).parent, path.parent)
         key = "rows"
         for study, labels in _labels_by_study(content.get("rows", []), extended).items():
             rows += _methods_of(study, labels, readers)
@@ -70,7 +78,16 @@ def _merged(path: Path, readers: tuple[Path, ...] = ()) -> dict[str, Any]:
     if "extends" in base:
         # Its test set is named after the study that has it.
         content["extends"] = base["extends"]
+    if "test" in content:
+        base = {key: base[key] for key in base if key not in OF_TEST}
     return base | content
+
+
+def _move_logs(content: dict[str, Any], old: Path, new: Path) -> None:
+    """Give paths of logs from another folder."""
+    for part in (part for name in ("logs", *SETS) for part in content.get(name, ())):
+        if "log" in part:
+            part["log"] = os.path.relpath(old / part["log"], new)
 
 
 def _labels_by_study(rows: object, extended: str) -> dict[str, list[Any]]:

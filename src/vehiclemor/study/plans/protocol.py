@@ -7,18 +7,21 @@ and every commit gets the same runs, whatever methods compete on them.
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from vehiclemor.exceptions import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.files import data_names
-from vehiclemor.registry import choice
+from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.registry import choice, component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
 from vehiclemor.study.plans.loading import load_studies, read_study, study_path
+from vehiclemor.study.plans.logs import LogGroup, windows
 from vehiclemor.study.plans.study_file import DRAWN, SETS, ProtocolEntry, ProtocolFile
 from vehiclemor.study.plans.study_runs import DECIMALS, Box, Draw, Group
 from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
@@ -30,7 +33,7 @@ PREFIX = "predictive-"
 TRIES = 100
 
 Scenarios = tuple[Scenario, ...]
-Part = TypeVar("Part", Group, Box)
+Part = TypeVar("Part", Group | LogGroup, Box)
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,13 @@ class Protocol:
         name = Path(self.definition.extends or self.path).stem
         return f"{name}-{self.definition.version}, seed {self.seed}"
 
+    @property
+    def screened(self) -> list[str]:
+        """Sets whose runs nobody has chosen one by one: in some the full order may be sensitive."""
+        listed = {name: getattr(self.definition, name) for name in ("test", "outside")}
+        logs = [n for n, parts in listed.items() if any(isinstance(p, LogGroup) for p in parts)]
+        return [*logs, *DRAWN]
+
     def timed_runs(self, runs: int) -> list[int]:
         """Numbers of the runs of a set that are timed: all, or so many evenly spread over it."""
         timed = min(self.definition.timed or runs, runs)
@@ -128,9 +138,11 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
     sets: dict[str, Scenarios] = {}
     for key in SETS:
         groups = enumerate(getattr(definition, key), start=1)
-        parts = [_checked(model, f"{key}, group {n}", _of_group, group) for n, group in groups]
+        make = partial(_of_group, folder=path.parent)
+        parts = [_checked(model, f"{key}, group {n}", make, group) for n, group in groups]
         sets[key] = tuple(itertools.chain(*parts))
     seen: dict[tuple, str] = {}
+    labels: set[str] = set()
     for key, part in sets.items():
         for scenario in part:
             # What a method has learned from or was chosen by can't test it.
@@ -138,21 +150,25 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
             if run in seen:
                 raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
             seen[run] = key
+            if scenario.label in labels:
+                raise InputError(f"{key}: ({scenario.label}) are two runs: give one log a name")
+            labels.add(scenario.label)
     draws = definition.draws
     for key, draw in draws.items():
         for number, box in enumerate(draw.boxes, start=1):
             _checked(model, f"{key}, box {number}", _corners, box)
     entries = tuple(_entry(model, entry, sets["training"]) for entry in definition.methods)
-    labels = [label for entry in entries for label in entry.row_labels]
-    for label in labels:
-        if labels.count(label) > 1:
+    rows = [label for entry in entries for label in entry.row_labels]
+    for label in rows:
+        if rows.count(label) > 1:
             raise InputError(f"label {label!r} is used twice (of full order with the tolerance)")
     if straight:
         boxes = [box for draw in draws.values() for box in draw.boxes]
-        driven = {part.maneuver for part in (*definition.test, *definition.outside, *boxes)}
+        listed = [p for p in (*definition.test, *definition.outside) if isinstance(p, Group)]
+        driven = {part.maneuver for part in (*listed, *boxes)}
         choice("maneuver of a test, in straight", straight.maneuver, sorted(driven))
     for target in definition.targets:
-        known = ["equal accuracy", "within bounds", *labels]
+        known = ["equal accuracy", "within bounds", *rows]
         if definition.extends and target.against not in known:
             (base,) = load_studies(definition.extends).values()
             raise InputError(
@@ -176,20 +192,27 @@ def _checked(
     return scenarios
 
 
-def _of_group(model: Model, group: Group) -> list[Scenario]:
-    """Every point of a group from every start."""
-    lists = group.frequency or [1.0], group.amplitude or [1.0]
-    # A point may leave the speed to the model.
-    speeds = [[speed] for speed in group.speed] or [[]]
-    products = itertools.product(*lists, speeds)
-    points = group.points or [[frequency, size, *speed] for frequency, size, speed in products]
-    samples = itertools.product(*group.parameters.values())
-    tables = [overrides(dict(zip(group.parameters, sample, strict=True))) for sample in samples]
+def _of_group(model: Model, part: Group | LogGroup, folder: Path = Path()) -> list[Scenario]:
+    """Every point of a group, or every window of a log of a folder, from every start."""
     usual_speed = own_speed(model)
+    lists = part.frequency or [1.0], part.amplitude or [1.0], part.speed or [usual_speed]
+    points = [*itertools.product(*lists)]
+    driven: list[tuple[Excitation, Sequence[Any]]] = []
+    if isinstance(part, Group):
+        maneuver = component("maneuver", part.maneuver)
+        driven = [(maneuver, point) for point in part.points or points]
+    else:
+        for signal, speed in windows(part, folder, model.definition):
+            driven += [
+                (signal, point if speed is None else (*point[:2], speed)) for point in points
+            ]
+    samples = itertools.product(*part.parameters.values())
+    tables = [overrides(dict(zip(part.parameters, sample, strict=True))) for sample in samples]
     return [
-        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else usual_speed, table)
-        for point in points
-        for start in group.start or model.starts[:1]
+        # A point may leave the speed to the model.
+        Scenario(excitation.perturbed(*point[:2]), start, [*point, usual_speed][2], table)
+        for excitation, point in driven
+        for start in part.start or model.starts[:1]
         for table in tables
     ]
 

@@ -38,7 +38,6 @@ from vehiclemor.study.plans.protocol import (
     sampled_sets,
 )
 from vehiclemor.study.plans.results import judged_set, protocol_dataset
-from vehiclemor.study.plans.study_file import DRAWN
 from vehiclemor.study.store import combined_path, run_path, stored
 from vehiclemor.study.workers import Engine, Workers
 
@@ -62,16 +61,16 @@ def run_protocol(
     results: dict[str, list[xr.Dataset]] = {}
     for number, name in enumerate(sets):
         results[name] = [workers.result(of_row[number]) for of_row in experiments]
-    seconds = {name: second_runs(protocol, sets[name]) for name in DRAWN if name in sets}
+    screened = [name for name in protocol.screened if name in sets]
+    seconds = {name: second_runs(protocol, sets[name]) for name in screened}
     workers([[experiment] for experiment in seconds.values()])
     apart = {name: reasons(protocol, workers.result(e)) for name, e in seconds.items()}
-    if "drawn" in sets and all(apart["drawn"]):
-        reason = apart["drawn"][0]
+    judged = judged_set(sets)
+    if judged in apart and all(apart[judged]):
         raise FileError(
-            f"{protocol.path}: no sampled run can be judged, the first because {reason}"
+            f"{protocol.path}: no run can be judged, the first because {apart[judged][0]}"
         )
     # A run whose result in the test set is a failure is not timed.
-    judged = judged_set(sets)
     sample = protocol.timed_runs(len(sets[judged]))
     ends = np.array([row["status"].values[sample] for row in results[judged]])
     tests = tuple(sets[judged][run] for run in sample)
@@ -82,7 +81,7 @@ def run_protocol(
         path,
         "cells",
         hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
-        lambda: protocol_dataset(protocol, rows, results, timed, apart),
+        lambda: protocol_dataset(protocol, rows, sets, results, timed, apart),
         lambda: (run_path(folder, key) for key in keys),
         content_hash(protocol.definition),
     )

@@ -18,7 +18,7 @@ from vehiclemor.provenance import attributes, layout_digest, versions
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.choice import Row
 from vehiclemor.study.plans.grid import Grid
-from vehiclemor.study.plans.protocol import Protocol
+from vehiclemor.study.plans.protocol import Protocol, Scenarios
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.plans.study_runs import PARAMETER
 from vehiclemor.study.result import meaning_of, variables
@@ -141,19 +141,23 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
 def protocol_dataset(
     protocol: Protocol,
     rows: Sequence[Row],
+    sets: Mapping[str, Scenarios],
     results: dict[str, list[xr.Dataset]],
     timed: xr.Dataset,
     apart: Mapping[str, list[str]],
 ) -> xr.Dataset:
     """Results of all rows on the dimensions `label`, `scenario` and `output`.
 
-    By set, `results` are those of the rows, `apart` says why scenarios are not judged; `timed` has
-    those of the scenarios that are judged which the protocol times.
+    By name of the `sets`, `results` are those of the rows, and `apart` says why scenarios are not
+    judged; `timed` has those of the judged scenarios that the protocol times.
     """
     parts: list[xr.Dataset] = []
     for name, datasets in results.items():
         number = datasets[0].sizes["scenario"]
         of_run = {"scenario_set": [name] * number, "apart": apart.get(name, [""] * number)}
+        # Of a family and of a log all members together.
+        names = [run.maneuver.name for run in sets[name]]
+        of_run["maneuver"] = [run.rpartition(":")[0] or run for run in names]
         part = xr.concat(datasets, dim="label", combine_attrs="override")
         parts.append(part.assign_coords(variables(of_run, "scenario")))
     # What does not depend on the scenario is the same in every set, but for seconds.

@@ -19,11 +19,11 @@ import numpy as np
 import xarray as xr
 
 from vehiclemor.codegen.cache import compiler_identity
+from vehiclemor.error_measures import rms, signal_range
 from vehiclemor.exceptions import InputError
 from vehiclemor.failure import Failure
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.metrics import rms, signal_range
 from vehiclemor.progress import tell
 from vehiclemor.provenance import attributes, code_digest, machine
 from vehiclemor.reduction.reduced_model import ReducedOrderModel, rom

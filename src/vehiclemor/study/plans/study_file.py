@@ -8,9 +8,10 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from vehiclemor.exceptions import InputError, did_you_mean
+from vehiclemor.study.plans.logs import Log, LogGroup
 from vehiclemor.study.plans.study_runs import (
     MOST_POINTS,
     PARAMETER,
@@ -31,10 +32,17 @@ SEED, MOST_SEED = 20261122, 2**63 - 1
 # Sets of scenarios that a protocol lists, and those that it samples.
 SETS = ("training", "validation", "test", "outside")
 DRAWN = ("drawn", "drawn_outside")
+# What goes with the test of a protocol: a study with a test of its own does not inherit it.
+OF_TEST = ("outside", *DRAWN, "straight", "targets", "failure_rate")
 
 Training = str | Annotated[list[str], Field(min_length=1)]
 Settings = dict[str, int | float | str]
-Groups = Annotated[list[Group], Field(min_length=1)]
+# By its form, so that what is wrong with one is not read as the other.
+Part = Annotated[
+    Annotated[Group, Tag("maneuver")] | Annotated[LogGroup, Tag("log")],
+    Discriminator(lambda value: "log" if "log" in dict(value) else "maneuver"),
+]
+Parts = Annotated[list[Part], Field(min_length=1)]
 PARAMETERS = table_of("parameter -> value in SI units where the study's are not the model's")
 
 
@@ -164,6 +172,7 @@ class GridFile(StudyOfModel):
 
     parameters: dict[str, float | list[float]] = PARAMETERS
     maneuver: str = Field("", description="registered name; by default that of the model")
+    logs: list[Log] = list_of("whose windows are run instead: the values of the axis maneuver")
     start: list[str] = list_of("initial conditions; the model's first by default")
     training: Training = Field(
         "matched",
@@ -225,6 +234,8 @@ class GridFile(StudyOfModel):
     def _each_set_once(self) -> "GridFile":
         of_study = {f"{PARAMETER}{name}" for name in self.parameters}
         of_study |= {name for name in ("maneuver", "start") if getattr(self, name)}
+        if self.logs and "maneuver" in of_study | set(self.grid):
+            raise ValueError("give a maneuver or logs, not both")
         sampled = set(self.sampling.ranges) if self.sampling else set()
         axes = {"grid": set(self.grid), "sampling": sampled}
         names_by_part = axes | {"study": of_study}
@@ -246,7 +257,7 @@ class ProtocolFile(StudyOfModel):
     kind = "a study with bounds"
 
     parameters: dict[str, float | list[float]] = PARAMETERS
-    training: Groups = Field(description="runs that methods learn from")
+    training: Parts = Field(description="runs that methods learn from")
     # A schema is frozen: no entry of another class can be put in.
     methods: list[ProtocolEntry] = Field(  # type: ignore[assignment]
         min_length=1, description="each is tested with the settings that validation chooses"
@@ -259,9 +270,9 @@ class ProtocolFile(StudyOfModel):
         None, ge=1, description="so many runs of the test set, evenly spread, are timed; else all"
     )
     reported: list[str] = list_of("outputs whose RMS errors are printed beside the bounded")
-    validation: Groups = Field(description="runs that candidates are chosen by")
-    test: list[Group] = list_of("listed test runs; judged if none are drawn")
-    outside: list[Group] = list_of("beyond what was trained: reported, not judged")
+    validation: Parts = Field(description="runs that candidates are chosen by")
+    test: list[Part] = list_of("listed test runs; judged if none are drawn")
+    outside: list[Part] = list_of("beyond what was trained: reported, not judged")
     version: int = Field(1, ge=1, description="of the drawn test set, part of its name")
     seed: int = Field(SEED, ge=0, le=MOST_SEED, description="of the drawn runs")
     drawn: Draw | None = Field(None, description="test set: drawn from boxes")

@@ -54,7 +54,8 @@ def _scenarios(
     """What one entry trains on, checked but for what follows from the tested run."""
     if not isinstance(entry, str):
         run = entry if isinstance(entry, Scenario) else replace(test, maneuver=entry)
-        run = replace(run, maneuver=checked_maneuver(run.maneuver, model.definition))
+        driven = model.driven_by(run.maneuver)
+        run = replace(run, maneuver=checked_maneuver(run.maneuver, driven.definition))
         check(model, run)
         return [run]
     if entry == "protocol":

@@ -1,0 +1,1 @@
+"""Handling tests of the standards: numbers of a vehicle's run."""

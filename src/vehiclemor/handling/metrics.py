@@ -1,0 +1,109 @@
+"""Numbers of the standards of a run; `data/handling/metrics.toml` defines them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vehiclemor.arguments import quoted
+from vehiclemor.exceptions import InputError
+from vehiclemor.files import data_folder
+from vehiclemor.handling import steering_tests
+from vehiclemor.handling.motion import Motion
+from vehiclemor.registry import choice
+from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.toml_files import FileSchema, Line, read_toml
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Maneuvers of the rack are those of the steering angle.
+RACK = "rack_"
+# Maneuver -> its numbers by name.
+TESTS: dict[str, Callable[[Motion], Mapping[str, Any]]] = {
+    "slow_ramp_steer": steering_tests.steady_turn,
+    "step_steer": steering_tests.step,
+    "sine_sweep": steering_tests.frequency_response,
+    "weave": steering_tests.weave,
+    "sine_with_dwell": steering_tests.sine_with_dwell,
+}
+
+
+class MetricsFile(FileSchema):
+    """Schema of `data/handling/metrics.toml`: standard, and number -> [unit, definition]."""
+
+    standards: dict[str, Line]
+    numbers: dict[str, dict[str, list[Line]]]
+
+
+@cache
+def declared() -> MetricsFile:
+    """Standards and definitions."""
+    return read_toml(data_folder() / "handling" / "metrics.toml", MetricsFile)
+
+
+def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
+    """Numbers of the standards of a handling test, of a full or a reduced vehicle.
+
+    Position, speed, sideslip and lateral acceleration are those of the sprung body's centre of
+    mass, see `docs/handling.md`.  What a run does not reach is not a number.
+
+    Parameters
+    ----------
+    run
+        A run of one of these maneuvers, by steering angle or rack.
+    maneuver
+        Name of the maneuver that the run is of, for an input of another name, such as a log.
+
+    Returns
+    -------
+    xarray.Dataset
+        Numbers by name, each with `units`, `long_name` (its definition) and `standard`; `speed` at
+        the start in m/s.  A frequency response is over `frequency` in Hz.
+
+    Raises
+    ------
+    InputError
+        If the run is of no such maneuver, of no vehicle, or has not come to its end.
+    """
+    if not isinstance(run, Trajectory):
+        raise InputError(f"run is {quoted(run)}, not a run as `simulate` gives it")
+    name = test_of(run.maneuver if maneuver is None else maneuver)
+    return numbers_of(motion_of(run), name)
+
+
+def test_of(maneuver: str) -> str:
+    """The test that a maneuver is; `InputError` if it is none."""
+    name = maneuver.removeprefix(RACK) if isinstance(maneuver, str) else maneuver
+    if not name:
+        raise InputError(f"the run is of no registered maneuver: name one of {', '.join(TESTS)}")
+    return choice("maneuver with numbers", name, TESTS)
+
+
+def motion_of(run: Trajectory) -> Motion:
+    """Motion of a run, with outputs that may have been chosen."""
+    names, p = run.names or run.model.outputs, run.model.parameters.values()
+    wheelbase = run.model.definition.wheelbase
+    length = np.nan if wheelbase is None else float(wheelbase(p))
+    return Motion.of(run.times, run.model.inputs, run.inputs, names, run.__getitem__, length)
+
+
+def numbers_of(motion: Motion, test: str) -> xr.Dataset:
+    """Numbers of a test with units and definitions."""
+    import xarray as xr
+
+    standard = declared().standards[test]
+    variables: dict[str, tuple] = {}
+    for name, value in TESTS[test](motion).items():
+        unit, definition = declared().numbers[test][name]
+        attributes = {"units": unit, "long_name": definition, "standard": standard}
+        variables[name] = ("frequency" if np.ndim(value) else (), value, attributes)
+    speed = {"units": "m/s", "long_name": "speed at the start"}
+    variables["speed"] = ((), motion.speed[0], speed)
+    hertz = {"units": "Hz", "long_name": "frequency of the steering"}
+    axes = {"frequency": ("frequency", steering_tests.FREQUENCIES, hertz)}
+    over_frequency = any(dimensions for dimensions, *_ in variables.values())
+    return xr.Dataset(variables, axes if over_frequency else {}, {"maneuver": test})

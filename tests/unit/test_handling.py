@@ -1,0 +1,175 @@
+"""Numbers of handling tests, on a linear single-track model and on signals of known answers."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.signal import lsim
+
+import vehiclemor as vm
+from tests.models import CAR, FIDELITY, WISHBONE
+from tests.refusing import refused
+from vehiclemor.simulation.trajectory import Trajectory
+
+# A single-track model: mass, yaw inertia, axle distances, axle stiffnesses, speed, roll by
+# acceleration; x' = STATE x + STEER delta of lateral speed and yaw rate.
+M, IZ, A, B, CF, CR, V, ROLL = 1500.0, 2500.0, 1.2, 1.5, 80e3, 110e3, 22.0, 0.02
+L = A + B
+MOMENT = A * CF - B * CR
+STATE = np.array(
+    [
+        [-(CF + CR) / (M * V), -V - MOMENT / (M * V)],
+        [-MOMENT / (IZ * V), -(A**2 * CF + B**2 * CR) / (IZ * V)],
+    ]
+)
+STEER = np.array([[CF / M], [A * CF / IZ]])
+UNDERSTEER = M / L * (B / CF - A / CR)
+TIMES = np.linspace(0.0, 6.0, 301)
+ONES = np.ones(len(TIMES))
+
+
+def run_of(times, steering, maneuver, **signals):
+    """A run of signals; what is not among them is that of a car driving straight ahead at V."""
+    columns = dict.fromkeys(("lateral_position", "yaw", "roll", "lateral_speed", "yaw_rate"), 0.0)
+    columns |= {"longitudinal_position": V * times, "longitudinal_speed": V} | signals
+    outputs = np.column_stack([np.broadcast_to(each, len(times)) for each in columns.values()])
+    names, nothing = tuple(columns), np.zeros((len(times), 0))
+    model = SimpleNamespace(
+        inputs=("delta",),
+        outputs=names,
+        parameters=SimpleNamespace(values=dict),
+        definition=SimpleNamespace(wheelbase=lambda _: L),
+    )
+    histories = steering[:, None], nothing, nothing, outputs
+    fields = {"names": names, "model": model, "maneuver": maneuver}
+    return Trajectory(times, *histories, {}, 0.0, **fields)
+
+
+def single_track(name):
+    """The linear model steered by a maneuver, recorded at its output times."""
+    maneuver = vm.maneuver(name)
+    times = np.linspace(0.0, maneuver.duration, 100 * (maneuver.samples - 1) + 1)
+    steering = maneuver.at(times)[:, 0]
+    system = STATE, STEER, np.eye(2), np.zeros((2, 1))
+    lateral, yaw_rate = lsim(system, steering, times)[1].T
+    acceleration = STATE[0] @ [lateral, yaw_rate] + STEER[0] * steering + V * yaw_rate
+    signals = {"lateral_speed": lateral, "yaw_rate": yaw_rate, "roll": ROLL * acceleration}
+    recorded = {key: signal[::100] for key, signal in signals.items()}
+    return run_of(times[::100], steering[::100], name, **recorded)
+
+
+def response(hertz):
+    """Yaw rate and lateral acceleration of the linear model over the steering angle."""
+    s = 2j * np.pi * hertz
+    lateral, yaw_rate = np.linalg.solve(s * np.eye(2) - STATE, STEER)[:, 0]
+    return {"yaw_rate": yaw_rate, "lateral_acceleration": s * lateral + V * yaw_rate}
+
+
+def test_gradients_of_a_slow_ramp_are_those_of_the_axles():
+    numbers = vm.metrics(single_track("slow_ramp_steer"))
+    assert numbers["understeer_gradient"] == pytest.approx(UNDERSTEER, rel=0.01)
+    assert numbers["roll_gradient"] == pytest.approx(ROLL, rel=1e-6)
+    assert numbers["sideslip_gradient"] == pytest.approx(B / V**2 - M * A / (L * CR), rel=0.01)
+    assert numbers["speed"] == V
+    assert numbers["understeer_gradient"].attrs["units"] == "rad s^2/m"
+    assert numbers["understeer_gradient"].attrs["standard"] == "ISO 4138"
+
+
+def test_a_step_is_answered_as_a_damped_oscillation_does():
+    damping, turning = 0.4, 5.0
+    damped = turning * np.sqrt(1.0 - damping**2)
+
+    def answer(time):
+        decay = np.exp(-damping * turning * time)
+        sine = damping * turning / damped * np.sin(damped * time)
+        return np.where(time > 0.0, 1.0 - decay * (np.cos(damped * time) + sine), 0.0)
+
+    steering = np.interp(TIMES, [1.0, 1.2], [0.0, 0.02])
+    # The car drives on a line that turns without slip: a = r u.
+    run = run_of(TIMES, steering, "step_steer", yaw_rate=0.1 * answer(TIMES - 1.1))
+    numbers = vm.metrics(run)
+    rise = brentq(lambda time: answer(time) - 0.9, 1e-3, 1.0)
+    assert numbers["yaw_rate_gain"] == pytest.approx(5.0, rel=1e-3)
+    assert numbers["yaw_rate_response_time"] == pytest.approx(rise, abs=2e-3)
+    assert numbers["lateral_acceleration_response_time"] == pytest.approx(rise, abs=2e-3)
+    assert numbers["yaw_rate_peak_time"] == pytest.approx(np.pi / damped, abs=2e-3)
+    overshoot = np.exp(-damping * np.pi / np.sqrt(1.0 - damping**2))
+    assert numbers["yaw_rate_overshoot"] == pytest.approx(overshoot, abs=2e-3)
+
+
+def test_a_sweep_gives_gain_and_phase_of_the_linear_model():
+    numbers = vm.metrics(single_track("sine_sweep"))
+    for hertz in (0.4, 0.8, 1.2):
+        at = numbers.sel(frequency=hertz, method="nearest")
+        for name, exact in response(hertz).items():
+            assert at[f"{name}_gain"] == pytest.approx(abs(exact), rel=0.01)
+            assert at[f"{name}_phase"] == pytest.approx(np.angle(exact), abs=0.01)
+
+
+def test_a_weave_gives_the_slope_and_the_width_of_the_ellipse():
+    numbers = vm.metrics(single_track("weave"))
+    largest = np.abs(vm.maneuver("weave").at(np.linspace(3.0, 9.0, 6001))).max()
+    for name, exact in response(0.2).items():
+        lag = -np.angle(exact)
+        assert numbers[f"{name}_gain"] == pytest.approx(abs(exact) * np.cos(lag), rel=0.01)
+        width = 2.0 * largest * np.sin(lag)
+        assert numbers[f"{name}_hysteresis"] == pytest.approx(width, rel=0.01)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_sine_with_dwell_is_judged_at_the_times_of_the_standard(side):
+    maneuver = vm.maneuver("sine_with_dwell", amplitude=side)
+    steering, end = maneuver.at(TIMES)[:, 0], 1.0 + 1.0 / 0.7 + 0.5
+    late = np.maximum(TIMES - end, 0.0)
+    reversed_since = 1.0 + 0.5 / 0.7
+    yaw_rate = np.where(reversed_since < TIMES, -0.5 * np.exp(-late / 0.8), 0.7)
+    heading, aside = 0.3, 0.5 * 4.0 * np.maximum(TIMES - 1.0, 0.0) ** 2
+    position = V * TIMES + 1j * side * aside
+    turned = position * np.exp(1j * heading)
+    path = {"longitudinal_position": turned.real, "lateral_position": turned.imag, "yaw": heading}
+    run = run_of(TIMES, steering, "sine_with_dwell", yaw_rate=side * yaw_rate, **path)
+    numbers = vm.metrics(run)
+    # Steering begins and ends where it passes 5 % of its largest value: by 15 ms.
+    assert numbers["yaw_rate_ratio_1_s"] == pytest.approx(np.exp(-1.0 / 0.8), rel=0.02)
+    assert numbers["yaw_rate_ratio_1_75_s"] == pytest.approx(np.exp(-1.75 / 0.8), rel=0.02)
+    assert numbers["lateral_displacement"] == pytest.approx(0.5 * 4.0 * 1.07**2, rel=0.03)
+
+
+def test_numbers_of_the_vehicle_are_those_of_its_linear_model():
+    model = vm.model(CAR)
+    run = model.simulate(vm.maneuver("sine_sweep", amplitude=0.02))
+    numbers = vm.metrics(run)
+    linear = vm.reduce(model, "full_order").linearise().reachable()
+    output = linear.outputs.index("yaw_rate")
+    for hertz in (0.4, 1.2):
+        shifted = 2j * np.pi * hertz * np.eye(len(linear.states)) - linear.A
+        exact = linear.C[output] @ np.linalg.solve(shifted, linear.B[:, 0]) + linear.D[output, 0]
+        at = numbers.sel(frequency=hertz, method="nearest")
+        assert at["yaw_rate_gain"] == pytest.approx(abs(exact), rel=0.01)
+        assert at["yaw_rate_phase"] == pytest.approx(np.angle(exact), abs=0.01)
+
+
+@pytest.mark.parametrize(("name", "prefix"), [(CAR, ""), (FIDELITY, "rack_")])
+def test_reduced_vehicles_have_the_numbers_of_the_full_ones(name, prefix):
+    full = vm.metrics(vm.model(name).simulate(vm.maneuver(f"{prefix}step_steer")))
+    reduced = vm.metrics(vm.rom(name).simulate(f"{prefix}step_steer"))
+    for number in ("yaw_rate_gain", "lateral_acceleration_response_time"):
+        assert float(reduced[number]) == pytest.approx(float(full[number]), rel=0.02)
+    # A left turn and a right turn are alike.
+    right = vm.model(name).simulate(vm.maneuver(f"{prefix}step_steer", amplitude=-1.0))
+    for number, value in vm.metrics(right).items():
+        assert float(value) == pytest.approx(float(full[number]), rel=1e-3), number
+
+
+def test_what_has_no_numbers_is_refused():
+    run = run_of(TIMES, 0.01 * ONES, "lane_change")
+    refused(lambda: vm.metrics(run), "lane_change", "step_steer")
+    refused(lambda: vm.metrics(run, "weeve"), "weave")
+    refused(lambda: vm.metrics(run_of(TIMES, 0.01 * ONES, "")), "maneuver")
+    refused(lambda: vm.metrics(3), "not a run")
+    refused(lambda: vm.metrics(vm.rom(WISHBONE).simulate("sine_travel"), "weave"), "no vehicle")
+    lost = run_of(TIMES, 0.01 * ONES, "weave", yaw=np.where(TIMES > 2.0, np.nan, 0.0))
+    refused(lambda: vm.metrics(lost), "end")
+    still = vm.metrics(run_of(TIMES, 0.0 * ONES, "slow_ramp_steer"))
+    assert np.isnan(still["understeer_gradient"])
