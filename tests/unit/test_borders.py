@@ -55,7 +55,7 @@ def trained(points):
         (simulated("maneuver"), [3, np.sin, "", "lane_change"], "maneuver"),
         (simulated("start"), ["", [0.0] * 8], "start"),
         (simulated("preset"), [["literal"], None], "unknown preset"),
-        (simulated("training"), [3, [], "nomnal", "sine_travl", range(10**12)], "training"),
+        (simulated("training"), [3, [], "nomnal", "sine_travl"], "training"),
         (simulated("training"), [["nominal", 3], "lane_change"], "maneuver"),
         (simulated("training"), [range(10**12)], "training is range"),
         (simulated("start"), ["n" * 10**5], "unknown start 'nnn"),
