@@ -42,6 +42,14 @@ AT_REST = 1e-9
 MOST_ITERATIONS = 30
 # Free lengths of the springs (m), with which the design position is the equilibrium.
 SOLVED = ("front_free_length", "rear_free_length")
+
+
+def wheelbase(p: Mapping[str, Any]) -> float:
+    """Distance of the axles in m."""
+    front, rear = wheel_places(p)
+    return front[0] - rear[0]
+
+
 DECLARED = declared("high_fidelity_vehicle")
 
 
@@ -219,7 +227,7 @@ DEFINITION = ModelDefinition(
     standstill=STANDSTILL,
     loads=TIRE_LOADS,
     slips=SLIP_RATIOS,
-    wheelbase=lambda p: wheel_places(p)[0][0] - wheel_places(p)[1][0],
+    wheelbase=wheelbase,
     tabled_outputs=(
         "lateral_speed",
         "vertical_speed",

@@ -106,6 +106,11 @@ def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
     return {"equilibrium": equilibrium, "dropped": dropped}
 
 
+def wheelbase(p: Mapping[str, Any]) -> float:
+    """Distance of the axles in m."""
+    return p["front_axle_distance"] + p["rear_axle_distance"]
+
+
 DECLARED = declared("independent_suspension_vehicle")
 DEFINITION = ModelDefinition(
     name="independent_suspension_vehicle",
@@ -130,7 +135,7 @@ DEFINITION = ModelDefinition(
     standstill=STANDSTILL,
     loads=TIRE_LOADS,
     slips=SLIP_RATIOS,
-    wheelbase=lambda p: p["front_axle_distance"] + p["rear_axle_distance"],
+    wheelbase=wheelbase,
     tabled_outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
     main_outputs=("pitch", "yaw", "lateral_position"),
 )
