@@ -296,8 +296,9 @@ class ReducedOrderModel(ShortRepr):
         if not validity.keys() <= columns.keys():
             outputs = self.outputs(states, inputs).T
             columns = dict(zip(self.output_names, outputs, strict=True)) | columns
-        for name, (low, high) in validity.items():
-            values = columns[name]
+        # Optional inputs that are not driven are constants.
+        for name in (name for name in validity if name in columns):
+            (low, high), values = validity[name], columns[name]
             wrong = values[~((values >= low) & (values <= high))]
             if len(wrong):
                 return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"
