@@ -90,6 +90,11 @@ def check(p: Mapping[str, Any]) -> None:
     check_moments("sprung body", np.linalg.eigvalsh(tensor))
 
 
+def wheelbase(p: Mapping[str, Any]) -> float:
+    """Distance of the axles in m."""
+    return p["front_axle_distance"] + p["rear_axle_distance"]
+
+
 def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Initial states (28,) by name: straight running, and the same dropped onto the road."""
     d, speed = derived(p), float(p["initial_speed"])
