@@ -21,15 +21,7 @@ from typing import Any
 import numpy as np
 import typst
 import xarray as xr
-from number_tables import (
-    Entry,
-    comparison,
-    named_values,
-    operations,
-    peers,
-    published,
-    studies,
-)
+from number_tables import Entry, comparison, named_values, operations, peers, published, studies
 from numbers_by_name import FILE, load, names_in, render
 
 from vehiclemor.files import write_text

@@ -152,7 +152,9 @@ def test_a_fit_reads_no_more_of_the_training_than_is_declared(pair):
         pytest.skip(f"{pair.name} reads whole runs")
     settings = validated(pair.method, pair.model.kind, SETTINGS.get(pair.name, {}))
     reduced = pair.method.fit(pair.model, readable[pair.method.learns_from], settings)
-    np.testing.assert_array_equal(pair.run(reduced).outputs, pair.run(pair.fit()).outputs)
+    run, known = pair.run(reduced), pair.run(pair.fit())
+    np.testing.assert_array_equal(run.outputs, known.outputs)
+    assert (run.counts, run.status, run.message) == (known.counts, known.status, known.message)
 
 
 def test_every_preset_simulates_the_nominal_maneuver(pair):
@@ -226,7 +228,11 @@ def test_results_are_deterministic(pair):
     reduced = pair.fit()
     other = pair.maneuver.perturbed(0.9, 0.8)
     first, _, again = (pair.run(reduced, maneuver) for maneuver in (None, other, None))
-    for run in (again, pair.run(pair.fresh_fit())):
+    runs = [again]
+    if pair.method.learns_from == "runs":
+        # Others are fitted a second time where they read no more than they declare.
+        runs.append(pair.run(pair.fresh_fit()))
+    for run in runs:
         np.testing.assert_array_equal(run.states, first.states)
         np.testing.assert_array_equal(run.outputs, first.outputs)
         assert (run.counts, run.status, run.message) == (first.counts, first.status, first.message)

@@ -214,23 +214,6 @@ def test_the_equilibrium_is_the_published_one(vehicle):
     assert max(abs(found[f"{name}_{w}"]) for name in TIRE[4:] for w in WHEELS) < 1e-15
 
 
-def test_the_springs_are_as_long_as_published(vehicle):
-    """Free lengths can be seen in the forces that turn the arms."""
-    x = vehicle.start()
-    now = oracle.Instant(x[:N], np.zeros(N), *REST, PARAMETERS)
-    _, force, _, _ = vehicle.descriptor(np.concatenate([x[:N], np.zeros(N)]), REST)
-    missing = force - now.applied_forces() + now.mass_and_bias()[1]
-    expected = {10: (0, "front", 7201.254, 0.609346042798164)}
-    expected |= {20: (2, "rear", 4820.822, 0.499095760284992)}
-    for joint, (number, axle, preload, free) in expected.items():
-        length, _, gradient = now.spring(number)
-        stiffness = PARAMETERS[f"{axle}.spring.stiffness"]
-        found = PARAMETERS[f"{axle}.spring.free_length"]
-        found += missing[joint] / (stiffness * gradient[joint])
-        assert found == pytest.approx(free, abs=2e-14)
-        assert stiffness * (found - length) == pytest.approx(preload, abs=5e-4)
-
-
 def test_the_dropped_start_is_the_equilibrium_raised_and_pitched(vehicle):
     x, dropped = vehicle.start("equilibrium"), vehicle.start("dropped")
     change = np.zeros(2 * N)

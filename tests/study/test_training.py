@@ -42,9 +42,7 @@ def test_nominal_is_the_models_own_maneuver_whatever_is_tested(given):
 
 
 @pytest.mark.parametrize(
-    "given",
-    ["chirp_travel", (OTHER,), [Scenario(OTHER, "equilibrium"), "sine_travel"]],
-    ids=str,
+    "given", ["chirp_travel", (OTHER,), [Scenario(OTHER, "equilibrium"), "sine_travel"]], ids=str
 )
 def test_training_is_asked_for_in_the_same_words_everywhere(given):
     reduced = vm.reduce(WISHBONE, "replay", training=given)

@@ -53,7 +53,7 @@ STUDIES = {
         (f"title = '{'x' * 900_000}'", "a text of 900000 characters"),
     ],
     'model = "double_wishbone"': [
-        ('model = "double_wishbone"\nmaneuver = "lane_change"', "gives inputs delta"),
+        ('model = "double_wishbone"\nmaneuver = "lane_change"', "gives inputs delta")
     ],
     "[grid]": [
         ('training = "set"\n[grid]', "training_set"),
@@ -78,9 +78,7 @@ PROTOCOLS = {
         ('start = ["droped"]', "unknown start 'droped'"),
         ("points = [[1.0, 1.0]], speed = [1.0]", "points or lists"),
     ],
-    'test = [{ maneuver = "sine_travel"': [
-        ('test = [{ maneuver = "lane_change"', "delta"),
-    ],
+    'test = [{ maneuver = "sine_travel"': [('test = [{ maneuver = "lane_change"', "delta")],
     'role = "full order"': [
         ("candidates = [{ rank = 3 }]", "unknown setting of full_order"),
         ('candidates = [{ preset = "best" }]', "unknown preset"),

@@ -277,8 +277,7 @@ def test_shells_and_beams_agree():
 
 
 @pytest.mark.parametrize(
-    ("mesh", "tolerance"),
-    [({}, 1e-4), ({"elements_per_bay": 4.0}, 1e-4), shelled(0.0625, 0.04)],
+    ("mesh", "tolerance"), [({}, 1e-4), ({"elements_per_bay": 4.0}, 1e-4), shelled(0.0625, 0.04)]
 )
 def test_strains_are_those_of_a_bent_ladder(mesh, tolerance):
     """Both rails under opposite moments at two stations: strain = moment z / (E I)."""

@@ -10,10 +10,7 @@ from hypothesis import strategies as st
 
 from tests.oracles.high_fidelity_data import PARAMETERS as SPECIFIED
 from tests.oracles.high_fidelity_data import fiala
-from tests.oracles.vehicle_lagrange import (
-    PARAMETERS,
-    magic_formula,
-)
+from tests.oracles.vehicle_lagrange import PARAMETERS, magic_formula
 from tests.unit.programs import function_of
 from vehiclemor.multibody.components import tires
 from vehiclemor.multibody.quantities import FIALA

@@ -23,7 +23,8 @@ def contents(car, tmp_path_factory):
     """Files of all kinds of reduced models."""
     made = {
         "bicycle": car,
-        "pod": vm.reduce(CAR, "pod", training="nominal", formulation="state"),
+        # Few control periods: a file of many is written slowly.
+        "pod": vm.reduce(CAR, "pod", training="nominal", formulation="state", control_period=5.0),
         "windows": vm.reduce("double_wishbone", "pod", training="nominal"),
         "replay": vm.reduce("double_wishbone", "replay"),
     }

@@ -140,10 +140,7 @@ def test_mechanisms_in_batches(method):
 
 
 def test_parameters_by_run(full):
-    masses, signals = (
-        [1400.0, 1500.0, 1500.0, -1.0],
-        vm.many_signals(TIMES, steering(4), "cubic"),
-    )
+    masses, signals = ([1400.0, 1500.0, 1500.0, -1.0], vm.many_signals(TIMES, steering(4), "cubic"))
     table = vm.simulate_many(full, signals, parameters={"sprung_mass": masses}, **KEPT)
     listed = [{"sprung_mass": mass} for mass in masses]
     xr.testing.assert_equal(

@@ -19,11 +19,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.system import Solver
-from vehiclemor.simulation.trajectory import (
-    ALGEBRAIC_COUNTS,
-    DYNAMIC_COUNTS,
-    trajectory_dataset,
-)
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS, trajectory_dataset
 from vehiclemor.study.result import variables
 
 

@@ -27,11 +27,7 @@ def runs(name: str) -> list:
     nominal = component("maneuver", model.definition.maneuver)
     return [
         partial(
-            model.simulate,
-            nominal.perturbed(1.0, amplitude),
-            start,
-            solver=solver,
-            tolerance=1e-3,
+            model.simulate, nominal.perturbed(1.0, amplitude), start, solver=solver, tolerance=1e-3
         )
         for amplitude in (1.0, 0.7)
         for start in starts

@@ -188,11 +188,8 @@ def errors(car, maneuver, restart, **settings):
 
 
 def test_with_all_directions_it_is_the_full_model(car, maneuver):
-    windows, states = 4, len(car.definition.states)
-    eye = np.tile(np.eye(states), (windows, 1, 1))
-    means = np.random.default_rng(1).normal(size=(windows, states))
-    ranks, edges = np.full(windows, states), np.linspace(0.0, 4.0, windows + 1)
-    spaces = ControlPeriods("state", edges, means, eye, eye, ranks)
+    means = np.random.default_rng(1).normal(size=(4, 2 * N))
+    spaces = in_windows(STATE, np.linspace(0.0, 4.0, 5), means)
     full = car.simulate(maneuver)
     for restart in ("full_model", "projected"):
         reduced = DynamicProjection(car, spaces, OfflineCost(), "dopri5", 1e-9, restart=restart)

@@ -10,14 +10,7 @@ import numpy as np
 import pytest
 
 from tests.unit.python_system import python_system
-from tests.unit.standard_problems import (
-    ANGLE,
-    ANGULAR_SPEED,
-    EXPLODING,
-    TRACKED,
-    driven,
-    maneuver,
-)
+from tests.unit.standard_problems import ANGLE, ANGULAR_SPEED, EXPLODING, TRACKED, driven, maneuver
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import Maneuver
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
