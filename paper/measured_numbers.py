@@ -66,6 +66,8 @@ def sources(results: Path) -> Iterator[tuple[str, str, Callable[[], Iterator[Ent
     yield "peers.json", "tox -e peers", partial(of_file, peers, "peers.json")
     for name, make in studies():
         command = "compare paper" if name in TIMING.values() else f"run {name}"
+        # Its file is that of who has the logs.
+        command += ".toml" if name.startswith("logs-") else ""
         file = f"studies/{name}.nc"
         yield file, f"vehiclemor {command}", partial(of_file, make, file)
 

@@ -20,7 +20,7 @@ from vehiclemor.report.comparison import stored_rows
 from vehiclemor.report.frames import frame
 from vehiclemor.report.published import load_published, rms_numbers
 from vehiclemor.report.sizes import size_rows
-from vehiclemor.report.unseen import protocol_rows
+from vehiclemor.report.unseen import count_rows, protocol_rows
 
 PEERS = Path(__file__).parents[1] / "benchmarks" / "peers" / "report.py"
 # Name, value, and a unit where the name does not give it away.
@@ -162,12 +162,15 @@ def settings(model: str, dataset: xr.Dataset) -> Iterator[Entry]:
 
 
 def protocol(dataset: xr.Dataset) -> Iterator[Entry]:
-    """Methods and integrators on unseen inputs; the chosen method is `chosen` too."""
+    """Methods and integrators on unseen inputs; the chosen method is `chosen` too; by maneuver."""
     head = dataset.attrs["study"].split("-", 1)
     for row in protocol_rows(dataset):
         if row["kind"] == "method":
             for label in [row["label"]] + ["chosen"] * row["winner"]:
                 yield from ((slug(*head, label, name), value) for name, value in row.items())
+    for row in count_rows(dataset):
+        item, label = row.pop("item"), row.pop("label")
+        yield from ((slug(*head, item, label, name), value) for name, value in row.items())
 
 
 def times(model: str, dataset: xr.Dataset) -> Iterator[Entry]:
@@ -255,3 +258,5 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
     yield "size", sizes
     for kind, model in product(("predictive", "contenders"), names("model")):
         yield f"{kind}-{model}", protocol
+    for model in VEHICLES:
+        yield f"logs-{model}", protocol

@@ -366,12 +366,11 @@ def plot(
     Parameters
     ----------
     result
-        A run, a dataset of `simulate` or `run_study`, a netCDF file, or the name of a study that
-        was run.
+        A run, a dataset, a netCDF file, or the name of a study that was run.
     *beside
         The full-order run of the same input, to be drawn with the run; or the kind.
     kind
-        `histories` of outputs, `paths`, or `errors`.
+        `histories`, `paths`, `errors`, `frequency_response` of a sweep, or `sine_with_dwell`.
     out
         Picture to write (PNG, SVG or PDF).
     results

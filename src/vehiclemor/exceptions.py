@@ -156,7 +156,7 @@ class blamed:  # noqa: N801
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
     """Question that offers the nearest of the known names; of few, if none is near, nothing."""
-    name, known = str(name), list(known)
+    name, known = name if isinstance(name, str) else "", list(known)
     if near := difflib.get_close_matches(name, known, n=3, cutoff=0.5):
         return f"did you mean {' or '.join(near)}?"
     if len(known) <= MANY:

@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
+from tests.models import CAR
 from vehiclemor import progress
 from vehiclemor.cli import main, studies
 from vehiclemor.cli.app import COMMANDS, ended
@@ -80,6 +81,18 @@ def test_simulate_writes_what_the_interface_returns(tmp_path, printed, monkeypat
         np.testing.assert_array_equal(written["coordinates"], expected["coordinates"])
         assert list(written["coordinate"].values) == list(model.coordinates)
         assert json.loads(written.attrs["configuration"])["parameters"]["wheel_centre"] == point
+
+
+def test_metrics_stand_side_by_side_with_their_standard(printed):
+    command = f"metrics {CAR} --maneuver step_steer --speed 22 --method shipped"
+    text = printed(*command.split())
+    assert "step_steer (ISO 7401); from 22 m/s" in text
+    rows = json.loads(printed(*command.split(), "--json"))
+    gain = next(row for row in rows if row["number"] == "yaw rate gain")
+    assert gain["unit"] == "1/s"
+    run = vm.model(CAR, {"initial_speed": 22.0}).simulate(vm.maneuver("step_steer"))
+    assert gain["full"] == pytest.approx(float(vm.metrics(run)["yaw_rate_gain"]), rel=1e-6)
+    assert gain["shipped"] == pytest.approx(gain["full"], rel=0.01)
 
 
 def test_a_log_is_simulated_as_its_signal_and_drawn(tmp_path, printed, monkeypatch, capsys):

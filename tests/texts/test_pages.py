@@ -129,7 +129,7 @@ def run_code(path, folder) -> dict:
     return runpy.run_path("page.py")
 
 
-@pytest.mark.parametrize("name", ["first-steps", "method", "reduced-models"])
+@pytest.mark.parametrize("name", ["first-steps", "method", "reduced-models", "handling"])
 def test_code_and_commands_of_a_page_run(name, here, capsys):
     run_code(DOCS / f"{name}.md", here)
     for words in console_commands(DOCS / f"{name}.md"):

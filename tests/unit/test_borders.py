@@ -26,6 +26,13 @@ NO_JOBS = ("2", 0, 1.5, True, 10**39, np.timedelta64(3, "s"), *WRONG)
 NO_FLAGS = (1, "yes", np.nan, *NONE, *WRONG)
 
 
+class NoText:
+    """An object that can't be printed as a text."""
+
+    def __str__(self):
+        raise ValueError
+
+
 @cache
 def car():
     return vm.model(CAR)
@@ -68,7 +75,7 @@ def trained(points):
         (simulated("rtol"), ["1e-3"], "rtol"),
         (simulated("rtol"), [1e300], "tolerance is 1e+300"),
         (lambda v: vm.simulate(WISHBONE, rtol=v, tolerance=v), [1e-3], "the same setting"),
-        (vm.model, [None, {}], "unknown model"),
+        (vm.model, [None, {}, NoText()], "unknown model"),
         (lambda v: vm.model(CAR, v), [[1], {1: 2}, *WRONG], "parameter"),
         (lambda v: vm.model(CAR, {"sprung_mass": v}), [*NO_NUMBERS, None, [2.0]], "sprung_mass"),
         (

@@ -29,19 +29,19 @@ TIMES = np.linspace(0.0, 6.0, 301)
 ONES = np.ones(len(TIMES))
 
 
-def run_of(times, steering, maneuver, **signals):
+def run_of(times, driven, maneuver, inputs=("delta",), **signals):
     """A run of signals; what is not among them is that of a car driving straight ahead at V."""
     columns = dict.fromkeys(("lateral_position", "yaw", "roll", "lateral_speed", "yaw_rate"), 0.0)
     columns |= {"longitudinal_position": V * times, "longitudinal_speed": V} | signals
     outputs = np.column_stack([np.broadcast_to(each, len(times)) for each in columns.values()])
     names, nothing = tuple(columns), np.zeros((len(times), 0))
     model = SimpleNamespace(
-        inputs=("delta",),
+        inputs=inputs,
         outputs=names,
         parameters=SimpleNamespace(values=dict),
         definition=SimpleNamespace(wheelbase=lambda _: L),
     )
-    histories = steering[:, None], nothing, nothing, outputs
+    histories = driven[:, None], nothing, nothing, outputs
     fields = {"names": names, "model": model, "maneuver": maneuver}
     return Trajectory(times, *histories, {}, 0.0, **fields)
 
@@ -131,9 +131,66 @@ def test_a_sine_with_dwell_is_judged_at_the_times_of_the_standard(side):
     run = run_of(TIMES, steering, "sine_with_dwell", yaw_rate=side * yaw_rate, **path)
     numbers = vm.metrics(run)
     # Steering begins and ends where it passes 5 % of its largest value: by 15 ms.
-    assert numbers["yaw_rate_ratio_1_s"] == pytest.approx(np.exp(-1.0 / 0.8), rel=0.02)
-    assert numbers["yaw_rate_ratio_1_75_s"] == pytest.approx(np.exp(-1.75 / 0.8), rel=0.02)
+    assert numbers["early_yaw_rate_ratio"] == pytest.approx(np.exp(-1.0 / 0.8), rel=0.02)
+    assert numbers["late_yaw_rate_ratio"] == pytest.approx(np.exp(-1.75 / 0.8), rel=0.02)
     assert numbers["lateral_displacement"] == pytest.approx(0.5 * 4.0 * 1.07**2, rel=0.03)
+
+
+def braked(maneuver, begin, **signals):
+    torque = 100.0 * (begin + 1e-6 < TIMES)
+    return vm.metrics(run_of(TIMES, torque, maneuver, ("brake_torque_FL",), **signals))
+
+
+def test_straight_braking_takes_the_distance_of_a_constant_deceleration():
+    late = np.maximum(TIMES - 1.0, 0.0)
+    x = V * TIMES - 0.5 * 3.0 * late**2
+    speeds = {"longitudinal_position": x, "longitudinal_speed": V - 3.0 * late}
+    numbers = braked("straight_braking", 1.0, **speeds)
+    assert numbers["distance"] == pytest.approx(V * 5.0 - 0.5 * 3.0 * 5.0**2, rel=1e-6)
+    assert numbers["mean_deceleration"] == pytest.approx(3.0, rel=1e-6)
+    assert numbers["final_speed"] == pytest.approx(V - 15.0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_braking_in_a_turn_is_compared_with_the_circle_that_would_go_on(side):
+    late, radius = np.maximum(TIMES - 3.0, 0.0), 100.0
+    # A circle until the brakes act, then the tangent: so the car leaves the circle outwards.
+    path = V * TIMES - 0.5 * 4.0 * late**2
+    angle = V * np.minimum(TIMES, 3.0) / radius
+    straight = np.maximum(path - 3.0 * V, 0.0)
+    x = radius * np.sin(angle) + straight * np.cos(angle)
+    y = side * (radius * (1.0 - np.cos(angle)) + straight * np.sin(angle))
+    signals = {"longitudinal_position": x, "lateral_position": y, "yaw": side * angle}
+    speed = V - 4.0 * late
+    rate = np.where(TIMES < 3.5, side * V / radius, side * 0.25 * V / radius)
+    numbers = braked("braking_in_turn", 3.0, longitudinal_speed=speed, yaw_rate=rate, **signals)
+    outwards = np.hypot(radius, V * 1.0 - 2.0) - radius
+    assert numbers["path_deviation"] == pytest.approx(-outwards, rel=1e-6)
+    assert numbers["mean_deceleration"] == pytest.approx(4.0, rel=1e-6)
+    assert numbers["yaw_rate_ratio"] == pytest.approx(0.25, rel=1e-6)
+
+
+def test_split_friction_and_other_inputs_give_what_is_largest_while_they_act():
+    rate = np.where(TIMES < 0.9, 5.0, -0.2 * np.sin(TIMES))
+    numbers = braked("split_friction", 1.0, yaw_rate=rate, lateral_speed=V * np.tan(rate / 4.0))
+    assert numbers["largest_yaw_rate"] == pytest.approx(0.2, rel=1e-3)
+    assert numbers["largest_sideslip"] == pytest.approx(0.05, rel=1e-3)
+    slips = {"slip_ratio_RL": 0.1 * np.sin(TIMES), "slip_ratio_RR": -0.3 * np.sin(TIMES)}
+    slip = vm.metrics(run_of(TIMES, 0.0 * ONES, "power_in_turn", **slips))["largest_slip"]
+    assert slip == pytest.approx(0.3, rel=1e-3)
+    loads = {"roll": -0.1 * np.sin(TIMES), "Fz_FL": 3e3 * ONES, "Fz_RR": 2e3 + 1e3 * np.sin(TIMES)}
+    numbers = vm.metrics(run_of(TIMES, 0.0 * ONES, "bump", **loads))
+    assert numbers["largest_roll"] == pytest.approx(0.1, rel=1e-3)
+    assert numbers["smallest_load"] == pytest.approx(1e3, rel=1e-3)
+
+
+def test_a_car_that_stops_has_the_distance_to_its_stop():
+    run = vm.model(CAR, {"initial_speed": 10.0}).simulate("straight_braking")
+    assert run.status == "stopped"
+    numbers = vm.metrics(run)
+    assert numbers["final_speed"] < 0.6
+    expected = 10.0**2 / (2.0 * numbers["mean_deceleration"])
+    assert numbers["distance"] == pytest.approx(float(expected), rel=0.01)
 
 
 def test_numbers_of_the_vehicle_are_those_of_its_linear_model():
@@ -160,6 +217,23 @@ def test_reduced_vehicles_have_the_numbers_of_the_full_ones(name, prefix):
     right = vm.model(name).simulate(vm.maneuver(f"{prefix}step_steer", amplitude=-1.0))
     for number, value in vm.metrics(right).items():
         assert float(value) == pytest.approx(float(full[number]), rel=1e-3), number
+
+
+def test_pictures_show_the_numbers_of_both_models():
+    model, rom = vm.model(CAR), vm.rom(CAR)
+    full, reduced = (each.simulate(vm.maneuver("sine_sweep")) for each in (model, rom))
+    panels = vm.plot(reduced, full, kind="frequency_response").axes
+    for line, run in zip(panels[0].lines, (full, reduced), strict=True):
+        np.testing.assert_allclose(line.get_ydata(), vm.metrics(run)["yaw_rate_gain"])
+    phase = np.degrees(vm.metrics(full)["lateral_acceleration_phase"])
+    np.testing.assert_allclose(panels[3].lines[0].get_ydata(), phase)
+    run = model.simulate(vm.maneuver("sine_with_dwell"))
+    lower = vm.plot(run, kind="sine_with_dwell").axes[1]
+    history, *_, late = lower.lines
+    np.testing.assert_allclose(history.get_ydata(), run["yaw_rate"])
+    # The mark stands 1.75 s after the end, which is at 2.93 s, at 20 % of the second peak.
+    assert late.get_xdata()[0] == pytest.approx(1.0 + 1.0 / 0.7 + 0.5 + 1.75, abs=0.02)
+    assert late.get_ydata()[0] == pytest.approx(0.2 * run["yaw_rate"].min(), rel=0.01)
 
 
 def test_what_has_no_numbers_is_refused():

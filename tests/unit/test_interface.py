@@ -83,6 +83,7 @@ def test_inputs_that_differ_by_rounding_are_the_same(car):
         (lambda run: vm.errors(run, with_inputs(run, 1.0 + 1e-5)), "other inputs"),
         (lambda run: vm.errors(run, with_inputs(run, 1.0, 1e-8)), "other inputs"),
         (lambda run: run.model.bare(["rhs"]), "rhs"),
+        (lambda run: run.model.bare(np.ones(3)), r"has no \[1. 1. 1.\]"),
     ],
 )
 def test_what_a_run_does_not_have_is_one_line(car, call, word):

@@ -10,7 +10,7 @@ from cyclopts import App, CycloptsError, Parameter, UnknownOptionError
 from vehiclemor import __version__
 from vehiclemor.cli.names import cite, list_components, new_plugin, show
 from vehiclemor.cli.options import FAILED, strict
-from vehiclemor.cli.runs import dataset, export, judge, plot, simulate
+from vehiclemor.cli.runs import dataset, export, judge, metrics, plot, simulate
 from vehiclemor.cli.studies import compare, convert, figures, report, run, status
 from vehiclemor.exceptions import (
     MachineError,
@@ -33,7 +33,7 @@ bound is missed and --check asks; 2 wrong input; 130 and 143 stopped by Ctrl-C a
     # It must reach `ended`, which tells how to resume.
     suppress_keyboard_interrupt=False,
 )
-OTHERS = (show, simulate, plot, run, status, compare, figures, report, export, convert)
+OTHERS = (show, simulate, plot, metrics, run, status, compare, figures, report, export, convert)
 OTHERS += (dataset, judge, cite)
 COMMANDS = {"list": list_components, "new-plugin": new_plugin} | {c.__name__: c for c in OTHERS}
 for name, command in COMMANDS.items():

@@ -144,6 +144,55 @@ def _picture(plot: list[Path] | None, usual: str) -> Path | None:
     return picture_file("--plot", plot[0] if plot else Path(usual))
 
 
+def metrics(
+    model: str,
+    *,
+    maneuver: Annotated[list[str] | None, Several] = None,
+    method: str | None = None,
+    speed: float | None = None,
+    amplitude: float = 1.0,
+    json_output: Json = False,
+) -> int:
+    """Print the numbers of the standards: how a vehicle handles, full and reduced side by side.
+
+    The exit status is 1 where a run has not come to its end, or does not reach what a number needs.
+
+    Parameters
+    ----------
+    model
+        A vehicle.
+    maneuver
+        Registered names, one or several; all that have numbers for this vehicle by default.
+    method
+        Reduce the model by this method too; shipped: the reduced model that ships with the package.
+    speed
+        Initial speed in m/s; that of the model's parameters by default.
+    amplitude
+        Factor on the steering.
+    """
+    import pandas as pd
+
+    from vehiclemor.report.handling import handling_rows
+    from vehiclemor.report.labels import Column
+    from vehiclemor.report.printing import Table, json_text
+
+    check_names("--maneuver", maneuver or ())
+    full = vm.model(model, {} if speed is None else {"initial_speed": speed})
+    models = {"full": vm.reduce(full, "full_order")}
+    if method == SHIPPED:
+        models[SHIPPED] = vm.rom(model)
+    elif method is not None:
+        models[method] = vm.reduce(model, method)
+    rows = pd.DataFrame(handling_rows(models, maneuver or (), amplitude))
+    if json_output:
+        print(json_text(rows))
+    else:
+        columns = {name: Column(name) for name in ("number", "unit")}
+        columns |= {name: Column(name, ".4g") for name in models}
+        print(Table(rows, columns, group="test"))
+    return FAILED if bool(rows[[*models]].isna().to_numpy().any()) else 0
+
+
 def plot(
     result: str,
     *,

@@ -25,7 +25,7 @@ from vehiclemor.cli.options import (
     new_file,
 )
 from vehiclemor.exceptions import InputError
-from vehiclemor.report.printing import ends_text, wrapped
+from vehiclemor.report.printing import Table, ends_text, wrapped
 from vehiclemor.report.study_formats import Format
 
 Study = Annotated[str, Parameter(help="Name of a study or collection, or a TOML file.")]
@@ -49,7 +49,7 @@ def run(
         Address of a dask scheduler whose workers compute.
     """
     from vehiclemor.report.frames import counted_ends
-    from vehiclemor.report.screens import counts_text
+    from vehiclemor.report.unseen import count_rows
     from vehiclemor.study.run import run_studies
 
     began, errors = time.perf_counter(), 0
@@ -66,7 +66,8 @@ def run(
         _print_reasons(Counter(end for end in ends if end[0] in ("rejected", "error")))
         errors += int((dataset["status"] == "error").sum())
         if "scenario_set" in dataset:
-            print(counts_text(dataset))
+            counts = ("item", "runs", "right", "flagged", "misses", "silent", "apart")
+            print(Table([*count_rows(dataset)], counts, group="label"))
     print(f"{time.perf_counter() - began:.1f} s")
     return FAILED if errors else 0
 

@@ -11,7 +11,7 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import data_folder
-from vehiclemor.handling import steering_tests
+from vehiclemor.handling import driving_tests, steering_tests
 from vehiclemor.handling.motion import Motion
 from vehiclemor.registry import choice
 from vehiclemor.simulation.trajectory import Trajectory
@@ -29,6 +29,11 @@ TESTS: dict[str, Callable[[Motion], Mapping[str, Any]]] = {
     "sine_sweep": steering_tests.frequency_response,
     "weave": steering_tests.weave,
     "sine_with_dwell": steering_tests.sine_with_dwell,
+    "straight_braking": driving_tests.straight_braking,
+    "braking_in_turn": driving_tests.braking_in_turn,
+    "split_friction": driving_tests.split_friction,
+    "power_in_turn": driving_tests.power_in_turn,
+    "bump": driving_tests.bump,
 }
 
 
@@ -83,8 +88,15 @@ def test_of(maneuver: str) -> str:
     return choice("maneuver with numbers", name, TESTS)
 
 
+def standard_of(test: str) -> str:
+    """Number of the standard of a test."""
+    return declared().standards[test]
+
+
 def motion_of(run: Trajectory) -> Motion:
-    """Motion of a run, with outputs that may have been chosen."""
+    """Motion of a run until it ends or the vehicle stops; its outputs may have been chosen."""
+    if run.status == "stopped":
+        run = run.chosen(times=run.times[: run.samples_to_stop])
     names, p = run.names or run.model.outputs, run.model.parameters.values()
     wheelbase = run.model.definition.wheelbase
     length = np.nan if wheelbase is None else float(wheelbase(p))
@@ -95,7 +107,7 @@ def numbers_of(motion: Motion, test: str) -> xr.Dataset:
     """Numbers of a test with units and definitions."""
     import xarray as xr
 
-    standard = declared().standards[test]
+    standard = standard_of(test)
     variables: dict[str, tuple] = {}
     for name, value in TESTS[test](motion).items():
         unit, definition = declared().numbers[test][name]

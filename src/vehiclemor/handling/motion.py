@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.multibody.quantities import WHEELS
+from vehiclemor.multibody.quantities import SLIP_RATIOS, TIRE_LOADS, WHEELS
 
 # Outputs that a vehicle needs.
 NEEDED = ("longitudinal_position", "lateral_position", "yaw", "roll")
@@ -39,6 +39,8 @@ class Motion:
         Magnitude of the velocity in m/s, and angle from the x axis to it in rad.
     lateral_acceleration
         dv/dt + r u of the lateral speed v, yaw rate r and longitudinal speed u, in m/s^2.
+    slip, load
+        Largest magnitude of the slip ratios, and smallest load in N, of all wheels.
     x, y, yaw, roll, yaw_rate
         Outputs in m, rad and rad/s.
     wheelbase
@@ -49,6 +51,8 @@ class Motion:
     steering: np.ndarray
     wheel_angle: np.ndarray
     braking: np.ndarray
+    slip: np.ndarray
+    load: np.ndarray
     speed: np.ndarray
     sideslip: np.ndarray
     lateral_acceleration: np.ndarray
@@ -81,12 +85,19 @@ class Motion:
             raise InputError("the run has not come to its end: it has no numbers of a maneuver")
         columns = dict(zip(names, inputs.T, strict=True))
         steering = columns.get("delta", columns.get("s", np.zeros(len(times))))
-        steered = [history(name) for name in STEERED if name in outputs]
+        nothing = np.full(len(times), np.nan)
+
+        def of_wheels(wanted: tuple[str, ...]) -> list[np.ndarray]:
+            return [history(name) for name in wanted if name in outputs] or [nothing]
+
+        steered = of_wheels(STEERED) if STEERED[0] in outputs else [steering]
         return cls(
             times=times,
             steering=steering,
-            wheel_angle=np.mean(steered or [steering], axis=0),
+            wheel_angle=np.mean(steered, axis=0),
             braking=sum((columns.get(name, 0.0) for name in BRAKES), np.zeros(len(times))),
+            slip=np.max([np.abs(each) for each in of_wheels(SLIP_RATIOS)], axis=0),
+            load=np.min(of_wheels(TIRE_LOADS), axis=0),
             speed=np.hypot(ahead, aside),
             sideslip=np.arctan2(aside, ahead),
             lateral_acceleration=CubicSpline(times, aside)(times, 1) + yaw_rate * ahead,

@@ -1,5 +1,7 @@
 """Numbers of open-loop steering tests: steady turn, step, sweep, weave, sine with dwell."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from vehiclemor.handling.motion import Motion, first_time, slope
@@ -15,8 +17,10 @@ ORDER, DELAY = 4, 0.1
 # Part of the largest steering around the centre, where on-centre gains are taken; part from which
 # on steering has begun.
 ON_CENTRE, BEGUN = 0.2, 0.05
-# s: ratios of the yaw rate after the end of the steering, displacement after its beginning.
-RATIO_TIMES, DISPLACEMENT_TIME = (1.0, 1.75), 1.07
+# Ratio of the yaw rate to its peak: time after the steering in s, largest ratio that is allowed.
+RATIOS = {"early_yaw_rate_ratio": (1.0, 0.35), "late_yaw_rate_ratio": (1.75, 0.2)}
+# s after the beginning of the steering.
+DISPLACEMENT_TIME = 1.07
 
 
 def steady_turn(motion: Motion) -> dict[str, float]:
@@ -37,12 +41,12 @@ def step(motion: Motion) -> dict[str, float]:
     times = motion.times
     steady = times >= times[-1] - STEADY
     half = first_time(times, motion.steering / np.mean(motion.steering[steady]), 0.5)
-    yaw_rate = np.mean(motion.yaw_rate[steady])
+    yaw_rate = float(np.mean(motion.yaw_rate[steady]))
     response = motion.yaw_rate / yaw_rate
     lateral = motion.lateral_acceleration / np.mean(motion.lateral_acceleration[steady])
     peak, largest = _peak(times, response)
     return {
-        "yaw_rate_gain": yaw_rate / np.mean(motion.wheel_angle[steady]),
+        "yaw_rate_gain": yaw_rate / float(np.mean(motion.wheel_angle[steady])),
         "yaw_rate_response_time": first_time(times, response, 0.9) - half,
         "yaw_rate_peak_time": peak - half,
         "yaw_rate_overshoot": largest - 1.0,
@@ -78,8 +82,6 @@ def transfer_function(times: np.ndarray, given: np.ndarray, response: np.ndarray
     A difference equation with delays of `DELAY` is fitted to all samples.  Fourier spectra of a
     sweep that ends in motion are wrong by 10 %.
     """
-    from scipy.signal import freqz
-
     delay = max(round(DELAY * (len(times) - 1) / (times[-1] - times[0])), 1)
     rows = np.arange(ORDER * delay, len(times))
     if len(rows) < 2 * ORDER + 1:
@@ -87,9 +89,9 @@ def transfer_function(times: np.ndarray, given: np.ndarray, response: np.ndarray
     past = [response[rows - k * delay] for k in range(1, ORDER + 1)]
     driven = [given[rows - k * delay] for k in range(ORDER + 1)]
     fitted = np.linalg.lstsq(np.column_stack(past + driven), response[rows], rcond=None)[0]
-    rate = 1.0 / (delay * (times[1] - times[0]))
-    denominator = np.append(1.0, -fitted[:ORDER])
-    return freqz(fitted[ORDER:], denominator, worN=FREQUENCIES, fs=rate)[1]
+    back = np.exp(-2j * np.pi * FREQUENCIES * delay * (times[1] - times[0]))
+    remembered = np.polyval(np.append(0.0, fitted[:ORDER])[::-1], back)
+    return np.polyval(fitted[ORDER:][::-1], back) / (1.0 - remembered)
 
 
 def weave(motion: Motion) -> dict[str, float]:
@@ -121,43 +123,47 @@ def _at_zero(steering: np.ndarray, response: np.ndarray) -> np.ndarray:
     return steering[before] + part * (steering[before + 1] - steering[before])
 
 
+class Dwell(NamedTuple):
+    """A sine of steering with its yaw rate.
+
+    It begins and ends, in s, where the steering passes `BEGUN` of its largest value.  The first
+    side is 1 on the left, -1 on the right; the peak is the largest yaw rate towards the other side
+    between the reversal of the steering and its end, in rad/s.
+    """
+
+    begin: float
+    end: float
+    side: float
+    peak: float
+
+
+def dwell_of(motion: Motion) -> Dwell:
+    """Times, side and peak of a sine with dwell."""
+    times, size = motion.times, np.abs(motion.steering)
+    threshold = BEGUN * size.max()
+    begin = first_time(times, size, threshold)
+    end = -first_time(-times[::-1], size[::-1], threshold)
+    first = np.sign(np.interp(begin, times, motion.steering))
+    back = np.where(times > begin, -first * motion.steering, -threshold)
+    turned_back = (times >= first_time(times, back, 0.0)) & (times <= end)
+    side = float(np.sign(np.interp(begin, times, motion.wheel_angle)))
+    peak = float(np.max(-side * motion.yaw_rate, where=turned_back, initial=0.0))
+    return Dwell(begin, end, side, peak or np.nan)
+
+
 def sine_with_dwell(motion: Motion) -> dict[str, float]:
     """Ratios of the yaw rate after the steering, displacement after its beginning."""
-    times = motion.times
-    begin, reversal, end = steering_times(motion)
-    towards = np.sign(np.interp(begin, times, motion.wheel_angle))
-    reversed_rate = -towards * motion.yaw_rate
-    turned_back = (times >= reversal) & (times <= end)
-    peak = np.max(reversed_rate, where=turned_back, initial=0.0) or np.nan
-
-    def ratio(after: float) -> float:
-        late = np.interp(end + after, times, reversed_rate, right=np.nan)
-        return float(late / peak)
+    dwell = dwell_of(motion)
 
     def at(signal: np.ndarray, time: float) -> float:
-        return float(np.interp(time, times, signal, right=np.nan))
+        return float(np.interp(time, motion.times, signal, right=np.nan))
 
-    heading, then = at(motion.yaw, begin), begin + DISPLACEMENT_TIME
-    ahead = at(motion.x, then) - at(motion.x, begin)
-    aside = at(motion.y, then) - at(motion.y, begin)
+    heading, then = at(motion.yaw, dwell.begin), dwell.begin + DISPLACEMENT_TIME
+    ahead = at(motion.x, then) - at(motion.x, dwell.begin)
+    aside = at(motion.y, then) - at(motion.y, dwell.begin)
     displacement = aside * np.cos(heading) - ahead * np.sin(heading)
-    return {
-        "yaw_rate_ratio_1_s": ratio(RATIO_TIMES[0]),
-        "yaw_rate_ratio_1_75_s": ratio(RATIO_TIMES[1]),
-        "lateral_displacement": float(towards * displacement),
+    numbers = {
+        name: -dwell.side * at(motion.yaw_rate, dwell.end + after) / dwell.peak
+        for name, (after, _) in RATIOS.items()
     }
-
-
-def steering_times(motion: Motion) -> tuple[float, float, float]:
-    """Times in s at which a sine of steering begins, changes its side, and is complete.
-
-    It begins and ends at `BEGUN` of its largest value.
-    """
-    size = np.abs(motion.steering)
-    threshold = BEGUN * size.max()
-    begin = first_time(motion.times, size, threshold)
-    end = -first_time(-motion.times[::-1], size[::-1], threshold)
-    side = np.sign(np.interp(begin, motion.times, motion.steering))
-    back = np.where(motion.times > begin, -side * motion.steering, -threshold)
-    turned = first_time(motion.times, back, 0.0)
-    return begin, turned, end
+    return numbers | {"lateral_displacement": float(dwell.side * displacement)}

@@ -143,7 +143,7 @@ class Excitation(ShortRepr):
 
     def _extent(self, limits: np.ndarray | float) -> np.ndarray:
         """Result (5, inputs) of `polynomial_loops.extent`."""
-        inputs = self.pieces.coefficients.shape[1]
+        inputs = self.pieces.coefficients.shape[2]
         bounds, result = np.empty((4, inputs)), np.empty((5, inputs))
         bounds[:] = limits
         polynomial_loops()["extent"](self.packed_pieces, bounds, result)
@@ -159,7 +159,7 @@ def polynomial_loops() -> dict[str, Loop]:
 def values_at(pieces: Pieces, times: np.ndarray) -> np.ndarray:
     """Values (n, inputs) at times (n,) in s; at a jump those after it, at the end before."""
     order = np.argsort(times)
-    increasing = np.empty((len(times), pieces.coefficients.shape[1]))
+    increasing = np.empty((len(times), pieces.coefficients.shape[2]))
     polynomial_loops()["sampled"](pieces, times[order], increasing)
     values = np.empty_like(increasing)
     values[order] = increasing

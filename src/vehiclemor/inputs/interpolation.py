@@ -80,14 +80,15 @@ def _check(times: np.ndarray, samples: np.ndarray) -> None:
 def _coefficients(
     times: np.ndarray, samples: np.ndarray, rises: np.ndarray, hold: str
 ) -> np.ndarray:
-    """Coefficients (runs, n - 1, inputs, degree + 1) of powers of the passed part of an interval.
+    """Coefficients (runs, n - 1, degree + 1, inputs) of powers of the passed part of an interval.
 
     Of degree 3 they are the spline with continuous second derivatives, not-a-knot at its ends.
     """
-    coefficients = np.empty((*rises.shape, HOLDS[hold] + 1))
-    coefficients[..., 0] = samples[:, :-1]
+    runs, intervals, inputs = rises.shape
+    coefficients = np.empty((runs, intervals, HOLDS[hold] + 1, inputs))
+    coefficients[:, :, 0] = samples[:, :-1]
     if hold == "linear":
-        coefficients[..., 1] = rises
+        coefficients[:, :, 1] = rises
     elif hold == "cubic":
         # Imported with the first spline: it takes a tenth of a second.
         from scipy.interpolate import CubicSpline
@@ -100,7 +101,7 @@ def _coefficients(
         for power in (1, 2, 3):
             # Of the spline by power from the highest on, interval, run and input.
             by_interval = np.moveaxis(spline.c[3 - power], 0, 1)
-            coefficients[..., power] = by_interval * lengths**power
+            coefficients[:, :, power] = by_interval * lengths**power
     if not np.isfinite(coefficients).all():
         raise InputError(INFINITE)
     return coefficients
@@ -142,12 +143,12 @@ def mark_rests(
         return
     run, begin, end = run[long], begin[long], end[long]
     breaks[run, begin] = breaks[run, end] = True
-    if coefficients.shape[3] > HOLDS["linear"] + 1:
+    if coefficients.shape[2] > HOLDS["linear"] + 1:
         changes = np.zeros(breaks.shape, dtype=int)
         changes[run, begin], changes[run, end] = 1, -1
         resting = changes.cumsum(axis=1)[:, :-1] > 0
-        largest = np.abs(samples).max(axis=1)[:, None, :, None]
-        swings = (np.abs(coefficients[..., 1:]) > SWING * largest).any(axis=(2, 3))
+        largest = np.abs(samples).max(axis=1)[:, None, None]
+        swings = (np.abs(coefficients[:, :, 1:]) > SWING * largest).any(axis=(2, 3))
         swings &= resting
         breaks[:, :-1] |= swings
         breaks[:, 1:] |= swings
@@ -161,5 +162,6 @@ def time_derivative(pieces: Pieces) -> Pieces:
         counts = np.diff(pieces.first)
         lengths = np.repeat(np.diff(pieces.edges) / counts, counts)
     rates = np.zeros_like(pieces.coefficients)
-    rates[:, :, :-1] = pieces.coefficients[:, :, 1:] * np.arange(1.0, rates.shape[2])
+    powers = np.arange(1.0, rates.shape[1])[:, None]
+    rates[:, :-1] = pieces.coefficients[:, 1:] * powers
     return pieces._replace(coefficients=rates / lengths[:, None, None])

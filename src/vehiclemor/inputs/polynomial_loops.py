@@ -12,6 +12,8 @@ INLINED = ("input_at", "signal_at", "passed")
 CORNER, HIGHER = 0.08, 0.02
 # Parts of a piece between evaluations, and the longest of them (s).
 PARTS, LONGEST = 4, 0.01
+# Inputs from which on they are evaluated side by side.
+MANY = 8
 # Samples whose spacings differ by less, relative to them, are equidistant.
 EQUIDISTANT = 1e-8
 
@@ -21,7 +23,7 @@ class Pieces(NamedTuple):
 
     Ends of the smooth segments (segments + 1,) in s; number of the first piece of each (segments +
     1,); times (pieces,) in s at which pieces begin, empty if those of a segment are of one length;
-    coefficients (pieces, inputs, degree + 1) in the part of the piece that has passed, lowest power
+    coefficients (pieces, degree + 1, inputs) in the part of the piece that has passed, lowest power
     first.
     """
 
@@ -59,12 +61,20 @@ def signal_at(signal, segment, t, u):
         i = min(i, end - row - 1)
         z = position - i
         row += i
-    degree = coefficients.shape[2] - 1
+    degree = coefficients.shape[1] - 1
+    if len(u) < MANY:
+        for j in range(len(u)):
+            value = coefficients[row, degree, j]
+            for power in range(degree - 1, -1, -1):
+                value = coefficients[row, power, j] + z * value
+            u[j] = value
+        return
+    # Side by side: the compiler takes several at once.
     for j in range(len(u)):
-        value = coefficients[row, j, degree]
-        for power in range(degree - 1, -1, -1):
-            value = coefficients[row, j, power] + z * value
-        u[j] = value
+        u[j] = coefficients[row, degree, j]
+    for power in range(degree - 1, -1, -1):
+        for j in range(len(u)):
+            u[j] = coefficients[row, power, j] + z * u[j]
 
 
 def sampled(signal: Pieces, times: Vector, inputs: Matrix) -> Int:
@@ -92,8 +102,8 @@ def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
         is (5, inputs).
     """
     edges, first, starts, coefficients = signal
-    degree, pieces, segments = coefficients.shape[2] - 1, len(coefficients), len(edges) - 1
-    for j in range(coefficients.shape[1]):
+    degree, pieces, segments = coefficients.shape[1] - 1, len(coefficients), len(edges) - 1
+    for j in range(coefficients.shape[2]):
         low, high, most, since = math.inf, -math.inf, 0.0, math.inf
         # Before it begins an input is zero.  Outputs of the first and second filter, by corner.
         before, once, twice, high_once, high_twice, squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -114,9 +124,9 @@ def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
                 decay, high_decay = math.exp(-span / CORNER), math.exp(-span / HIGHER)
                 half_decay = math.sqrt(high_decay)
             for part in range(parts + 1):
-                value = coefficients[piece, j, degree]
+                value = coefficients[piece, degree, j]
                 for power in range(degree - 1, -1, -1):
-                    value = coefficients[piece, j, power] + part * share * value
+                    value = coefficients[piece, power, j] + part * share * value
                 change, before = value - before, value
                 if part:
                     left = high_once, high_twice

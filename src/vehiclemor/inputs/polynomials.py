@@ -50,7 +50,7 @@ def _segment(
     largest: np.ndarray,
     known: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
-    """Polynomials (pieces, inputs, 6) between two break points, which also give known values."""
+    """Polynomials (pieces, 6, inputs) between two break points, which also give known values."""
     a, b = ends
     # One-sided values at the ends, where the input may jump.
     inside = min(max(1e-13, 2.0 * np.spacing(b) / (b - a)), 1e-6)
@@ -72,18 +72,18 @@ def _segment(
         left = np.arange(pieces)[:, None]
         values = inputs_at((left + nodes) / pieces)
         if np.all(values == values[0, 0]) and np.all(known_values == values[0, 0]):
-            constant = np.zeros((1, values.shape[2], DEGREE + 1))
-            constant[0, :, 0] = values[0, 0]
+            constant = np.zeros((1, DEGREE + 1, values.shape[2]))
+            constant[0, 0] = values[0, 0]
             return constant
-        coefficients = np.einsum("pk,nki->nip", _powers(nodes), values)
+        coefficients = _powers(nodes) @ values
         # The first and the last node have been moved inside.
-        coefficients[0] = (_powers(np.fmax(nodes, inside * pieces)) @ values[0]).T
-        coefficients[-1] = (_powers(np.fmin(nodes, 1.0 - inside * pieces)) @ values[-1]).T
-        between = (coefficients @ middles ** np.arange(DEGREE + 1)[:, None]).swapaxes(1, 2)
+        coefficients[0] = _powers(np.fmax(nodes, inside * pieces)) @ values[0]
+        coefficients[-1] = _powers(np.fmin(nodes, 1.0 - inside * pieces)) @ values[-1]
+        between = middles[:, None] ** np.arange(DEGREE + 1) @ coefficients
         errors = between - inputs_at((left + middles) / pieces)
         further = _values(coefficients, known_parts) - known_values
         if max(np.abs(e / largest).max(initial=0.0) for e in (errors, further)) < ACCURACY:
-            return np.ascontiguousarray(coefficients)
+            return coefficients
         pieces *= 2
     raise InputError(
         f"maneuver {maneuver.name!r} is not smooth between t = {a:g} and {b:g} s; "
@@ -106,4 +106,4 @@ def _values(coefficients: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """Polynomials (n, inputs) at parts (n,) between 0 and 1 of their segment."""
     pieces = np.floor(parts * len(coefficients)).astype(int)
     powers = (parts * len(coefficients) - pieces)[:, None] ** np.arange(DEGREE + 1)
-    return np.einsum("nip,np->ni", coefficients[pieces], powers)
+    return np.einsum("npi,np->ni", coefficients[pieces], powers)

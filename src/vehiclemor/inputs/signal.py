@@ -131,7 +131,7 @@ class Signal(Excitation):
     @cached
     def _scaled_pieces(self) -> Pieces:
         edges, first, starts, coefficients = self.nominal_pieces
-        orders = np.zeros(coefficients.shape[1])
+        orders = np.zeros(coefficients.shape[2])
         for column, name in enumerate(self.inputs):
             orders[column] = derivative_order(name, self.inputs)
         amplitudes = self.amplitude_factor * self.frequency_factor**orders
@@ -139,7 +139,7 @@ class Signal(Excitation):
             edges / self.frequency_factor,
             first,
             starts / self.frequency_factor,
-            coefficients * amplitudes[:, None],
+            coefficients * amplitudes,
         )
 
     @property
@@ -158,7 +158,7 @@ class Signal(Excitation):
         return values_at(self.pieces, within_run)
 
     def _at_output_times(self) -> np.ndarray:
-        inputs = np.empty((self.samples, self.pieces.coefficients.shape[1]))
+        inputs = np.empty((self.samples, self.pieces.coefficients.shape[2]))
         polynomial_loops()["sampled"](self.packed_pieces, self.times, inputs)
         return inputs
 
@@ -182,7 +182,7 @@ class Signal(Excitation):
 
     @cached
     def _completed(self, names: tuple[str, ...], defaults: tuple[float, ...]) -> Signal:
-        columns = self.nominal_pieces.coefficients.shape[1]
+        columns = self.nominal_pieces.coefficients.shape[2]
         needed = ", ".join(names)
         if not self.inputs:
             if columns == len(names):
@@ -199,7 +199,7 @@ class Signal(Excitation):
                 )
         values = dict(zip(names, defaults, strict=False))
         columns = [self._column(name, values.get(name, 0.0)) for name in names]
-        coefficients = np.stack(columns, axis=1)
+        coefficients = np.stack(columns, axis=2)
         pieces = self.nominal_pieces._replace(coefficients=coefficients)
         return replace(self, inputs=names, nominal_pieces=pieces)
 
@@ -209,7 +209,7 @@ class Signal(Excitation):
         while name not in self.inputs:
             lower = integral_of(name)
             if not lower:
-                constant = np.zeros_like(pieces.coefficients[:, 0])
+                constant = np.zeros_like(pieces.coefficients[:, :, 0])
                 constant[:, 0] = default
                 return constant
             name, order = lower, order + 1
@@ -217,7 +217,7 @@ class Signal(Excitation):
             raise InputError(f"{self}: derivatives of {name} follow from a cubic hold alone")
         for _ in range(order):
             pieces = time_derivative(pieces)
-        return pieces.coefficients[:, self.inputs.index(name)]
+        return pieces.coefficients[:, :, self.inputs.index(name)]
 
     @classmethod
     def from_function(

@@ -1,12 +1,12 @@
 """What the settings of all methods share: one pydantic class by method and kind of model."""
 
-from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Collection, Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema, field_validator
 
-from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
+from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, frozen
 
 Value = int | float | str
 LARGEST_NUMBER = 1e300
@@ -42,26 +42,27 @@ class Settings(BaseModel):
         return value
 
 
-def _integrator(name: str) -> str:
-    """An integrator by its name."""
-    if name not in INTEGRATORS:
-        raise ValueError(f"is {name!r}; allowed: {', '.join(INTEGRATORS)}")
-    return name
+def _one_of(names: Collection[str]) -> tuple[Any, ...]:
+    """What makes a text the name of one of these integrators."""
+
+    def check(name: str) -> str:
+        if name not in names:
+            raise ValueError(f"is {name!r}; allowed: {', '.join(names)}")
+        return name
+
+    meaning = "; ".join(f"{name}: {INTEGRATORS[name].summary}" for name in names)
+    schema = WithJsonSchema({"type": "string", "enum": list(names)})
+    return AfterValidator(check), schema, Field(description=meaning)
 
 
-AnyIntegrator = Annotated[
-    str, AfterValidator(_integrator), WithJsonSchema({"type": "string", "enum": list(INTEGRATORS)})
-]
+AnyIntegrator = Annotated[str, *_one_of(INTEGRATORS)]
 # How a reduced system is integrated: the same two settings of all methods that have one.
 Solver = Annotated[
     AnyIntegrator,
     Field(description="as of full_order; etdrk4 freezes the Jacobian"),
 ]
 # Projected systems have no Jacobian to freeze.
-ProjectedSolver = Annotated[
-    Literal["dopri5", "rodas4"],
-    Field(description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4"),
-]
+ProjectedSolver = Annotated[str, *_one_of([name for name in INTEGRATORS if not frozen(name)])]
 # Of an iteration.
 StepTolerance = Annotated[
     float,

@@ -17,6 +17,7 @@ from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.simulation.build import build_derived
 from vehiclemor.study.plans.loading import is_study, load_studies, read_study, study_path
+from vehiclemor.study.plans.logs import Log
 from vehiclemor.study.plans.study_file import (
     SETS,
     CollectionFile,
@@ -245,6 +246,7 @@ def _grid(study: GridFile) -> Description:
         "starts": study.start or ["the model's first"],
         "training": study.trained_on,
         "parameters": _listed(study.parameters),
+        "logs": [log.log for log in study.logs],
         "grid points": study.points,
         "keeps": study.keep,
         "grid": grid,
@@ -254,9 +256,11 @@ def _grid(study: GridFile) -> Description:
 def _sets(study: ProtocolFile) -> Description:
     """What a study with bounds trains, chooses by and tests; scenarios are counted."""
     counted = {s: sum(g.scenarios for g in getattr(study, s)) for s in SETS}
+    logs = [part.log for s in SETS for part in getattr(study, s) if isinstance(part, Log)]
     counted |= {name.replace("_", " "): draw.runs for name, draw in study.draws.items()}
     return {
         "runs": [f"{count} {purpose}" for purpose, count in counted.items() if count],
+        "logs": [*dict.fromkeys(logs)],
         "seed": study.seed,
         "version": study.version,
         "bounds": [

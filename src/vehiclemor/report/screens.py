@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import xarray as xr
 
 from vehiclemor.registry import component, names
 from vehiclemor.report.comparison import ALL_MODELS, PAPER, cost_table, timing_of
@@ -27,7 +26,6 @@ from vehiclemor.report.frames import ERRORS
 from vehiclemor.report.labels import ERROR, Column, column, declared, main_outputs, of_kind
 from vehiclemor.report.printing import Table, format_value, wrapped
 from vehiclemor.report.sizes import EXPLAINED, KIND, growth_text
-from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 Row = dict[str, Any]
@@ -322,16 +320,6 @@ def _protocol_parts(rows: Mapping[str, list[Row]], explain: bool) -> list[Part]:
     if chosen:
         parts.append(Table(chosen, ("label", "chosen_settings")))
     return parts
-
-
-def counts_text(dataset: xr.Dataset) -> str:
-    """How many runs of each method are right, warned and so on: of all, by maneuver or log."""
-    rows = protocol_rows(dataset)
-    methods = [row | {"item": "all"} for row in rows if row["kind"] == "method"]
-    every = [row for row in methods if row["role"] != FULL_ORDER]
-    every += [row for row in rows if row["kind"] == "count"]
-    columns = ("label", "runs", "right", "flagged", "misses", "silent")
-    return str(Table(every, columns, group="item"))
 
 
 def _winner_parts(

@@ -10,7 +10,7 @@ would stand in for it.
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby, pairwise
+from itertools import groupby, pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,12 +37,11 @@ CONTINUED = 0.5
 
 
 def protocol_rows(dataset: xr.Dataset) -> list[Row]:
-    """Rows of one protocol, by `kind`: `method`, `count`; of what was chosen `target`, `bound`."""
+    """Rows of one protocol, by `kind`: `method`, then `target` and `bound` of what was chosen."""
     protocol = protocol_of(dataset)
     methods = method_rows(dataset, protocol)
     rows = methods + target_rows(dataset, protocol, methods)
     rows += [row for method in methods if method["winner"] for row in bound_rows(protocol, method)]
-    rows += count_rows(dataset, protocol)
     head = {"study": str(dataset.attrs["study"]), "model": protocol.model}
     return [head | row for row in rows]
 
@@ -111,16 +110,17 @@ def _method_row(dataset: xr.Dataset, judged: xr.Dataset, label: str, protocol: P
     return row | times | {"spread": spread / times["seconds"] if times["seconds"] > 0.0 else 0.0}
 
 
-def count_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> Iterator[Row]:
-    """How many runs of each reduced model are right, warned and so on: of each maneuver or log."""
+def count_rows(dataset: xr.Dataset) -> Iterator[Row]:
+    """How many runs of each reduced model are right, warned and so on: all, by maneuver or log."""
+    bounds, sets = protocol_of(dataset).bounds, dataset["scenario_set"].values
+    tested = dataset.isel(scenario=sets == judged_set(set(sets)))
     part = judged_part(dataset)
-    part = part.isel(label=part["role"].values != FULL_ORDER)
-    driven = part["maneuver"].values
-    for name in dict.fromkeys(driven):
-        for label in part["label"].values:
-            runs = part.sel(label=label).isel(scenario=driven == name)
-            counts = outcomes(runs, protocol.bounds).counts
-            yield {"kind": "count", "item": name, "label": str(label), **counts}
+    reduced = part["label"].values[part["role"].values != FULL_ORDER]
+    for label, name in product(reduced, ["all", *dict.fromkeys(tested["maneuver"].values)]):
+        here, there = (np.isin(d["maneuver"], name) | (name == "all") for d in (part, tested))
+        counts = outcomes(part.sel(label=label).isel(scenario=here), bounds).counts
+        apart = int(there.sum() - here.sum())
+        yield {"item": name, "label": str(label), **counts, "apart": apart}
 
 
 def _chosen_settings(candidates: list[Row]) -> str:

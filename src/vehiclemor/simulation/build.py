@@ -71,7 +71,8 @@ def build(
         definition = with_overrides(definition, overrides)
         overrides = {**overrides, **inputs}
     path = parameter_file or definition.parameter_file
-    parameters = load_parameters(name, definition.parameters, path, overrides or inputs)
+    overrides = inputs if overrides is None else overrides
+    parameters = load_parameters(name, definition.parameters, path, overrides)
     with first_use(name):
         return _made(definition, parameters)
 

@@ -157,6 +157,11 @@ class Model(ShortRepr):
         optional = (quantity.name for quantity in self.definition.optional_inputs)
         return frozenset(optional).difference(self.inputs)
 
+    @cached_property
+    def _driven_models(self) -> dict[tuple[str, ...], Any]:
+        # To look one up for each run would take as long as a step.
+        return {}
+
     def driving(self, names: Iterable[str]) -> Self:
         """The model whose runs drive the optional inputs among these names too, cached."""
         names = [*names]
@@ -170,7 +175,12 @@ class Model(ShortRepr):
             return self
         if isinstance(maneuver, str):
             maneuver = registered(maneuver)
-        return self.driving(maneuver.inputs) if isinstance(maneuver, Excitation) else self
+        if not isinstance(maneuver, Excitation):
+            return self
+        names = maneuver.inputs
+        if names not in self._driven_models:
+            self._driven_models[names] = self.driving(names)
+        return self._driven_models[names]
 
     def start(self, name: Start | None = None) -> np.ndarray:
         """State (n,) of an initial condition, the first by default, or a copy of the one given."""
@@ -273,7 +283,7 @@ class Model(ShortRepr):
 
     def bare(self, function: str) -> BareKernel:
         """`rhs`, `outputs` or another function for integrators of others, see `BareKernel`."""
-        function = "derivative" if function == "rhs" else function
+        function = "derivative" if str(function) == "rhs" else function
         self.require(function)
         return self.kernels.bare(function, self.constants)
 

@@ -41,7 +41,7 @@ class StepSpace(NamedTuple):
     """A workspace of one step at a time, and what is overwritten for each.
 
     Times are arrays that end with the length of the step; window is an index (1,), coefficients
-    (1, inputs, 6) are of the inputs, means (windows, n) of the subspaces, first is the first step.
+    (1, 6, inputs) are of the inputs, means (windows, n) of the subspaces, first is the first step.
     """
 
     space: Workspace
@@ -99,11 +99,11 @@ class SteppedSystem:
         start[:] = state
         slope = None if next_inputs is None else (next_inputs - inputs) / dt
         for begin, length, window in self._parts(time, dt):
-            coefficients[0, :, 0] = inputs
-            coefficients[0, :, 1] = 0.0
+            coefficients[0, 0] = inputs
+            coefficients[0, 1] = 0.0
             if slope is not None:
-                coefficients[0, :, 0] += begin * slope
-                coefficients[0, :, 1] = length * slope
+                coefficients[0, 0] += begin * slope
+                coefficients[0, 1] = length * slope
             for array in held.times:
                 array[-1] = length
             held.first.value = length
@@ -137,7 +137,7 @@ class SteppedSystem:
             yield begin, end - begin, window
 
     def _packed(self) -> StepSpace:
-        edges, coefficients = np.zeros(2), np.zeros((1, self.system.inputs, 6))
+        edges, coefficients = np.zeros(2), np.zeros((1, 6, self.system.inputs))
         span, window, sample = np.zeros(2), np.zeros(1, dtype=np.int64), np.ones(1)
         counts, one = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64), np.array([0, 1])
         signal = ready(Pieces(edges, one, np.empty(0), coefficients))

@@ -51,11 +51,7 @@ class AlgebraicSettings(Settings):
 class DynamicSettings(OnlineSettings):
     """How equations of motion are integrated."""
 
-    solver: AnyIntegrator = Field(
-        "dopri5",
-        description="dopri5: Dormand-Prince 5(4); rodas4: Rosenbrock of order 4, fresh "
-        "Jacobians; etdrk4: exponential method of order 4, one Jacobian for all runs",
-    )
+    solver: AnyIntegrator = "dopri5"
     tolerance: Tolerance = 1e-8
 
 

@@ -226,7 +226,7 @@ def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[No
         with matplotlib.style.context(changes):
             pass
     except (OSError, TypeError, ValueError):
-        known = ", ".join(matplotlib.style.available)
+        known = ", ".join(name for name in matplotlib.style.available if name[0] != "_")
         raise InputError(f"style is {quoted(style)}, neither a file nor one of {known}") from None
     return matplotlib.style.context(changes)
 

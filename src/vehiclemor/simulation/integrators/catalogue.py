@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
+from pathlib import Path
 
 import numpy as np
 
@@ -160,13 +161,11 @@ def scratch_size(
     return scratch_end(n, inputs) + of_method + chosen.inputs * inputs + of_step
 
 
-# All source that a run may be compiled from.
+# All source that a run follows from: of integrators their tables and step-size control too.
 LOOP_SOURCES = (
     "inputs.polynomial_loops",
     "simulation.loop_arguments",
     *(f"simulation.formulations.{name}" for name in FORMULATIONS),
-    *(f"simulation.integrators.{name}" for name in INTEGRATORS),
-    *(f"simulation.integrators.{name}" for name in ("contract", "dense_solves", "explicit_pair")),
-    "simulation.integrators.loop",
+    *(f"simulation.integrators.{path.stem}" for path in sorted(Path(__file__).parent.glob("*.py"))),
     "simulation.path_loops",
 )

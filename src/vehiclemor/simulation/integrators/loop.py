@@ -58,7 +58,7 @@ def integrate(
     Buffer and integers are scratch space, see `catalogue.scratch_size`.  Gives why the run has
     ended; if early, when is the first number of the buffer.
     """
-    n, inputs = len(start), signal.coefficients.shape[1]
+    n, inputs = len(start), signal.coefficients.shape[2]
     x = vector(buffer, 0, n)
     for i in range(n):
         x[i] = start[i]

@@ -2,8 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.exceptions import FileError, GeometryError, InputError, PlugInError, VehiclemorError
-from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -22,7 +21,7 @@ from vehiclemor.study.experiment import (
     default_settings,
     make_experiment,
 )
-from vehiclemor.study.plans.logs import Window, windows
+from vehiclemor.study.plans.logs import windows
 from vehiclemor.study.plans.study_file import GridFile, MethodEntry
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER, TEXTS, Sampling, values
 from vehiclemor.study.plans.training import training_set
@@ -60,19 +59,17 @@ def expand(name: str, study: GridFile, folder: Path = Path()) -> Grid:
         model = build(study.model, overrides=study.parameters)
         samples = sampled(study.sampling) if study.sampling else {}
         dimensions = _dimensions(model, study, samples)
-        measured = _windows(model, study, folder)
-        if measured:
-            dimensions = {"maneuver": [*measured]} | dimensions
+        driven = _driven(model, study, folder)
+        if study.logs:
+            dimensions = {"maneuver": [*driven]} | dimensions
         if study.keep == "trajectories":
-            names = dimensions.get("maneuver", [study.maneuver or model.definition.maneuver])
-            driven = [measured[n].signal if measured else component("maneuver", n) for n in names]
-            _check_histories(model, driven, math.prod(map(len, dimensions.values())))
+            _check_histories(model, driven, dimensions)
         keys = np.empty([len(entry) for entry in dimensions.values()], KEY)
         experiments: dict[str, Experiment] = {}
         axes = {name: points for name, points in dimensions.items() if name != "label"}
         for number, entry in enumerate(study.methods):
             points = _points(axes, samples)
-            of_method = list(_of_method(model, study, entry, points, measured))
+            of_method = list(_of_method(model, study, entry, points, driven))
             # Settings that a method does not have give no further experiments of it.
             experiments |= {experiment.key: experiment for experiment in of_method}
             keys_of_method = np.array([experiment.key for experiment in of_method], KEY)
@@ -103,18 +100,25 @@ def _dimensions(
     return dimensions | {"label": list(study.labelled)}
 
 
-def _windows(model: Model, study: GridFile, folder: Path) -> dict[str, Window]:
-    """Windows of all logs of a study by their names."""
-    every = [part for log in study.logs for part in windows(log, folder, model.definition)]
-    by_name = {window.signal.name: window for window in every}
-    if len(by_name) < len(every):
-        raise InputError("logs: two windows have the same name: give one log a name")
-    return by_name
+def _driven(model: Model, study: GridFile, folder: Path) -> dict[str, Scenario]:
+    """What drives the runs, by its name on the axis of maneuvers."""
+    if not study.logs:
+        axis = study.grid.get("maneuver", [study.maneuver or model.definition.maneuver])
+        names = [str(name) for name in values(axis)]
+        return {name: Scenario(component("maneuver", name), model.starts[0]) for name in names}
+    every = [run for log in study.logs for run in windows(model, log, folder)]
+    driven = {run.maneuver.name: run for run in every}
+    if len(driven) < len(every):
+        raise InputError("two windows of logs have the same name: give one log a name")
+    return driven
 
 
-def _check_histories(model: Model, driven: Sequence[Excitation], number: int) -> None:
-    """Raise `InputError` if the histories of so many runs can't be held, or not side by side."""
-    first, *others = driven
+def _check_histories(
+    model: Model, driven: Mapping[str, Scenario], dimensions: Mapping[str, list[Any]]
+) -> None:
+    """Raise `InputError` if the histories of all runs can't be held, or not side by side."""
+    first, *others = [run.maneuver for run in driven.values()]
+    number = math.prod(map(len, dimensions.values()))
     columns = len(model.coordinates) + len(model.speeds) + 2 * len(model.outputs)
     size = 8.0 * first.samples * columns * number
     if size > MOST_BYTES:
@@ -142,7 +146,7 @@ def _of_method(
     study: GridFile,
     entry: MethodEntry,
     points: Iterator[dict[str, Any]],
-    measured: Mapping[str, Window],
+    driven: Mapping[str, Scenario],
 ) -> Iterator[Experiment]:
     """Experiments of a method at some points; `InputError` if its settings fit at none of them.
 
@@ -150,6 +154,7 @@ def _of_method(
     """
     names = set(default_settings(model, entry.method))
     first_refusal, fits = "", False
+    only = next(iter(driven))
     factors = tuple((one, other) for one, other in study.training_set)
     for point in points:
         given = entry.settings | {d: point[d] for d in study.grid if d in names}
@@ -157,10 +162,9 @@ def _of_method(
         parameters = {
             n.removeprefix(PARAMETER): v for n, v in point.items() if n.startswith(PARAMETER)
         }
-        name = point.get("maneuver", study.maneuver or model.definition.maneuver)
-        driven = measured[name] if measured else Window(component("maneuver", name), None)
-        factors_of_run = tuple(point[f] for f in FACTORS)
-        test = _checked(model, driven, factors_of_run, point["start"], overrides(parameters))
+        run = driven[str(point.get("maneuver", only))]
+        of_run = tuple(point[f] for f in FACTORS)
+        test = _checked(model, run, of_run, point["start"], overrides(parameters))
         training = entry.training or point.get("training", study.training)
         training = tuple(training) if isinstance(training, list) else (training,)
         learner = entry.method if "protocol" in training else ""
@@ -186,7 +190,7 @@ def _complete(model: Model, method: str, given: tuple[tuple[str, Any], ...], pre
 
 @lru_cache(maxsize=4096)
 def _checked(
-    model: Model, driven: Window, factors: tuple[float, float], start: str, parameters: Overrides
+    model: Model, run: Scenario, factors: tuple[float, float], start: str, parameters: Overrides
 ) -> Scenario:
     """A test scenario; `InputError` if the model can't be built or run so."""
     try:
@@ -194,8 +198,8 @@ def _checked(
     except VehiclemorError as error:
         given = ", ".join(f"{name} = {value}" for name, value in parameters)
         raise InputError(f"{given}: {error}") from None
-    excitation = driven.signal.perturbed(*factors)
-    scenario = Scenario(excitation, start, driven.speed, parameters)
+    driven = run.maneuver.perturbed(*factors)
+    scenario = replace(run, maneuver=driven, start=start, parameters=parameters)
     check(model, scenario)
     return scenario
 

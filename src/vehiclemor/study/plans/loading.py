@@ -11,13 +11,7 @@ from vehiclemor.arguments import file_path
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import data_folder, data_names, write_text
 from vehiclemor.registry import choice
-from vehiclemor.study.plans.study_file import (
-    OF_TEST,
-    SETS,
-    CollectionFile,
-    StudyFile,
-    schema_of,
-)
+from vehiclemor.study.plans.study_file import OF_TEST, SETS, CollectionFile, StudyFile, schema_of
 from vehiclemor.toml_files import FileSchema, fitting, toml_content
 
 # Between entries of a long list.

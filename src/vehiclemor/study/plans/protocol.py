@@ -9,19 +9,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from vehiclemor.exceptions import FileError, GeometryError, InputError, PlugInError
 from vehiclemor.files import data_names
-from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.registry import choice, component
+from vehiclemor.inputs.signal import Signal
+from vehiclemor.registry import choice
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import Experiment, Settings, complete_settings, make_experiment
 from vehiclemor.study.plans.loading import load_studies, read_study, study_path
-from vehiclemor.study.plans.logs import LogGroup, windows
+from vehiclemor.study.plans.logs import Log, windows
 from vehiclemor.study.plans.study_file import DRAWN, SETS, ProtocolEntry, ProtocolFile
 from vehiclemor.study.plans.study_runs import DECIMALS, Box, Draw, Group
 from vehiclemor.study.scenario import Scenario, check, overrides, own_speed
@@ -33,7 +33,7 @@ PREFIX = "predictive-"
 TRIES = 100
 
 Scenarios = tuple[Scenario, ...]
-Part = TypeVar("Part", Group | LogGroup, Box)
+Part = TypeVar("Part", Group | Log, Box)
 
 
 @dataclass(frozen=True)
@@ -95,9 +95,7 @@ class Protocol:
     @property
     def screened(self) -> list[str]:
         """Sets whose runs nobody has chosen one by one: in some the full order may be sensitive."""
-        listed = {name: getattr(self.definition, name) for name in ("test", "outside")}
-        logs = [n for n, parts in listed.items() if any(isinstance(p, LogGroup) for p in parts)]
-        return [*logs, *DRAWN]
+        return [name for name, runs in self.sets.items() if any(map(_measured, runs))] + [*DRAWN]
 
     def timed_runs(self, runs: int) -> list[int]:
         """Numbers of the runs of a set that are timed: all, or so many evenly spread over it."""
@@ -142,33 +140,33 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
         parts = [_checked(model, f"{key}, group {n}", make, group) for n, group in groups]
         sets[key] = tuple(itertools.chain(*parts))
     seen: dict[tuple, str] = {}
-    labels: set[str] = set()
+    run_labels: set[str] = set()
     for key, part in sets.items():
         for scenario in part:
             # What a method has learned from or was chosen by can't test it.
             run = scenario.run_key
-            if run in seen:
+            # Windows of logs may be alike, such as two without steering.
+            if run in seen and not (_measured(scenario) and seen[run] == key):
                 raise InputError(f"{key}: the scenario ({scenario.label}) is in {seen[run]} too")
             seen[run] = key
-            if scenario.label in labels:
+            if scenario.label in run_labels:
                 raise InputError(f"{key}: ({scenario.label}) are two runs: give one log a name")
-            labels.add(scenario.label)
+            run_labels.add(scenario.label)
     draws = definition.draws
     for key, draw in draws.items():
         for number, box in enumerate(draw.boxes, start=1):
             _checked(model, f"{key}, box {number}", _corners, box)
     entries = tuple(_entry(model, entry, sets["training"]) for entry in definition.methods)
-    rows = [label for entry in entries for label in entry.row_labels]
-    for label in rows:
-        if rows.count(label) > 1:
+    labels = [label for entry in entries for label in entry.row_labels]
+    for label in labels:
+        if labels.count(label) > 1:
             raise InputError(f"label {label!r} is used twice (of full order with the tolerance)")
     if straight:
         boxes = [box for draw in draws.values() for box in draw.boxes]
-        listed = [p for p in (*definition.test, *definition.outside) if isinstance(p, Group)]
-        driven = {part.maneuver for part in (*listed, *boxes)}
+        driven = {part.maneuver for part in (*definition.test, *definition.outside, *boxes)}
         choice("maneuver of a test, in straight", straight.maneuver, sorted(driven))
     for target in definition.targets:
-        known = ["equal accuracy", "within bounds", *rows]
+        known = ["equal accuracy", "within bounds", *labels]
         if definition.extends and target.against not in known:
             (base,) = load_studies(definition.extends).values()
             raise InputError(
@@ -177,6 +175,10 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
             )
         choice("row that a target is against", target.against, known)
     return Protocol(name, path, definition, model, sets, entries, seed)
+
+
+def _measured(scenario: Scenario) -> bool:
+    return isinstance(scenario.maneuver, Signal)
 
 
 def _checked(
@@ -192,27 +194,22 @@ def _checked(
     return scenarios
 
 
-def _of_group(model: Model, part: Group | LogGroup, folder: Path = Path()) -> list[Scenario]:
-    """Every point of a group, or every window of a log of a folder, from every start."""
+def _of_group(model: Model, group: Group | Log, folder: Path = Path()) -> list[Scenario]:
+    """Every point of a group from every start, or every window of a log of a folder."""
+    if isinstance(group, Log):
+        return windows(model, group, folder)
+    lists = group.frequency or [1.0], group.amplitude or [1.0]
+    # A point may leave the speed to the model.
+    speeds = [[speed] for speed in group.speed] or [[]]
+    products = itertools.product(*lists, speeds)
+    points = group.points or [[frequency, size, *speed] for frequency, size, speed in products]
+    samples = itertools.product(*group.parameters.values())
+    tables = [overrides(dict(zip(group.parameters, sample, strict=True))) for sample in samples]
     usual_speed = own_speed(model)
-    lists = part.frequency or [1.0], part.amplitude or [1.0], part.speed or [usual_speed]
-    points = [*itertools.product(*lists)]
-    driven: list[tuple[Excitation, Sequence[Any]]] = []
-    if isinstance(part, Group):
-        maneuver = component("maneuver", part.maneuver)
-        driven = [(maneuver, point) for point in part.points or points]
-    else:
-        for signal, speed in windows(part, folder, model.definition):
-            driven += [
-                (signal, point if speed is None else (*point[:2], speed)) for point in points
-            ]
-    samples = itertools.product(*part.parameters.values())
-    tables = [overrides(dict(zip(part.parameters, sample, strict=True))) for sample in samples]
     return [
-        # A point may leave the speed to the model.
-        Scenario(excitation.perturbed(*point[:2]), start, [*point, usual_speed][2], table)
-        for excitation, point in driven
-        for start in part.start or model.starts[:1]
+        Scenario.of(group.maneuver, point[:2], start, point[2] if point[2:] else usual_speed, table)
+        for point in points
+        for start in group.start or model.starts[:1]
         for table in tables
     ]
 

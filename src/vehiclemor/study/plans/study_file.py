@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import BeforeValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from vehiclemor.exceptions import InputError, did_you_mean
-from vehiclemor.study.plans.logs import Log, LogGroup
+from vehiclemor.study.plans.logs import Log
 from vehiclemor.study.plans.study_runs import (
     MOST_POINTS,
     PARAMETER,
@@ -39,7 +39,7 @@ Training = str | Annotated[list[str], Field(min_length=1)]
 Settings = dict[str, int | float | str]
 # By its form, so that what is wrong with one is not read as the other.
 Part = Annotated[
-    Annotated[Group, Tag("maneuver")] | Annotated[LogGroup, Tag("log")],
+    Annotated[Group, Tag("maneuver")] | Annotated[Log, Tag("log")],
     Discriminator(lambda value: "log" if "log" in dict(value) else "maneuver"),
 ]
 Parts = Annotated[list[Part], Field(min_length=1)]
@@ -281,7 +281,7 @@ class ProtocolFile(StudyOfModel):
     )
     sensitive: dict[str, Limit] = table_of(
         "output -> largest value of the full order's run in the first 10 s; beyond it "
-        "(spin, rollover) a drawn run is not judged"
+        "(spin, rollover) a drawn or measured run is not judged"
     )
     targets: list[SpeedTarget] = list_of("speed that is aimed at")
     failure_rate: float | None = Field(

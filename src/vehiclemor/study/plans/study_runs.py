@@ -106,10 +106,16 @@ def values(entry: Axis) -> list[int | float | str]:
     return list(entry)
 
 
-class Runs(FileSchema):
-    """Lists, every combination of which is a run of what drives the model."""
+class Group(FileSchema):
+    """Scenarios of one maneuver: every point, from every start.
 
+    Points are rows (frequency, amplitude) or (frequency, amplitude, speed); without them they are
+    all combinations of the three lists.
+    """
+
+    maneuver: str = Field(description="registered name")
     start: list[str] = list_of("initial conditions; the model's first by default")
+    points: list[list[float]] = list_of("[frequency, amplitude] or [frequency, amplitude, speed]")
     frequency: list[float] = list_of("factors, 1 by default")
     amplitude: list[float] = list_of("factors, 1 by default")
     speed: list[float] = list_of("m/s, that of the model by default")
@@ -120,37 +126,19 @@ class Runs(FileSchema):
     @property
     def scenarios(self) -> int:
         """How many scenarios it is."""
-        lists = (self.frequency, self.amplitude, self.speed, self.start, *self.parameters.values())
-        return math.prod(len(entry) or 1 for entry in lists)
+        lists = (self.frequency, self.amplitude, self.speed)
+        points = len(self.points) or math.prod(len(entry) or 1 for entry in lists)
+        samples = math.prod(len(entry) for entry in self.parameters.values())
+        return points * samples * (len(self.start) or 1)
 
     @model_validator(mode="after")
-    def _not_empty(self) -> "Runs":
-        for name in self.model_fields_set:
-            if getattr(self, name) in ([], {}):
+    def _either(self) -> "Group":
+        for name in self.model_fields_set - {"maneuver"}:
+            if not getattr(self, name):
                 raise ValueError(f"{name} is empty")
         for name, values in self.parameters.items():
             if not values or not all(map(math.isfinite, values)):
                 raise ValueError(f"parameters: {name} is not a list of finite numbers")
-        return self
-
-
-class Group(Runs):
-    """Scenarios of one maneuver: every point, from every start.
-
-    Points are rows (frequency, amplitude) or (frequency, amplitude, speed); without them they are
-    all combinations of the three lists.
-    """
-
-    maneuver: str = Field(description="registered name")
-    points: list[list[float]] = list_of("[frequency, amplitude] or [frequency, amplitude, speed]")
-
-    @property
-    def scenarios(self) -> int:
-        """How many scenarios it is."""
-        return super().scenarios * (len(self.points) or 1)
-
-    @model_validator(mode="after")
-    def _either(self) -> "Group":
         if self.points and (self.frequency or self.amplitude or self.speed):
             raise ValueError("give points or lists of factors, not both")
         if any(len(point) not in (2, 3) for point in self.points):
