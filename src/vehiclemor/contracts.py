@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.definition import STATE_KINDS, ModelDefinition
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import checked_run, fitted, validated
@@ -39,7 +39,7 @@ def check_model(name: str) -> None:
     stands, and the derivatives of its port forces are theirs.
     """
     model, definition = build(name), _definition(name)
-    for kind in ("coordinates", "speeds", "inputs", "outputs", "ports"):
+    for kind in (*STATE_KINDS, "inputs", "outputs", "ports"):
         quantities = getattr(definition, kind)
         assert all(q.unit and q.long_name for q in quantities), f"{name}: unit or meaning missing"
     try:
@@ -80,7 +80,7 @@ def _check_algebraic(model: AlgebraicModel, maneuver: Excitation) -> None:
 
 def _check_dynamic(model: Any, maneuver: Excitation) -> None:
     name = model.name
-    size = len(model.coordinates) + len(model.speeds)
+    size = len(model.definition.states)
     u = maneuver.at(maneuver.times)[0]
     for start in model.starts:
         derivative = model.rhs(model.start(start), u)

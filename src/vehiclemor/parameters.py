@@ -1,5 +1,7 @@
 """Parameter sets: every value with its unit, source and status, validated on loading."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -74,9 +76,21 @@ class ParameterFile(FileSchema):
     """Schema of `data/parameters/*.toml`."""
 
     model: str = Field(description="registered name")
+    extends: str = Field(
+        "", description="model whose public data hold what is missing here; none by default"
+    )
     title: Line = Field(description="one line")
     sources: dict[str, Source] = Field(description="key -> where values come from")
     parameters: dict[str, Parameter] = Field(description="name -> value; all that the model needs")
+
+    def completed(self) -> ParameterFile:
+        """The file with the sources and parameters of the file that it extends."""
+        if not self.extends:
+            return self
+        base = read_toml(parameter_path(self.extends), ParameterFile)
+        sources = {**base.sources, **self.sources}
+        parameters = {**base.parameters, **self.parameters}
+        return self.model_copy(update={"sources": sources, "parameters": parameters})
 
 
 @dataclass(frozen=True)
@@ -118,7 +132,7 @@ def load_parameters(
     or has a wrong unit or value; `InputError` if an override names no parameter or does not fit.
     """
     path = path or parameter_path(model)
-    content = read_toml(path, ParameterFile)
+    content = read_toml(path, ParameterFile).completed()
     if content.model != model:
         raise FileError(f"{path}: parameters of model {content.model!r}, not of {model!r}")
     in_file = {name: declared for name, declared in expected.items() if declared.default is None}

@@ -127,7 +127,7 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
     return ExportedSystem(
         name,
         model.summary,
-        (*definition.coordinates, *definition.speeds),
+        definition.state_quantities,
         definition.inputs,
         definition.outputs,
         parameter_quantities(model),
@@ -213,7 +213,7 @@ def reduced_system(
     constants; none where the states are the model's.
     """
     model, system = reduced.model, reduced.system
-    definition, full = model.definition, 2 * len(model.coordinates)
+    definition, full = model.definition, len(model.definition.states)
     lines = Lines()
     arrays = {
         "_x": lines.entries("x", len(reduced.states)),
@@ -248,7 +248,7 @@ def reduced_system(
     if trust:
         outputs.append(lines.largest(trust))
         quantities = (*quantities, TRUST)
-    of_model = {q.name: q for q in (*definition.coordinates, *definition.speeds)}
+    of_model = {q.name: q for q in definition.state_quantities}
     states = [of_model.get(n, Quantity(n, "1", "reduced coordinate")) for n in reduced.states]
     at_rest = np.zeros(system.inputs)
     return ExportedSystem(

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Algebraic equations; ordinary differential equations; those with constraints; sparse matrices.
 KINDS = ("ae", "ode", "dae", "structural")
+# Quantities that are states, in their order.
+STATE_KINDS = ("coordinates", "speeds", "further_states")
 # A mechanism without forces has no equilibrium to find: the name stands for its design position,
 # so that studies can name the same start for every kind of model.
 DESIGN_START = "equilibrium"
@@ -96,6 +98,8 @@ class ModelDefinition(ShortRepr):
         Quantities in order; inputs are those of every run.  A state is the coordinates and, after
         them, as many speeds; models of kind `ae` have no speeds.  Coordinates of a structure have
         no names: there are none.
+    further_states
+        States of first order, which follow the speeds (kind `ode`).
     equations
         Residual equations with their units (kind `ae`).
     constraints
@@ -172,12 +176,12 @@ class ModelDefinition(ShortRepr):
     (n x (n + 1): Jacobian, then residual), `newton_step` (n), `outputs`, and `joints` (points x 3).
 
     That of the other kinds has functions over `x` (2 n) and `u`: `derivative` (2 n) and `outputs`;
-    for mechanical models also `second_order` (n x (n + 1): mass matrix M and forces F of M q'' = F
-    in the coordinates, forces of constraints included), and `speeds` (n: the speeds where x holds
-    the rates of the coordinates in their place).  Models with c constraints have `descriptor`
-    ((n + c) x (n + 1): mass matrix and applied forces, less inertial ones, below them Jacobian and
-    right side of the stabilised constraints on q'') and `violations` (c x 2: constraints and their
-    rates).
+    further states follow in both.  Mechanical models without further states have also
+    `second_order` (n x (n + 1): mass matrix M and forces F of M q'' = F in the coordinates, forces
+    of constraints included), and `speeds` (n: the speeds where x holds the rates of the coordinates
+    in their place).  Models with c constraints have `descriptor` ((n + c) x (n + 1): mass matrix
+    and applied forces, less inertial ones, below them Jacobian and right side of the stabilised
+    constraints on q'') and `violations` (c x 2: constraints and their rates).
     """
 
     repr_fields = ("name", "kind", "summary")
@@ -194,6 +198,7 @@ class ModelDefinition(ShortRepr):
     optional_inputs: tuple[Quantity, ...] = ()
     choice: InputChoice = DEFAULTS
     speeds: tuple[Quantity, ...] = ()
+    further_states: tuple[Quantity, ...] = ()
     equations: tuple[Quantity, ...] = ()
     joints: tuple[str, ...] = ()
     constraints: tuple[Quantity, ...] = ()
@@ -222,8 +227,13 @@ class ModelDefinition(ShortRepr):
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """Names of the coordinates and, after them, of the speeds."""
-        return tuple(q.name for q in (*self.coordinates, *self.speeds))
+        """Names of the coordinates and, after them, of the speeds and of further states."""
+        return tuple(quantity.name for quantity in self.state_quantities)
+
+    @property
+    def state_quantities(self) -> tuple[Quantity, ...]:
+        """Coordinates, speeds and further states."""
+        return (*self.coordinates, *self.speeds, *self.further_states)
 
     def __post_init__(self) -> None:
         """Refuse what contradicts itself, so that a plug-in's author reads one clear line."""
@@ -233,12 +243,12 @@ class ModelDefinition(ShortRepr):
             raise InputError(
                 f"model {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}"
             )
-        for kind in ("coordinates", "speeds", "inputs", "optional_inputs", "outputs"):
+        for kind in (*STATE_KINDS, "inputs", "optional_inputs", "outputs"):
             quantities = getattr(self, kind)
             if not all(isinstance(quantity, Quantity) for quantity in quantities):
                 raise InputError(f"model {self.name!r}: {kind} must be quantities with units")
             names = [quantity.name for quantity in quantities]
-            optional = kind in ("speeds", "optional_inputs") or (
+            optional = kind in ("speeds", "further_states", "optional_inputs") or (
                 kind == "coordinates" and self.kind == "structural"
             )
             if len(set(names)) != len(names) or not (names or optional):
@@ -257,6 +267,10 @@ class ModelDefinition(ShortRepr):
             raise InputError(
                 f"model {self.name!r} of kind {self.kind} has {len(self.coordinates)} coordinates "
                 f"and {len(self.speeds)} speeds, not {expected}"
+            )
+        if self.further_states and self.kind != "ode":
+            raise InputError(
+                f"model {self.name!r} of kind {self.kind} has further_states; only kind ode has any"
             )
         if self.heading_pairs and len(self.planar) != 3:
             raise InputError(f"model {self.name!r} has heading_pairs, but no heading in planar")

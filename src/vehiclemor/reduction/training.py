@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.multibody.definition import STATE_KINDS
 from vehiclemor.multibody.quantities import DROP, Quantity
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
-HISTORIES = ("times", "inputs", "states", "coordinates", "speeds", "outputs", "counts")
+HISTORIES = ("times", "inputs", "states", "outputs", "counts", *STATE_KINDS)
 # Parameter with the speed (m/s) at which a vehicle starts.
 SPEED = "initial_speed"
 # An input that is no larger was zero in training.

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError, PlugInError, blamed
 from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.multibody.definition import STATE_KINDS
 from vehiclemor.reduction.fallback import with_fallback
 from vehiclemor.reduction.interface import MEMBERS, FittedModel, Method, OfflineCost
 from vehiclemor.reduction.settings import AT_MOST_COORDINATES, Settings
@@ -110,7 +111,7 @@ def checked_run(model: Model, maneuver: Excitation, start: Start, reduced: Any) 
     whose += " gives"
     if not isinstance(run, Trajectory):
         raise PlugInError(f"{whose} {quoted(run)}, no Trajectory")
-    columns = {name: (len(getattr(model, name)),) for name in ("coordinates", "speeds", "outputs")}
+    columns = {name: (len(getattr(model, name)),) for name in (*STATE_KINDS, "outputs")}
     for name, size in {"times": (), **columns}.items():
         shape = (maneuver.samples, *size)
         values = np.asarray(getattr(run, name))

@@ -53,6 +53,7 @@ QUANTITIES = (
     "outputs",
     "coordinates",
     "speeds",
+    "further_states",
     "equations",
     "constraints",
     "ports",
@@ -118,7 +119,7 @@ def _model(
         ],
         "sources": [
             {"source": key, "licence": source.licence, "text": source.text}
-            for key, source in read_toml(path, ParameterFile).sources.items()
+            for key, source in read_toml(path, ParameterFile).completed().sources.items()
         ],
     }
 

@@ -181,7 +181,7 @@ def _count_of(signals: Any, model: Model) -> int:
 
 def _names(model: Model, outputs: Names) -> tuple[str, ...]:
     """Names of what is kept; `InputError` if the model has no such quantity."""
-    known = *model.outputs, *model.coordinates, *model.speeds
+    known = *model.outputs, *model.definition.states
     names = model.outputs if outputs is None else output_names(outputs)
     return tuple(choice("output", name, known) for name in names)
 
@@ -287,7 +287,7 @@ def _dataset(
     """Runs by labels: their values (run, time, output), what else there is of them, counts."""
     import xarray as xr
 
-    declared = (*model.definition.outputs, *model.definition.coordinates, *model.definition.speeds)
+    declared = (*model.definition.outputs, *model.definition.state_quantities)
     units = {quantity.name: quantity.unit for quantity in reversed(declared)}
     described = REPORTED | {name: ("1", long_name) for name, long_name in model.counts.items()}
     variables: dict[str, Any] = {

@@ -238,11 +238,14 @@ def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
     elif definition.kind == "structural":
         needed, further = {"port_forces": (len(definition.ports), 3)}, {}
     else:
-        needed = {"derivative": (2 * n,)}
+        needed = {"derivative": (len(definition.states),)}
         further = {"second_order": (n, n + 1), "speeds": (n,), "violations": (constraints, 2)}
         further["descriptor"] = (n + constraints, n + 1)
     if definition.kind != "structural":
         needed["outputs"] = (outputs,)
+    if definition.further_states:
+        for function in {"second_order", "speeds"}.intersection(equations.shapes):
+            raise InputError(f"model {definition.name!r} has further states, so no {function}")
     for function, shape in (needed | further).items():
         derived = equations.shapes.get(function)
         if derived is None and function in needed:

@@ -13,6 +13,7 @@ from vehiclemor.arguments import loop_array, number
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.multibody.definition import STATE_KINDS
 from vehiclemor.simulation.checks import left_validity, stopped, wheel_remarks
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.evaluation import By, chosen
@@ -41,7 +42,7 @@ REFERENCE_SOLVER, REFERENCE_TOLERANCE = "dopri5", 1e-8
 
 @dataclass(frozen=True, eq=False)
 class DynamicModel(Model):
-    """Compiled first-order equations dx/dt = f(x, u), x = (coordinates, speeds).
+    """Compiled first-order equations dx/dt = f(x, u), x = (coordinates, speeds, further states).
 
     Near is a model of similar parameters, whose operators and workspaces serve this one too.
     """
@@ -175,7 +176,7 @@ class DynamicModel(Model):
         trajectory = self.integrate(
             maneuver,
             self.start(start),
-            whole_space(2 * len(self.coordinates)),
+            whole_space(len(self.definition.states)),
             Solver(
                 solver,
                 REFERENCE_TOLERANCE if tolerance is None else tolerance,
@@ -238,11 +239,11 @@ class DynamicModel(Model):
         """Trajectory of a run whose path has been brought to the model's states.
 
         Inputs are those at the output times (samples, inputs); states stand where the run is
-        recorded, 2 n columns and what may follow them.  Trust is what a reduced model tells of the
-        run.  Where outputs are named, these alone are computed; else all can be read.
+        recorded, those of the model and what may follow them.  Trust is what a reduced model tells
+        of the run.  Where outputs are named, these alone are computed; else all can be read.
         """
         remark = "" if maneuver is None else cut_short(maneuver)
-        recorder, times, n = self._recorder, run.times, 2 * len(self.coordinates)
+        recorder, times, n = self._recorder, run.times, len(self.definition.states)
         at_points = run.recorded_at(inputs)[1]
         first = recorder.first_outside(run, at_points, states)
         limited, message, end = len(recorder.limited), run.failure, len(times)
@@ -280,7 +281,7 @@ class DynamicModel(Model):
         }
         if outputs not in (None, self.outputs) and not message:
             histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]
-            fields |= {"names": outputs, "coordinates": nothing, "speeds": nothing}
+            fields |= {"names": outputs, **dict.fromkeys(STATE_KINDS, nothing)}
             trajectory = Trajectory.of(**fields, outputs=histories)
         else:
             points = points[0][:, :n], *points[1:]

@@ -46,7 +46,8 @@ NEEDED_FOR = {
 class Model(ShortRepr):
     """A model with one parameter set, as studies, methods and reports see it.
 
-    A state is the coordinates and, after them, the speeds; kinematic models have no speeds.
+    A state is the coordinates and, after them, the speeds and further states; kinematic models have
+    coordinates alone.
 
     Attributes
     ----------
@@ -101,6 +102,11 @@ class Model(ShortRepr):
     def speeds(self) -> tuple[str, ...]:
         """Names of the speeds."""
         return tuple(q.name for q in self.definition.speeds)
+
+    @cached_property
+    def further_states(self) -> tuple[str, ...]:
+        """Names of the states of first order behind the speeds."""
+        return tuple(q.name for q in self.definition.further_states)
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:

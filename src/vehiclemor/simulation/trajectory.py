@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.arguments import check_shapes, quoted, real_array
 from vehiclemor.exceptions import InputError
-from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.multibody.definition import STATE_KINDS, ModelDefinition
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.run_timer import CLOCK
@@ -19,7 +19,7 @@ from vehiclemor.simulation.run_timer import CLOCK
 if TYPE_CHECKING:
     import xarray as xr
 
-HISTORIES = ("coordinates", "outputs", "inputs", "speeds")
+HISTORIES = ("coordinates", "outputs", "inputs", "speeds", "further_states")
 # Times (s) that differ by less are one.
 SAME_TIME = 1e-9
 
@@ -86,7 +86,7 @@ class Trajectory(ShortRepr):
     ----------
     times
         Output times (samples,) in s.
-    inputs, coordinates, speeds, outputs
+    inputs, coordinates, speeds, further_states, outputs
         Histories (samples, number of quantities), SI units; a kinematic model has 0 speeds.
     counts
         Solver counts by name, those of `Model.counts`.
@@ -126,9 +126,15 @@ class Trajectory(ShortRepr):
     model: Any = None
     method: str = ""
     maneuver: str = ""
+    further_states: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None
+
+    def __post_init__(self) -> None:
+        """By default there are no further states at all samples."""
+        if not self.further_states.size:
+            object.__setattr__(self, "further_states", self.inputs[:, :0])
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if histories are of other samples than the times."""
@@ -151,14 +157,17 @@ class Trajectory(ShortRepr):
     def __getattr__(self, name: str) -> Any:
         """Histories that nobody has read so far, see `of`."""
         fields = self.__dict__
-        if name not in ("coordinates", "speeds", "outputs") or "recording" not in fields:
+        if name == "further_states" and "recording" not in fields:
+            return self.inputs[:, :0]
+        if name not in (*STATE_KINDS, "outputs") or "recording" not in fields:
             raise AttributeError(f"{type(self).__name__} has no {name}")
         recording, n = fields["recording"], len(fields["model"].coordinates)
         if name == "outputs":
             fields[name] = recording.output_history
         else:
             fields["coordinates"] = recording.state_history[:, :n]
-            fields["speeds"] = recording.state_history[:, n:]
+            fields["speeds"] = recording.state_history[:, n : 2 * n]
+            fields["further_states"] = recording.state_history[:, 2 * n :]
         return fields[name]
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -172,7 +181,7 @@ class Trajectory(ShortRepr):
         recording = self.__dict__.get("recording")
         groups = {"outputs": self.names}
         if recording is not None or self.coordinates.shape[1]:
-            groups |= {group: getattr(self.model, group, ()) for group in ("coordinates", "speeds")}
+            groups |= {group: getattr(self.model, group, ()) for group in STATE_KINDS}
         columns = {
             name: (group, column)
             for group in reversed(groups)
@@ -204,11 +213,11 @@ class Trajectory(ShortRepr):
             names = output_names(outputs)
             nothing = self.inputs[:, :0]
             fields.pop("recording", None)
-            fields |= {"names": names, "coordinates": nothing, "speeds": nothing}
+            fields |= {"names": names, **dict.fromkeys(STATE_KINDS, nothing)}
             fields["outputs"] = self._columns(names)
         if times is not None:
             rows = sample_rows(times, self.times)
-            for history in ("times", "inputs", "coordinates", "speeds", "outputs"):
+            for history in ("times", "inputs", *STATE_KINDS, "outputs"):
                 if history in fields:
                     fields[history] = fields[history][rows]
             if "recording" in fields:
@@ -241,8 +250,8 @@ class Trajectory(ShortRepr):
 
     @property
     def states(self) -> np.ndarray:
-        """Coordinates and speeds side by side (samples, n)."""
-        return np.hstack((self.coordinates, self.speeds))
+        """Coordinates, speeds and further states side by side (samples, n)."""
+        return np.hstack((self.coordinates, self.speeds, self.further_states))
 
 
 def output_names(outputs: Any, what: str = "outputs") -> tuple[str, ...]:
@@ -321,7 +330,7 @@ def _labels(
 
     seconds = np.frombuffer(times)
     labels: dict[str, tuple] = {"time": ("time", seconds, {"units": "s", "long_name": "time"})}
-    declared = (*definition.outputs, *definition.coordinates, *definition.speeds)
+    declared = (*definition.outputs, *definition.state_quantities)
     known = {quantity.name: quantity for quantity in reversed(declared)}
     for name in histories:
         quantities, label = getattr(definition, name), name.removesuffix("s")

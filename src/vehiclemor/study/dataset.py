@@ -131,7 +131,7 @@ def _write(protocol: Protocol, folder: Path) -> None:
 def _runs(model: Model, scenarios: Sequence[Scenario], work: str) -> xr.Dataset:
     """Full-order runs, one behind the other (contiguous ragged arrays of the CF conventions)."""
     definition = model.definition
-    states = (*definition.coordinates, *definition.speeds)
+    states = definition.state_quantities
     rates = [
         Quantity(f"rate_of_{state.name}", f"{state.unit}/s", f"rate of: {state.long_name}")
         for state in (states if definition.speeds else ())

@@ -17,6 +17,7 @@ from vehiclemor.failure import Failure
 from vehiclemor.files import data_folder
 from vehiclemor.inputs.checks import completed
 from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.multibody.definition import STATE_KINDS
 from vehiclemor.provenance import attributes
 from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.registry import component
@@ -142,13 +143,21 @@ def _compared(
 
 def _missing(model: Model, maneuver: Excitation, failure: Failure) -> Trajectory:
     times = maneuver.times
-    coordinates, speeds, outputs = (
-        np.full((len(times), len(names)), np.nan)
-        for names in (model.coordinates, model.speeds, model.outputs)
-    )
+    histories = {
+        kind: np.full((len(times), len(getattr(model, kind))), np.nan)
+        for kind in (*STATE_KINDS, "outputs")
+    }
     maneuver = completed(maneuver, model.definition)
-    inputs, end = maneuver.at(times), (failure.status, failure.message)
-    return Trajectory(times, inputs, coordinates, speeds, outputs, {}, np.nan, *end)
+    inputs = maneuver.at(times)
+    return Trajectory.of(
+        times=times,
+        inputs=inputs,
+        **histories,
+        counts={},
+        seconds=np.nan,
+        status=failure.status,
+        message=failure.message,
+    )
 
 
 def _measured(model: Model, outcome: Outcome) -> dict[str, object]:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from vehiclemor.multibody.components.body import Attitude
+from vehiclemor.multibody.components.slip import SlipLaw
 from vehiclemor.multibody.components.wheel_inputs import WheelInputs
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
@@ -46,6 +47,7 @@ class WheelOnRoad:
     # Force on the wheel in N and its moment about the wheel centre in N m.
     force: Vector
     moment: Vector
+    slip_rates: tuple[sp.Expr, ...] = ()  # Rates of the states that the slips follow from.
 
 
 @dataclass(frozen=True)
@@ -247,6 +249,7 @@ def upright_wheel(
     rotation: Vector,
     p: Mapping[str, sp.Expr],  # Parameters of the vehicle.
     inputs: WheelInputs,
+    slip_law: SlipLaw,
 ) -> WheelOnRoad:
     """A wheel whose effective radius is the height of its centre, with the Magic Formula.
 
@@ -261,11 +264,10 @@ def upright_wheel(
     arm = g.named(tape, up * -above)
     sliding = g.named(tape, velocity + rotation.cross(arm))
     forward = let(heading @ velocity)
-    speed = let(sp.sqrt(let(forward**2 + p["slip_speed"] ** 2)))
-    lateral = let(let(leftward @ sliding) / speed)
+    slip = slip_law(tape, p, forward, let(heading @ sliding), let(leftward @ sliding))
     rise = let(let(up @ velocity) - inputs.road_rate)
-    ratio, angle = let(-let(heading @ sliding) / speed), let(sp.atan(lateral))
-    slips = ratio, angle, let(1 / sp.sqrt(let(1 + lateral**2)))
+    cos_angle = let(1 / sp.sqrt(let(1 + slip.tangent**2)))
+    slips = slip.ratio, let(sp.atan(slip.tangent)), cos_angle
 
     pressed = let(p["tire_stiffness"] * (p["tire_radius"] - above) - p["tire_damping"] * rise)
     load = let((pressed + sp.Abs(pressed)) / 2)
@@ -274,7 +276,8 @@ def upright_wheel(
     shear = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral)
     moment = arm.cross(shear) + up * tire.aligning
     force = g.named(tape, shear + up * load)
-    return WheelOnRoad(tire, load, ratio, lateral, force, g.named(tape, moment))
+    moment = g.named(tape, moment)
+    return WheelOnRoad(tire, load, slip.ratio, slip.tangent, force, moment, slip.rates)
 
 
 def tilted_wheel(

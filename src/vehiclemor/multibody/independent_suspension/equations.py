@@ -1,10 +1,12 @@
 """Equations of the 14-DOF vehicle: Kane's equations of its five bodies and four spinning wheels."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from vehiclemor.multibody.components import body
+from vehiclemor.multibody.components.slip import SlipLaw, static_slip
 from vehiclemor.multibody.components.tires import (
     Corner,
     kane_with_corners,
@@ -14,6 +16,7 @@ from vehiclemor.multibody.components.tires import (
 from vehiclemor.multibody.components.wheel_inputs import WheelInputs, wheel_inputs
 from vehiclemor.multibody.independent_suspension.definition import DECLARED, Derived, derived
 from vehiclemor.multibody.quantities import DEFAULTS, WHEELS, InputChoice
+from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic import mechanics
 from vehiclemor.symbolic.elimination import eliminate_symmetric
@@ -23,11 +26,21 @@ from vehiclemor.symbolic.tape import Tape
 
 def derive(choice: InputChoice = DEFAULTS) -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
+    return derive_with(choice, DECLARED["parameters"], [static_slip] * len(WHEELS))
+
+
+def derive_with(
+    choice: InputChoice,
+    declared_parameters: Mapping[str, Declared],
+    slip_laws: Sequence[SlipLaw],  # Of the wheels.
+    further_states: Sequence[sp.Symbol] = (),
+) -> Program:
+    """As `derive`, by other laws of slip, the second-order form without further states alone."""
     tape = Tape()
-    vehicle = _vehicle(tape, choice)
+    vehicle = _vehicle(tape, choice, declared_parameters)
     q, nu, attitude = vehicle.q, vehicle.nu, vehicle.attitude
     sprung = _sprung_body(tape, vehicle)
-    wheels = [_wheel(tape, vehicle, number) for number in range(4)]
+    wheels = [_wheel(tape, vehicle, number, law) for number, law in enumerate(slip_laws)]
     mass, force = kane_with_corners(tape, sprung, wheels, range(6, 10), len(nu))
     for row, spin, inputs in zip(range(10, 14), nu[10:], vehicle.at_wheels, strict=True):
         # Reactions act on the carrier, which does not turn in the chassis.
@@ -36,21 +49,25 @@ def derive(choice: InputChoice = DEFAULTS) -> Program:
     order = [*range(10, 14), *range(6, 10), *range(6)]
     solved = eliminate_symmetric(tape, mass, force, order)
     rates = [*body.rates(tape, attitude, nu), *nu[6:]]
-    second_order = body.in_coordinates(tape, attitude, nu, mass, force)
     n = len(q)
+    # Rates of the further states: first those of all wheels that come first at each of them.
+    by_kind = zip(*(corner.wheel.slip_rates for corner in wheels), strict=True)
+    slip_rates = [rate for of_wheels in by_kind for rate in of_wheels]
+    derivative = [*rates, *(solved[k] for k in range(n)), *slip_rates]
+    outputs = [*body.outputs(q, nu), *tire_outputs(tape, wheels)]
+    functions = {
+        "derivative": (derivative, (len(derivative),)),
+        "outputs": (outputs, (len(outputs),)),
+    }
+    if not further_states:
+        second_order = body.in_coordinates(tape, attitude, nu, mass, force)
+        functions["second_order"] = second_order, (n, n + 1)
+        functions["speeds"] = [*body.speeds(tape, attitude, nu), *nu[6:]], (n,)
     return assemble(
         tape,
-        {"x": [*q, *nu], "u": vehicle.inputs.driven},
+        {"x": [*q, *nu, *further_states], "u": vehicle.inputs.driven},
         [*vehicle.p.values(), *vehicle.inputs.constant],
-        {
-            "derivative": ([*rates, *(solved[k] for k in range(n))], (2 * n,)),
-            "outputs": (
-                [*body.outputs(q, nu), *tire_outputs(tape, wheels)],
-                (len(DECLARED["outputs"]),),
-            ),
-            "second_order": (second_order, (n, n + 1)),
-            "speeds": ([*body.speeds(tape, attitude, nu), *nu[6:]], (n,)),
-        },
+        functions,
     )
 
 
@@ -78,11 +95,13 @@ class _Vehicle:
         return self.attitude.road_normal * -self.p["gravity"]
 
 
-def _vehicle(tape: Tape, choice: InputChoice) -> _Vehicle:
+def _vehicle(
+    tape: Tape, choice: InputChoice, declared_parameters: Mapping[str, Declared]
+) -> _Vehicle:
     """The sprung body on the road."""
     q, nu = (body.symbols(DECLARED[k]) for k in ("coordinates", "speeds"))
     inputs = body.inputs(DECLARED["inputs"], choice)
-    p = body.parameters(DECLARED["parameters"])
+    p = body.parameters(declared_parameters)
     attitude, d = body.attitude(tape, q), derived(p)
     pairs = {
         k: tuple(map(tape.let, getattr(d, k))) for k in ("sprung_distance", "depth", "preload")
@@ -105,7 +124,7 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
     return mechanics.Body(mass, origin, v.weight * mass + pushed, rotation, inertia)
 
 
-def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> Corner:
+def _wheel(tape: Tape, v: _Vehicle, wheel: int, slip_law: SlipLaw) -> Corner:
     """A wheel of number 0 to 3 with its load, tire and spring."""
     p, d, frame, front = v.p, v.derived, v.frame, wheel < 2
     end, side = (0, "front") if front else (1, "rear")
@@ -126,7 +145,7 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int) -> Corner:
     about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
     rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
     motion = hub, axle, centre.value, rotation.value
-    on_road = upright_wheel(tape, v.attitude, v.q[2], *motion, p, v.at_wheels[wheel])
+    on_road = upright_wheel(tape, v.attitude, v.q[2], *motion, p, v.at_wheels[wheel], slip_law)
     mass = p["unsprung_mass"]
     applied = g.named(tape, on_road.force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate

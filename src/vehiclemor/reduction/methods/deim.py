@@ -57,8 +57,8 @@ class InterpolatedProjection(DynamicProjection):
 def check(model: DynamicModel, settings: DeimSettings) -> None:
     """Raise `InputError` if the settings don't fit the model or each other."""
     dynamic.check_subspace(model, settings)
-    if not settings.rank <= settings.rows <= 2 * len(model.coordinates):
-        most = 2 * len(model.coordinates)
+    if not settings.rank <= settings.rows <= len(model.definition.states):
+        most = len(model.definition.states)
         raise InputError(f"rows is {settings.rows}; it must be from rank {settings.rank} to {most}")
 
 

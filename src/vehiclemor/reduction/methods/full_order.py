@@ -131,7 +131,7 @@ class FullOrderSystem(FullOrder, ReducedSystem):
     @cached_property
     def spaces(self) -> ControlPeriods:
         """All of the state space."""
-        return whole_space(2 * len(self.model.coordinates))
+        return whole_space(len(self.model.definition.states))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.arguments import require
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.multibody.definition import KINDS
+from vehiclemor.multibody.definition import KINDS, STATE_KINDS
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
@@ -32,7 +32,7 @@ class ReplayModel(ShortRepr):
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if a run is none of this model."""
-        for name in ("inputs", "coordinates", "speeds", "outputs"):
+        for name in ("inputs", *STATE_KINDS, "outputs"):
             columns = len(getattr(self.model, name))
             require(all(getattr(r, name).shape[1] == columns for r in self.recorded), name)
         conditions = len(_conditions(self.model, self.model.starts[0]))
@@ -71,19 +71,20 @@ class ReplayModel(ShortRepr):
         alike = [k for k in numbers if np.array_equal(self.recorded[k].times, times)]
         distance = partial(self._distance, times, inputs, conditions)
         nearest = self.recorded[min(alike or numbers, key=distance)]
-        paths = nearest.coordinates, nearest.speeds, nearest.outputs
-        q, v, outputs = (_resampled(nearest.times, path, times) for path in paths)
+        paths = {
+            name: _resampled(nearest.times, getattr(nearest, name), times)
+            for name in (*STATE_KINDS, "outputs")
+        }
         # Of a structure there are no coordinates to make outputs of.
         if self.model.kind != "structural":
-            outputs = self.model.outputs_at(np.hstack((q, v)), inputs)
+            states = np.hstack([paths[kind] for kind in STATE_KINDS])
+            paths["outputs"] = self.model.outputs_at(states, inputs)
         return replace(
             nearest,
             times=times,
             inputs=inputs,
             model=self.model,
-            coordinates=q,
-            speeds=v,
-            outputs=outputs,
+            **paths,
             counts=dict.fromkeys(self.model.counts, 0),
             seconds=0.0,
         )

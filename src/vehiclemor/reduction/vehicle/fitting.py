@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from vehiclemor.multibody.definition import STATE_KINDS
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.trust import largest_inputs
 from vehiclemor.reduction.vehicle.decoding import (
@@ -65,7 +66,7 @@ KNOWN = np.array([[0.95, 1.0, 1.0], [0.75, 1.0, 1.0], [0.75, 1.0, 1.0]])
 # Part of the steered motion's amplitudes that a start's transient may have beside it.
 BESIDE = 0.3
 # Histories of a trajectory.
-PATHS = ("times", "inputs", "coordinates", "speeds", "outputs")
+PATHS = ("times", "inputs", *STATE_KINDS, "outputs")
 # Relative singular values of the starts' deviations below this are rounding.
 RANK = 1e-7
 # (indices of features, column) of the coefficients that may change.

@@ -141,7 +141,7 @@ class ReducedVehicle(ReducedSystem):
 
     def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Full states (samples, 2 n) of reduced ones."""
-        return self._decoded(states, inputs)[:, : 2 * len(self.model.coordinates)]
+        return self._decoded(states, inputs)[:, : len(self.model.definition.states)]
 
     def _decoded(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         return self.decoder.states(np.zeros(len(states)), states, inputs, NOTHING_EXCITED)[0]

@@ -78,8 +78,7 @@ class VehicleShape:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the shape's states."""
-        states = (*self.model.coordinates, *self.model.speeds)
-        return tuple(states[i] for i in self.indices)
+        return tuple(self.model.definition.states[i] for i in self.indices)
 
     @cached_property
     def pairs(self) -> list[tuple[int, int]]:
@@ -101,7 +100,7 @@ class VehicleShape:
     @property
     def layout(self) -> Layout:
         """Where the shape stands in the states."""
-        size = 2 * len(self.model.coordinates)
+        size = len(self.model.definition.states)
         return Layout(size, self.indices.tolist(), self.model.planar.tolist(), self.pairs)
 
     def of(self, states: np.ndarray) -> np.ndarray:
@@ -110,7 +109,7 @@ class VehicleShape:
 
     def states(self, shapes: np.ndarray, planar: np.ndarray) -> np.ndarray:
         """States of shapes (samples, n) at `planar` (samples, 3); wheels don't turn."""
-        states = np.zeros((len(shapes), 2 * len(self.model.coordinates)))
+        states = np.zeros((len(shapes), len(self.model.definition.states)))
         states[:, self.indices] = shapes
         states[:, self.model.planar] = planar
         return turned(states, self.pairs, planar[:, 2])

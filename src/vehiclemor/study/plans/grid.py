@@ -119,7 +119,7 @@ def _check_histories(
     """Raise `InputError` if the histories of all runs can't be held, or not side by side."""
     first, *others = [run.maneuver for run in driven.values()]
     number = math.prod(map(len, dimensions.values()))
-    columns = len(model.coordinates) + len(model.speeds) + 2 * len(model.outputs)
+    columns = len(model.definition.states) + 2 * len(model.outputs)
     size = 8.0 * first.samples * columns * number
     if size > MOST_BYTES:
         raise InputError(
