@@ -57,8 +57,8 @@ class InterpolatedProjection(DynamicProjection):
 def check(model: DynamicModel, settings: DeimSettings) -> None:
     """Raise `InputError` if the settings don't fit the model or each other."""
     dynamic.check_subspace(model, settings)
-    if not settings.rank <= settings.rows <= len(model.definition.states):
-        most = len(model.definition.states)
+    if not settings.rank <= settings.rows <= 2 * len(model.coordinates):
+        most = 2 * len(model.coordinates)
         raise InputError(f"rows is {settings.rows}; it must be from rank {settings.rank} to {most}")
 
 
@@ -103,6 +103,7 @@ METHOD = Method(
     summary="POD with one basis, rates from few rows of the equations (DEIM), by pyMOR",
     reference="10.1137/090766498",
     settings=dict.fromkeys(("ode", "dae"), DeimSettings),
+    refusal=dynamic.further_states_refused,
     check=check,
     fit=fit,
     packages=("pymor",),

@@ -87,6 +87,7 @@ METHOD = Method(
     reference="10.1115/1.4029390",
     settings={kind: _in_periods(kind) for kind in SETTINGS},
     presets=PRESETS,
+    refusal=dynamic.further_states_refused,
     check=check,
     fit=fit,
     follows_time=True,
@@ -97,6 +98,7 @@ FIXED_BASIS = Method(
     reference="10.1090/qam/910462",
     settings={kind: _of_one_basis(kind) for kind in SETTINGS},
     presets=PRESETS,
+    refusal=dynamic.further_states_refused,
     check=check,
     fit=fit,
 )

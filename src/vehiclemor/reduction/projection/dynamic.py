@@ -106,7 +106,7 @@ class DynamicProjection(ReducedSystem):
     def check_sizes(self) -> None:
         """Raise `ValueError` if the subspaces are of other states than the model's."""
         require(self.spaces.formulation != "full", "formulation")
-        require(self.spaces.means.shape[1] == len(self.model.definition.states), "spaces")
+        require(self.spaces.means.shape[1] == 2 * len(self.model.coordinates), "spaces")
 
     @property
     def system(self) -> System:
@@ -265,7 +265,7 @@ def _spaces(
     """Subspaces around the means (windows, 2 n), by a weight and a formulation, for the loops."""
     (weight, formulation), n, windows = how, len(model.coordinates), len(bases)
     rows = max(basis.rank for basis in bases) * (2 if formulation == "paired" else 1)
-    trial, test = (np.zeros((windows, rows, means.shape[1])) for _ in range(2))
+    trial, test = np.zeros((windows, rows, 2 * n)), np.zeros((windows, rows, 2 * n))
     ranks = np.empty(windows, dtype=np.int64)
     # The speeds that go with rates of the coordinates, where angles are small.
     turn = speeds_per_rates(model) if formulation == "paired" else np.eye(n)
@@ -315,6 +315,13 @@ def _weight(
     return weight
 
 
+def further_states_refused(model: DynamicModel) -> str:
+    """Why a model, or its definition, can't be projected; empty if it can."""
+    if not model.further_states:
+        return ""
+    return f"{model.name} has further states; only coordinates and speeds can be projected"
+
+
 def check_subspace(model: DynamicModel, settings: DynamicPodSettings) -> None:
     """Raise `InputError` if the settings don't fit the model."""
     formulation, energy = settings.formulation, settings.inner_product == "energy"
@@ -324,5 +331,5 @@ def check_subspace(model: DynamicModel, settings: DynamicPodSettings) -> None:
         model.require("speeds")
     states, kind = len(model.coordinates), "coordinates"
     if formulation == "state":
-        states, kind = len(model.definition.states), "states"
+        states, kind = 2 * states, "states"
     check_pod(settings.rank, settings.snapshots, states, f"{kind} of {model.name}")
