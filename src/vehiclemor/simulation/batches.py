@@ -106,7 +106,7 @@ def simulate_many(
     if not isinstance(full, Model):
         raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
     if given is full and isinstance(signals, Sequence):
-        driven = (name for signal in signals for name in getattr(signal, "inputs", ()))
+        driven = [name for signal in signals for name in getattr(signal, "inputs", ())]
         given = full = full.driving(driven)
     runs, names = _count_of(signals, full), _names(full, outputs)
     kept, rows = _kept_times(times, signals)
