@@ -86,7 +86,7 @@ def test_simulate_writes_what_the_interface_returns(tmp_path, printed, monkeypat
 def test_metrics_stand_side_by_side_with_their_standard(printed):
     command = f"metrics {CAR} --maneuver step_steer --speed 22 --method shipped"
     text = printed(*command.split())
-    assert "step_steer (ISO 7401); from 22 m/s" in text
+    assert "step_steer (ISO 7401), 22 m/s" in text
     rows = json.loads(printed(*command.split(), "--json"))
     gain = next(row for row in rows if row["number"] == "yaw rate gain")
     assert gain["unit"] == "1/s"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from tests.models import CAR, WISHBONE
+from tests.models import CAR, FIDELITY, WISHBONE
 from tests.study.conftest import SMALL
 from vehiclemor.cli import main
 from vehiclemor.study.plans.protocol import load_protocol
@@ -124,6 +124,26 @@ def test_a_grid_runs_every_window(folder, tmp_path):
     np.testing.assert_allclose(run["outputs"], alone["outputs"], atol=1e-9)
 
 
+def test_a_log_may_brake(tmp_path):
+    times = 0.05 * np.arange(121)
+    columns = times, 0.003 * np.sin(times), 500.0 * (times > 2.0), 0.5 + 0.0 * times
+    text = "\n".join(",".join(f"{x:.6g}" for x in row) for row in zip(*columns, strict=True))
+    (tmp_path / "brake.csv").write_text(f"time,s,brake,friction\n{text}\n")
+    inputs = {"s": "s", "brake_torque_FL": "brake", "friction_FL": "friction"}
+    lines = [f'inputs.{name} = "{column}"' for name, column in inputs.items()]
+    study = [f'title = "brake"\nmodel = "{FIDELITY}"\nmethods = [{{ method = "full_order" }}]']
+    study += ['[[logs]]\nlog = "brake.csv"\nwindow = 6.0', *lines]
+    (tmp_path / "brake.toml").write_text("\n".join(study))
+    run = vm.run_study(tmp_path / "brake.toml", results=tmp_path).squeeze()
+    found = run["inputs"].sel(input=["brake_torque_FL", "friction_FL"]).values
+    # The friction goes over from 1, and no spline makes a brake push.
+    np.testing.assert_allclose(found[[0, -1]], [[0.0, 1.0], [500.0, 0.5]])
+    assert found.min() == 0.0
+    times, rack, rate = run["time"].values, *run["inputs"].sel(input=["s", "s_dot"]).values.T
+    np.testing.assert_allclose(np.gradient(rack, times)[60:-1], rate[60:-1], atol=1e-5)
+    assert run["status"] == "ok"
+
+
 # Part of the study -> what stands in its place, or the log's text; and what the line says.
 WRONG = [
     ("", log_of(*ROWS[:100], *ROWS[160:]), "a gap of 1.22 s from 1.98 s on, after row 100"),
@@ -131,7 +151,7 @@ WRONG = [
     ("", log_of(*ROWS[:100], "2.00,inf", *ROWS[101:]), "'height' has no number in row 101"),
     ("", log_of(*ROWS[:100], ",1.0", *ROWS[101:]), "'time' has no number in row 101"),
     ("", log_of(*ROWS[:150]), "no window of 4 s fits into 2.98 s"),
-    ("", log_of(ROWS[0]), "1 rows lie between begin and end"),
+    ("", log_of(), "0 rows lie between begin and end"),
     ('"height"', '"hight"', "there is no column 'hight': set z= to one of time, height"),
     ("lead_in", 'time = "t"\nlead_in', "there is no column 't': set time="),
     ('"mm"', '"inch"', "test, group 1: unknown unit 'inch'"),

@@ -18,6 +18,7 @@ from vehiclemor.cli.app import app, main
 from vehiclemor.exporting import fmu
 from vehiclemor.report.figures import theme
 from vehiclemor.report.published import citations
+from vehiclemor.study import timing
 from vehiclemor.study.plans.loading import study_path
 
 ROOT = Path(__file__).parents[2]
@@ -114,6 +115,9 @@ def here(tmp_path, monkeypatch):
     # One picture of each figure is enough here, and machine code that is not optimised.
     monkeypatch.setattr(theme, "FORMATS", ("png",))
     monkeypatch.setattr(fmu, "OPTIMISED", ("-std=c99", "-O0"))
+    # Times are measured, but no test asks how well.
+    for rounds in ("PROTOCOL_ROUNDS", "PROTOCOL_ROUNDS_OF_LONG"):
+        monkeypatch.setattr(timing, rounds, 1)
     return tmp_path
 
 

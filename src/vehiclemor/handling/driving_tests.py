@@ -8,61 +8,61 @@ from vehiclemor.handling.motion import Motion
 AFTER = 1.0
 
 
+def _begin(motion: Motion) -> int:
+    """The last sample before a brake acts; the first of a run without any."""
+    return max(int(np.argmax(motion.of_wheels("brake_torque").any(axis=0))) - 1, 0)
+
+
 def straight_braking(motion: Motion) -> dict[str, float]:
     """Distance from the first brake torque until the car stops, or the run ends."""
-    k = _begin(motion.braking)
-    distance = float(np.hypot(np.diff(motion.x[k:]), np.diff(motion.y[k:])).sum())
-    lost = motion.speed[k] ** 2 - motion.speed[-1] ** 2
+    x, y, speed = (
+        motion[name][_begin(motion) :]
+        for name in ("longitudinal_position", "lateral_position", "speed")
+    )
+    distance = float(np.hypot(np.diff(x), np.diff(y)).sum()) or np.nan
+    deceleration = (speed[0] ** 2 - speed[-1] ** 2) / (2.0 * distance)
     return {
         "distance": distance,
-        "mean_deceleration": float(lost / (2.0 * distance)) if distance else np.nan,
-        "final_speed": float(motion.speed[-1]),
+        "mean_deceleration": float(deceleration),
+        "final_speed": float(speed[-1]),
     }
 
 
 def braking_in_turn(motion: Motion) -> dict[str, float]:
     """How braking changes a steady turn."""
-    k = _begin(motion.braking)
-    then = motion.times[k] + AFTER
-
-    def at(signal: np.ndarray) -> float:
-        return float(np.interp(then, motion.times, signal, right=np.nan))
-
-    # The circle of the turn goes on around its centre.
-    course, radius = motion.yaw[k] + motion.sideslip[k], motion.speed[k] / motion.yaw_rate[k]
-    centre_x = motion.x[k] - radius * np.sin(course)
-    centre_y = motion.y[k] + radius * np.cos(course)
+    begin = float(motion.times[_begin(motion)])
+    then = begin + AFTER
+    speed, yaw_rate = motion.at("speed", begin), motion.at("yaw_rate", begin)
+    # Chassis axes of the turn, with the centre of the circle at the left side of the course.
+    course, radius = motion.at("yaw", begin) + motion.at("sideslip", begin), speed / yaw_rate
+    centre = 1j * radius * np.exp(1j * course)
+    gone = complex(
+        motion.at("longitudinal_position", then) - motion.at("longitudinal_position", begin),
+        motion.at("lateral_position", then) - motion.at("lateral_position", begin),
+    )
     return {
-        "yaw_rate_ratio": at(motion.yaw_rate) / float(motion.yaw_rate[k]),
-        "mean_deceleration": (float(motion.speed[k]) - at(motion.speed)) / AFTER,
-        "path_deviation": float(
-            abs(radius) - np.hypot(at(motion.x) - centre_x, at(motion.y) - centre_y)
-        ),
+        "yaw_rate_ratio": motion.at("yaw_rate", then) / yaw_rate,
+        "mean_deceleration": (speed - motion.at("speed", then)) / AFTER,
+        "path_deviation": float(abs(radius) - abs(gone - centre)),
     }
 
 
 def split_friction(motion: Motion) -> dict[str, float]:
     """Largest magnitudes while the car brakes."""
-    k = _begin(motion.braking)
+    k = _begin(motion)
     return {
-        "largest_yaw_rate": float(np.abs(motion.yaw_rate[k:]).max()),
-        "largest_sideslip": float(np.abs(motion.sideslip[k:]).max()),
+        f"largest_{name}": float(abs(motion[name][k:]).max()) for name in ("yaw_rate", "sideslip")
     }
 
 
 def power_in_turn(motion: Motion) -> dict[str, float]:
     """Largest slip of a wheel."""
-    return {"largest_slip": float(motion.slip.max())}
+    return {"largest_slip": float(abs(motion.of_wheels("slip_ratio")).max())}
 
 
 def bump(motion: Motion) -> dict[str, float]:
     """Roll, and what is left of the load of a wheel."""
     return {
-        "largest_roll": float(np.abs(motion.roll).max()),
-        "smallest_load": float(motion.load.min()),
+        "largest_roll": float(abs(motion["roll"]).max()),
+        "smallest_load": float(motion.of_wheels("Fz").min()),
     }
-
-
-def _begin(torque: np.ndarray) -> int:
-    """The last sample before a torque (samples,) acts; the first of a run without any."""
-    return max(int(np.argmax(torque > 0.0)) - 1, 0)

@@ -77,7 +77,7 @@ def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
     if not isinstance(run, Trajectory):
         raise InputError(f"run is {quoted(run)}, not a run as `simulate` gives it")
     name = test_of(run.maneuver if maneuver is None else maneuver)
-    return numbers_of(motion_of(run), name)
+    return _numbers(motion_of(run), name)
 
 
 def test_of(maneuver: str) -> str:
@@ -94,28 +94,28 @@ def standard_of(test: str) -> str:
 
 
 def motion_of(run: Trajectory) -> Motion:
-    """Motion of a run until it ends or the vehicle stops; its outputs may have been chosen."""
-    if run.status == "stopped":
-        run = run.chosen(times=run.times[: run.samples_to_stop])
-    names, p = run.names or run.model.outputs, run.model.parameters.values()
-    wheelbase = run.model.definition.wheelbase
-    length = np.nan if wheelbase is None else float(wheelbase(p))
-    return Motion.of(run.times, run.model.inputs, run.inputs, names, run.__getitem__, length)
+    """Motion of a run until it ends or the vehicle stops."""
+    n, model = run.samples_to_stop, run.model
+    inputs = zip(model.inputs, run.inputs[:n].T, strict=True)
+    outputs = zip(run.names or model.outputs, run.outputs[:n].T, strict=True)
+    wheelbase = model.definition.wheelbase
+    length = np.nan if wheelbase is None else float(wheelbase(model.parameters.values()))
+    return Motion(run.times[:n], dict([*inputs, *outputs]), length)
 
 
-def numbers_of(motion: Motion, test: str) -> xr.Dataset:
+def _numbers(motion: Motion, test: str) -> xr.Dataset:
     """Numbers of a test with units and definitions."""
     import xarray as xr
 
-    standard = standard_of(test)
     variables: dict[str, tuple] = {}
+    coordinates: dict[str, tuple] = {}
     for name, value in TESTS[test](motion).items():
         unit, definition = declared().numbers[test][name]
-        attributes = {"units": unit, "long_name": definition, "standard": standard}
+        attributes = {"units": unit, "long_name": definition, "standard": standard_of(test)}
         variables[name] = ("frequency" if np.ndim(value) else (), value, attributes)
+        if np.ndim(value):
+            hertz = {"units": "Hz", "long_name": "frequency of the steering"}
+            coordinates["frequency"] = "frequency", steering_tests.FREQUENCIES, hertz
     speed = {"units": "m/s", "long_name": "speed at the start"}
-    variables["speed"] = ((), motion.speed[0], speed)
-    hertz = {"units": "Hz", "long_name": "frequency of the steering"}
-    axes = {"frequency": ("frequency", steering_tests.FREQUENCIES, hertz)}
-    over_frequency = any(dimensions for dimensions, *_ in variables.values())
-    return xr.Dataset(variables, axes if over_frequency else {}, {"maneuver": test})
+    variables["speed"] = (), motion.speed[0], speed
+    return xr.Dataset(variables, coordinates, {"maneuver": test})

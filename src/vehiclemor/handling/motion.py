@@ -1,119 +1,88 @@
 """Motion of a vehicle in a handling test, by the terms of ISO 8855."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.multibody.quantities import SLIP_RATIOS, TIRE_LOADS, WHEELS
 
-# Outputs that a vehicle needs.
 NEEDED = ("longitudinal_position", "lateral_position", "yaw", "roll")
 NEEDED += ("longitudinal_speed", "lateral_speed", "yaw_rate")
-STEERED = tuple(f"steer_{wheel}" for wheel in WHEELS[:2])
-BRAKES = tuple(f"brake_torque_{wheel}" for wheel in WHEELS)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Histories (samples,) of a run, SI units.
+    """Inputs and outputs (samples,) of a run by name, at times (samples,) in s; wheelbase in m.
 
     Position, speed, sideslip and lateral acceleration are those of the sprung body's centre of
-    mass.  They are along the chassis axes: the horizontal ones of ISO 8855 differ by the cosine of
-    the roll angle, which is 0.2 % at 0.06 rad.
-
-    Attributes
-    ----------
-    times
-        Output times in s.
-    steering
-        First input: angle of the front wheels, or displacement of the rack.
-    wheel_angle
-        Mean angle of the front wheels in rad.
-    braking
-        Sum of the brake torques in N m.
-    speed, sideslip
-        Magnitude of the velocity in m/s, and angle from the x axis to it in rad.
-    lateral_acceleration
-        dv/dt + r u of the lateral speed v, yaw rate r and longitudinal speed u, in m/s^2.
-    slip, load
-        Largest magnitude of the slip ratios, and smallest load in N, of all wheels.
-    x, y, yaw, roll, yaw_rate
-        Outputs in m, rad and rad/s.
-    wheelbase
-        In m; not a number if the model declares none.
+    mass, along chassis axes: the horizontal ones of ISO 8855 differ by the cosine of the roll
+    angle, 0.2 % at 0.06 rad.
     """
 
     times: np.ndarray
-    steering: np.ndarray
-    wheel_angle: np.ndarray
-    braking: np.ndarray
-    slip: np.ndarray
-    load: np.ndarray
-    speed: np.ndarray
-    sideslip: np.ndarray
-    lateral_acceleration: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-    yaw: np.ndarray
-    roll: np.ndarray
-    yaw_rate: np.ndarray
-    wheelbase: float
+    histories: Mapping[str, np.ndarray]
+    wheelbase: float = np.nan
 
-    @classmethod
-    def of(
-        cls,
-        times: np.ndarray,
-        names: tuple[str, ...],
-        inputs: np.ndarray,
-        outputs: tuple[str, ...],
-        history: Callable[[str], np.ndarray],
-        wheelbase: float,
-    ) -> Motion:
-        """Motion of a run with named inputs (samples, names) and outputs, which `history` gives."""
+    def __post_init__(self) -> None:
+        """Refuse what is no run of a vehicle, or one that has not come to its end."""
+        if missing := [name for name in NEEDED if name not in self.histories]:
+            raise InputError(f"the run is of no vehicle, or without outputs {', '.join(missing)}")
+        if len(self.times) < 2:
+            raise InputError("the run has one output time, too few for numbers of a maneuver")
+        if not np.isfinite([self[name] for name in NEEDED]).all():
+            raise InputError("the run has not come to its end: it has no numbers of a maneuver")
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """History (samples,) of an input or output, or of what follows from them."""
+        return self.histories[name] if name in self.histories else getattr(self, name)
+
+    def of_wheels(self, quantity: str) -> np.ndarray:
+        """Histories (wheels, samples) of an input or output of each wheel; zero if it has none."""
+        wheels = [each for name, each in self.histories.items() if name.startswith(f"{quantity}_")]
+        return np.array(wheels or [np.zeros(len(self.times))])
+
+    def at(self, name: str, time: float) -> float:
+        """Value at a time in s, linear between the samples; not a number after the run."""
+        return float(np.interp(time, self.times, self[name], right=np.nan))
+
+    @property
+    def steering(self) -> np.ndarray:
+        """What the driver moves: angle of the front wheels in rad or displacement of the rack."""
+        nothing = np.zeros(len(self.times))
+        return self.histories.get("delta", self.histories.get("s", nothing))
+
+    @property
+    def wheel_angle(self) -> np.ndarray:
+        """Mean angle of the front wheels in rad."""
+        return (
+            self.of_wheels("steer").mean(axis=0) if "steer_FL" in self.histories else self.steering
+        )
+
+    @property
+    def speed(self) -> np.ndarray:
+        """Magnitude of the velocity in m/s."""
+        return np.hypot(self["longitudinal_speed"], self["lateral_speed"])
+
+    @property
+    def sideslip(self) -> np.ndarray:
+        """Angle in rad from the longitudinal axis to the velocity."""
+        return np.arctan2(self["lateral_speed"], self["longitudinal_speed"])
+
+    @cached_property
+    def lateral_acceleration(self) -> np.ndarray:
+        """Rate of the lateral speed, plus yaw rate times longitudinal speed, in m/s^2."""
         from scipy.interpolate import CubicSpline
 
-        if missing := [name for name in NEEDED if name not in outputs]:
-            raise InputError(f"the run is of no vehicle, or without outputs {', '.join(missing)}")
-        if len(times) < 2:
-            raise InputError("the run has one output time, too few for numbers of a maneuver")
-        x, y, yaw, roll, ahead, aside, yaw_rate = map(history, NEEDED)
-        if not np.isfinite([x, y, yaw, roll, ahead, aside, yaw_rate]).all():
-            raise InputError("the run has not come to its end: it has no numbers of a maneuver")
-        columns = dict(zip(names, inputs.T, strict=True))
-        steering = columns.get("delta", columns.get("s", np.zeros(len(times))))
-        nothing = np.full(len(times), np.nan)
-
-        def of_wheels(wanted: tuple[str, ...]) -> list[np.ndarray]:
-            return [history(name) for name in wanted if name in outputs] or [nothing]
-
-        steered = of_wheels(STEERED) if STEERED[0] in outputs else [steering]
-        return cls(
-            times=times,
-            steering=steering,
-            wheel_angle=np.mean(steered, axis=0),
-            braking=sum((columns.get(name, 0.0) for name in BRAKES), np.zeros(len(times))),
-            slip=np.max([np.abs(each) for each in of_wheels(SLIP_RATIOS)], axis=0),
-            load=np.min(of_wheels(TIRE_LOADS), axis=0),
-            speed=np.hypot(ahead, aside),
-            sideslip=np.arctan2(aside, ahead),
-            lateral_acceleration=CubicSpline(times, aside)(times, 1) + yaw_rate * ahead,
-            x=x,
-            y=y,
-            yaw=yaw,
-            roll=roll,
-            yaw_rate=yaw_rate,
-            wheelbase=wheelbase,
-        )
+        rate = CubicSpline(self.times, self["lateral_speed"])(self.times, 1)
+        return rate + self["yaw_rate"] * self["longitudinal_speed"]
 
 
 def first_time(times: np.ndarray, signal: np.ndarray, level: float) -> float:
-    """First time at which a signal (samples,) has risen to a level; not a number if it never has.
+    """First time in s at which a signal (samples,) has risen to a level, linear between samples.
 
-    Linear between the samples.
+    Not a number if it never has.
     """
     k = int(np.argmax(signal >= level))
     if signal[k] < level:
@@ -125,6 +94,4 @@ def first_time(times: np.ndarray, signal: np.ndarray, level: float) -> float:
 
 def slope(x: np.ndarray, y: np.ndarray) -> float:
     """Slope of the straight line through points (n,), by least squares; of one there is none."""
-    if len(x) < 2 or np.ptp(x) == 0.0:
-        return np.nan
-    return float(np.polyfit(x, y, 1)[0])
+    return float(np.polyfit(x, y, 1)[0]) if len(x) > 1 and np.ptp(x) > 0.0 else np.nan

@@ -11,7 +11,7 @@ slippery on one side) brake from a steady speed; these start from the parameter 
 the model.  The amplitude factor is that of the acceleration, or of the height of the bump.
 """
 
-from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,60 +38,80 @@ SLIPPERY = 0.3
 # m, m/s: height and length of the bump, wheelbase, and the speed at a frequency factor of 1.
 HEIGHT, LENGTH, WHEELBASE, SPEED = 0.02, 2.4, 2.58, 20.0
 
-BRAKES = tuple(f"brake_torque_{wheel}" for wheel in WHEELS)
-# (Times (n,) in s, frequency factor, amplitude factor) -> values (n,).
-Column = Callable[[np.ndarray, float, float], np.ndarray]
+
+class Ramp(NamedTuple):
+    """An input that rises from 0 to its size, or the derivative of that order of it.
+
+    It begins at a time in s and takes a length in s at a frequency factor of 1; without a length it
+    is constant.  The amplitude factor scales it, if it is `scaled`.
+    """
+
+    size: float
+    begin: float = 0.0
+    length: float = 0.0
+    order: int = 0
+    scaled: bool = False
+
+    def at(self, times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+        """Values (n,) at times (n,) in s."""
+        size = self.size * (amplitude if self.scaled else 1.0)
+        if not self.length:
+            return np.full(len(times), size)
+        length = self.length / frequency
+        return size * ramp((times - self.begin) / length, length)[:, self.order]
+
+    def corners(self, frequency: float) -> set[float]:
+        """Times in s at which it begins and ends."""
+        return {self.begin, self.begin + self.length / frequency} if self.length else set()
 
 
-def _torque(acceleration: float, share: float, begin: float) -> Column:
-    """Torque of one wheel, which has a share of the force that accelerates the car."""
-    largest = MASS * RADIUS * acceleration * share
-
-    def column(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
-        length = TORQUE_RAMP / frequency
-        return amplitude * largest * ramp((times - begin) / length, length)[:, 0]
-
-    return column
+def _torque(acceleration: float, share: float, begin: float) -> Ramp:
+    """Torque of a wheel that has a share of the force which accelerates the car."""
+    return Ramp(MASS * RADIUS * acceleration * share, begin, TORQUE_RAMP, scaled=True)
 
 
-def _brakes(begin: float) -> dict[str, Column]:
-    front, rear = (_torque(BRAKING, s / 2.0, begin) for s in (FRONT_SHARE, 1.0 - FRONT_SHARE))
-    return dict(zip(BRAKES, (front, front, rear, rear), strict=True))
+def _brakes(begin: float) -> dict[str, Ramp]:
+    front, rear = FRONT_SHARE / 2.0, (1.0 - FRONT_SHARE) / 2.0
+    shares = zip(WHEELS, (front, front, rear, rear), strict=True)
+    return {f"brake_torque_{w}": _torque(BRAKING, share, begin) for w, share in shares}
 
 
-def _constant(value: float) -> Column:
-    return lambda times, frequency, amplitude: np.full(len(times), value)  # noqa: ARG005
+def _ramps(name: str, summary: str, ramps: dict[str, Ramp], duration: float) -> Maneuver:
+    """Maneuver of ramps by input."""
+
+    def signal(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+        return np.stack([each.at(times, frequency, amplitude) for each in ramps.values()], axis=1)
+
+    def corners(frequency: float) -> tuple[float, ...]:
+        return tuple(sorted(set().union(*(each.corners(frequency) for each in ramps.values()))))
+
+    linear = all(each.scaled for each in ramps.values())
+    fields = name, summary, signal, tuple(ramps), duration, round(duration * RATE) + 1, corners
+    return Maneuver(*fields, linear_in_amplitude=linear)
 
 
-def _turn(size: float, derivative: int) -> Column:
-    """Steering into a turn, or one of its derivatives."""
-
-    def column(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
-        del amplitude
-        length = ONSET / frequency
-        return size * STEP_SIZE * ramp((times - BEGIN) / length, length)[:, derivative]
-
-    return column
-
-
-TURN = {"delta": _turn(LANE_CHANGE_AMPLITUDE, 0)}
-RACK_TURN = {
-    name: _turn(RACK_AMPLITUDE, order) for order, name in enumerate(("s", "s_dot", "s_ddot"))
-}
+def _in_turn(name: str, summary: str, ramps: dict[str, Ramp]) -> tuple[Maneuver, Maneuver]:
+    """Ramps of torques while the steering angle is held, and while the rack is."""
+    summary = f"{summary} from 3 s on in a turn of 4 m/s^2 at 20 m/s"
+    angle = {"delta": Ramp(LANE_CHANGE_AMPLITUDE * STEP_SIZE, BEGIN, ONSET)}
+    rack = {
+        displaced: Ramp(RACK_AMPLITUDE * STEP_SIZE, BEGIN, ONSET, order)
+        for order, displaced in enumerate(("s", "s_dot", "s_ddot"))
+    }
+    return (
+        _ramps(name, f"{summary}, 6 s", angle | ramps, 6.0),
+        _ramps(f"rack_{name}", f"{summary}, of the rack, 6 s", rack | ramps, 6.0),
+    )
 
 
-def _road(distance: float, derivative: int) -> Column:
-    """Height of the bump below a wheel so far behind the front axle (m), or its rate."""
-
-    def column(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
-        speed = SPEED * frequency
-        part = (speed * (times - BEGIN) - distance) / LENGTH
-        angle = 2.0 * np.pi * np.clip(part, 0.0, 1.0)
-        if derivative:
-            return amplitude * HEIGHT * np.pi * speed / LENGTH * np.sin(angle)
-        return amplitude * HEIGHT * 0.5 * (1.0 - np.cos(angle))
-
-    return column
+def _bump(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
+    """Heights below the front and the rear wheel, and their rates."""
+    travelled = SPEED * frequency * (times - BEGIN)
+    part = (travelled[:, None] - np.array([0.0, WHEELBASE])) / LENGTH
+    angle = 2.0 * np.pi * np.clip(part, 0.0, 1.0)
+    heights = 0.5 * HEIGHT * (1.0 - np.cos(angle))
+    rates = HEIGHT * np.pi * SPEED * frequency / LENGTH * np.sin(angle)
+    return amplitude * np.hstack([heights, rates])
 
 
 def _bump_corners(frequency: float) -> tuple[float, ...]:
@@ -99,80 +119,30 @@ def _bump_corners(frequency: float) -> tuple[float, ...]:
     return tuple((BEGIN + distances / (SPEED * frequency)).tolist())
 
 
-def _straight_corners(frequency: float) -> tuple[float, ...]:
-    return BEGIN, BEGIN + TORQUE_RAMP / frequency
-
-
-def _turn_corners(frequency: float) -> tuple[float, ...]:
-    corners = BEGIN, BEGIN + ONSET / frequency, IN_TURN, IN_TURN + TORQUE_RAMP / frequency
-    return tuple(sorted(corners))
-
-
-def _maneuver(
-    name: str,
-    summary: str,
-    columns: Mapping[str, Column],
-    duration: float,
-    corners: Callable[[float], tuple[float, ...]],
-    linear: bool = False,
-) -> Maneuver:
-    def signal(times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
-        return np.stack([each(times, frequency, amplitude) for each in columns.values()], axis=1)
-
-    samples = round(duration * RATE) + 1
-    inputs = tuple(columns)
-    return Maneuver(
-        name, summary, signal, inputs, duration, samples, corners, linear_in_amplitude=linear
-    )
-
-
-straight_braking = _maneuver(
-    "straight_braking",
-    "brakes at 0.3 g from 1 s on (ISO 21994), 10 s",
-    _brakes(BEGIN),
-    10.0,
-    _straight_corners,
-    linear=True,
+straight_braking = _ramps(
+    "straight_braking", "brakes at 0.3 g from 1 s on (ISO 21994), 10 s", _brakes(BEGIN), 10.0
 )
-split_friction = _maneuver(
+split_friction = _ramps(
     "split_friction",
     "brakes at 0.3 g from 1 s on, friction 0.3 on the left side (ISO 14512), 5 s",
-    _brakes(BEGIN)
-    | {f"friction_{w}": _constant(SLIPPERY if w.endswith("L") else 1.0) for w in WHEELS},
+    _brakes(BEGIN) | {f"friction_{w}": Ramp(SLIPPERY if w[1] == "L" else 1.0) for w in WHEELS},
     5.0,
-    _straight_corners,
 )
-_DRIVE = {f"drive_torque_{wheel}": _torque(DRIVING, 0.5, IN_TURN) for wheel in WHEELS[2:]}
-braking_in_turn, rack_braking_in_turn = (
-    _maneuver(
-        f"{prefix}braking_in_turn",
-        "brakes at 0.3 g from 3 s on in a turn of 4 m/s^2 at 20 m/s (ISO 7975), 6 s",
-        turn | _brakes(IN_TURN),
-        6.0,
-        _turn_corners,
-    )
-    for prefix, turn in (("", TURN), ("rack_", RACK_TURN))
+braking_in_turn, rack_braking_in_turn = _in_turn(
+    "braking_in_turn", "brakes at 0.3 g (ISO 7975)", _brakes(IN_TURN)
 )
-power_in_turn, rack_power_in_turn = (
-    _maneuver(
-        f"{prefix}power_in_turn",
-        "drives the rear wheels at 0.2 g from 3 s on in a turn of 4 m/s^2 at 20 m/s, 6 s",
-        turn | _DRIVE,
-        6.0,
-        _turn_corners,
-    )
-    for prefix, turn in (("", TURN), ("rack_", RACK_TURN))
+power_in_turn, rack_power_in_turn = _in_turn(
+    "power_in_turn",
+    "drives the rear wheels at 0.2 g",
+    {f"drive_torque_{wheel}": _torque(DRIVING, 0.5, IN_TURN) for wheel in WHEELS[2:]},
 )
-bump = _maneuver(
+bump = Maneuver(
     "bump",
     "bump of 20 mm, 2.4 m long, below the left wheels; frequency factor is speed over 20 m/s, 4 s",
-    {
-        "road_FL": _road(0.0, 0),
-        "road_RL": _road(WHEELBASE, 0),
-        "road_FL_dot": _road(0.0, 1),
-        "road_RL_dot": _road(WHEELBASE, 1),
-    },
+    _bump,
+    ("road_FL", "road_RL", "road_FL_dot", "road_RL_dot"),
     4.0,
+    round(4.0 * RATE) + 1,
     _bump_corners,
-    linear=True,
+    linear_in_amplitude=True,
 )

@@ -58,7 +58,7 @@ class FallbackModel(ShortRepr):
     ) -> Trajectory:
         """The reduced run; where it can't be trusted, that of the full order."""
         run = simulated(self.reduced, maneuver, start, outputs)
-        if run.status in WITHOUT_COMPLAINT and run.trust and not run.trust.reason:
+        if run.status in WITHOUT_COMPLAINT and run.trust and np.isinf(run.trust.until):
             return run
         # A model without a trust indicator is trusted nowhere.
         reason = run.message or "the reduced model does not judge itself"

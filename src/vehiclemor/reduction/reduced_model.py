@@ -293,11 +293,12 @@ class ReducedOrderModel(ShortRepr):
         """Which input or output is beyond what the full model declares, if one is."""
         validity = self.model.definition.validity
         columns = dict(zip(self.inputs, inputs.T, strict=True))
-        if not validity.keys() <= columns.keys():
+        if not validity.keys().isdisjoint(self.output_names):
             outputs = self.outputs(states, inputs).T
             columns = dict(zip(self.output_names, outputs, strict=True)) | columns
         for name, (low, high) in validity.items():
-            values = columns[name]
+            # A run that does not drive an optional input has no values of it.
+            values = columns.get(name, np.zeros(0))
             wrong = values[~((values >= low) & (values <= high))]
             if len(wrong):
                 return f"{name} is {wrong[0]:.4g}; the model holds from {low:g} to {high:g}"

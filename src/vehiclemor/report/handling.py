@@ -13,28 +13,26 @@ from vehiclemor.inputs.maneuver import registered
 from vehiclemor.registry import names
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from vehiclemor.reduction.reduced_model import ReducedOrderModel
-    from vehiclemor.simulation.model import Model
+    from vehiclemor.simulation.trajectory import Trajectory
 
 # Hz: frequencies of a response that are printed.
 PRINTED = (0.5, 1.0)
 
 
-def maneuvers_of(full: Model, reduced: Iterable[ReducedOrderModel]) -> list[str]:
+def maneuvers_of(full: ReducedOrderModel, reduced: Iterable[ReducedOrderModel]) -> list[str]:
     """Registered maneuvers with numbers, whose inputs all models have, in the order of the tests.
 
     The full model has its optional inputs too.  `InputError` if there are none.
     """
-    definition = full.definition
+    definition = full.model.definition
     every = (*definition.inputs, *definition.optional_inputs)
     shared = {quantity.name for quantity in every}.intersection(*(r.inputs for r in reduced))
     known = {*names("maneuver")}
     wanted = [name for test in TESTS for name in (test, RACK + test) if name in known]
     fitting = [name for name in wanted if shared.issuperset(registered(name).inputs)]
     if not fitting:
-        raise InputError(f"{full.name} is no vehicle of the handling tests: {', '.join(TESTS)}")
+        raise InputError(f"{definition.name} is no vehicle of the tests: {', '.join(TESTS)}")
     return fitting
 
 
@@ -47,34 +45,32 @@ def handling_rows(
     taken whose inputs all models have.
     """
     first, *reduced = models.values()
-    full = first.model
-    chosen = list(maneuvers) or maneuvers_of(full, reduced)
+    start, speed = first.model.start(), first.parameters.get("initial_speed", np.nan)
+    chosen = list(maneuvers) or maneuvers_of(first, reduced)
     standards = {name: standard_of(test_of(name)) for name in chosen}
     rows: list[dict[str, Any]] = []
     for name, standard in standards.items():
         maneuver = registered(name).perturbed(amplitude=amplitude)
-        runs = {key: model.simulate(maneuver, full.start()) for key, model in models.items()}
+        runs = {key: model.simulate(maneuver, start) for key, model in models.items()}
         remarks = [f"{key}: {run.message}" for key, run in runs.items() if run.message]
-        numbers = {key: metrics(run) for key, run in runs.items() if run.finished}
-        speed = [f"from {float(each['speed']):.4g} m/s" for each in numbers.values()][:1]
-        test = "; ".join([f"{name} ({standard})", *speed, *remarks])
-        values = {key: _values(each) for key, each in numbers.items()}
-        units = {number: unit for each in values.values() for number, (unit, _) in each.items()}
-        for number, unit in (units or {"no numbers": ""}).items():
-            columns = {key: values[key][number][1] if key in values else np.nan for key in models}
+        test = "; ".join([f"{name} ({standard}), {speed:.4g} m/s", *remarks])
+        values = {key: _values(run) for key, run in runs.items() if run.finished}
+        # Names and units, in the order of the first run that has come to its end.
+        for number, unit in next(iter(values.values()), [("no numbers", "")]):
+            columns = {key: values.get(key, {}).get((number, unit), np.nan) for key in models}
             rows.append({"test": test, "number": number, "unit": unit} | columns)
     return rows
 
 
-def _values(numbers: xr.Dataset) -> dict[str, tuple[str, float]]:
-    """Name of a number -> unit and value, with its frequency if it has one."""
-    values: dict[str, tuple[str, float]] = {}
-    for key, number in numbers.drop_vars("speed").data_vars.items():
+def _values(run: Trajectory) -> dict[tuple[str, str], float]:
+    """Name, with its frequency if there is one, and unit of a number -> value."""
+    values: dict[tuple[str, str], float] = {}
+    for key, number in metrics(run).drop_vars("speed").data_vars.items():
         name, unit = str(key).replace("_", " "), str(number.attrs["units"])
-        if number.dims:
-            for hertz in PRINTED:
-                at = number.sel(frequency=hertz, method="nearest")
-                values[f"{name} at {hertz:g} Hz"] = unit, float(at)
-        else:
-            values[name] = unit, float(number)
+        if not number.dims:
+            values[name, unit] = float(number)
+            continue
+        for hertz in PRINTED:
+            at = number.sel(frequency=hertz, method="nearest")
+            values[f"{name} at {hertz:g} Hz", unit] = float(at)
     return values

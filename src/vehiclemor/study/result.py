@@ -15,6 +15,7 @@ import numpy as np
 from vehiclemor.error_measures import max_abs, rms, signal_range
 from vehiclemor.failure import Failure
 from vehiclemor.files import data_folder
+from vehiclemor.inputs.checks import completed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.provenance import attributes
 from vehiclemor.reduction.interface import FittedModel
@@ -145,6 +146,7 @@ def _missing(model: Model, maneuver: Excitation, failure: Failure) -> Trajectory
         np.full((len(times), len(names)), np.nan)
         for names in (model.coordinates, model.speeds, model.outputs)
     )
+    maneuver = completed(maneuver, model.definition)
     inputs, end = maneuver.at(times), (failure.status, failure.message)
     return Trajectory(times, inputs, coordinates, speeds, outputs, {}, np.nan, *end)
 

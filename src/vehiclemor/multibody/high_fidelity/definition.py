@@ -42,6 +42,14 @@ AT_REST = 1e-9
 MOST_ITERATIONS = 30
 # Free lengths of the springs (m), with which the design position is the equilibrium.
 SOLVED = ("front_free_length", "rear_free_length")
+
+
+def wheelbase(p: Mapping[str, Any]) -> float:
+    """Distance of the axles in m."""
+    front, rear = wheel_places(p)
+    return front[0] - rear[0]
+
+
 DECLARED = declared("high_fidelity_vehicle")
 
 
@@ -98,6 +106,12 @@ def wheel_places(p: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     """Design positions of the left wheel centres, front and rear, chassis frame, in m."""
     origin = p["chassis_centre"]
     return p["wheel_centre"] + p["front_frame_origin"] - origin, p["rear_wheel_centre"] - origin
+
+
+def wheelbase(p: Mapping[str, Any]) -> float:
+    """Distance of the axles in m."""
+    front, rear = wheel_places(p)
+    return float(front[0] - rear[0])
 
 
 def _mass_and_centre(p: Mapping[str, Any]) -> tuple[float, float]:
@@ -219,7 +233,7 @@ DEFINITION = ModelDefinition(
     standstill=STANDSTILL,
     loads=TIRE_LOADS,
     slips=SLIP_RATIOS,
-    wheelbase=lambda p: wheel_places(p)[0][0] - wheel_places(p)[1][0],
+    wheelbase=wheelbase,
     tabled_outputs=(
         "lateral_speed",
         "vertical_speed",

@@ -90,6 +90,11 @@ def check(p: Mapping[str, Any]) -> None:
     check_moments("sprung body", np.linalg.eigvalsh(tensor))
 
 
+def wheelbase(p: Mapping[str, Any]) -> float:
+    """Distance of the axles in m."""
+    return p["front_axle_distance"] + p["rear_axle_distance"]
+
+
 def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Initial states (28,) by name: straight running, and the same dropped onto the road."""
     d, speed = derived(p), float(p["initial_speed"])
@@ -104,6 +109,11 @@ def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
     dropped[14] = speed * np.cos(dropped[4])
     dropped[16] = speed * np.sin(dropped[4])
     return {"equilibrium": equilibrium, "dropped": dropped}
+
+
+def wheelbase(p: Mapping[str, Any]) -> float:
+    """Distance of the axles in m."""
+    return p["front_axle_distance"] + p["rear_axle_distance"]
 
 
 DECLARED = declared("independent_suspension_vehicle")
@@ -130,7 +140,7 @@ DEFINITION = ModelDefinition(
     standstill=STANDSTILL,
     loads=TIRE_LOADS,
     slips=SLIP_RATIOS,
-    wheelbase=lambda p: p["front_axle_distance"] + p["rear_axle_distance"],
+    wheelbase=wheelbase,
     tabled_outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
     main_outputs=("pitch", "yaw", "lateral_position"),
 )

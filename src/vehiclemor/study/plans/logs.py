@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field
 from vehiclemor.arguments import within
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.columns import UNITS, csv_samples
-from vehiclemor.inputs.signal import many_signals
+from vehiclemor.inputs.signal import Signal, many_signals
 from vehiclemor.inputs.steering import ramp
 from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
@@ -108,14 +108,24 @@ def windows(model: Model, log: Log, folder: Path) -> list[Scenario]:
         speed = values[:, :, -1]
         chosen = speed[:, 0] if log.speed_column.of == "first" else speed.mean(axis=1)
         speeds = chosen.round(DECIMALS)[:, None].tolist()
+    unrated = np.array([f"{name}_dot" not in defaults for name in log.inputs])
     signals = many_signals(times, inputs, "cubic", inputs=[*log.inputs])
     runs: list[Scenario] = []
-    for signal, begin, of_window in zip(signals, begins.round(6), speeds, strict=True):
-        named = replace(signal, name=f"{log.name or log.log}:{begin:.9g}")
+    names = [f"{log.name or log.log}:{begin:.9g}" for begin in begins.round(6)]
+    for signal, name, samples, of_window in zip(signals, names, inputs, speeds, strict=True):
+        named = replace(_straightened(signal, samples, unrated), name=name)
         for amplitude, speed in product(log.amplitude or [1.0], of_window):
             driven = named.perturbed(amplitude=amplitude)
             runs.append(Scenario(driven, model.starts[0], speed))
     return runs
+
+
+def _straightened(signal: Signal, samples: np.ndarray, columns: np.ndarray) -> Signal:
+    """A cubic signal, some columns of which are linear: a spline of brakes would be negative."""
+    pieces, coefficients = signal.pieces, signal.pieces.coefficients.copy()
+    coefficients[:, columns, 1] = np.diff(samples[:, columns], axis=0)
+    coefficients[:, columns, 2:] = 0.0
+    return replace(signal, nominal_pieces=pieces._replace(coefficients=coefficients))
 
 
 def _read(log: Log, path: Path) -> np.ndarray:
@@ -127,8 +137,8 @@ def _read(log: Log, path: Path) -> np.ndarray:
         columns["speed_column"] = log.speed_column
     names = {name: column.column for name, column in columns.items()}
     times, values, _ = csv_samples(path, log.separator, log.decimal, names.pop("time"), names)
-    table = np.column_stack([times - times[:1], values])
-    table *= [column.factor for column in columns.values()]
+    factors = [column.factor for column in columns.values()]
+    table = np.column_stack([times - times[:1], values]) * factors
     # A row without a time is not left out.
     outside = (table[:, 0] < log.begin) | (table[:, 0] > (log.end or np.inf))
     rows, table = np.flatnonzero(~outside) + 1, table[~outside]
