@@ -108,12 +108,6 @@ def wheel_places(p: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     return p["wheel_centre"] + p["front_frame_origin"] - origin, p["rear_wheel_centre"] - origin
 
 
-def wheelbase(p: Mapping[str, Any]) -> float:
-    """Distance of the axles in m."""
-    front, rear = wheel_places(p)
-    return float(front[0] - rear[0])
-
-
 def _mass_and_centre(p: Mapping[str, Any]) -> tuple[float, float]:
     """Mass of the vehicle in kg and x of its centre of mass in the chassis in m."""
     front = p["front_frame_origin"][0] - p["chassis_centre"][0]

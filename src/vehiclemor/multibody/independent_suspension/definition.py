@@ -111,11 +111,6 @@ def starts(p: Mapping[str, Any]) -> dict[str, np.ndarray]:
     return {"equilibrium": equilibrium, "dropped": dropped}
 
 
-def wheelbase(p: Mapping[str, Any]) -> float:
-    """Distance of the axles in m."""
-    return p["front_axle_distance"] + p["rear_axle_distance"]
-
-
 DECLARED = declared("independent_suspension_vehicle")
 DEFINITION = ModelDefinition(
     name="independent_suspension_vehicle",
