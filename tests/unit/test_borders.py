@@ -157,6 +157,7 @@ def trained(points):
         (lambda v: STEER.perturbed(frequency=v), [0.0, *WRONG], "frequency factor"),
         (lambda v: vm.export(car(), v), WRONG, "unknown target"),
         (lambda v: vm.export(car(), "c", "none/c", step=v), [1e5, 1e-300, *WRONG], "step"),
+        (lambda v: vm.simulate_many(car(), v), [range(10**12), [3]], "signals"),
         (lambda v: vm.simulate_many(car(), [STEER], outputs=v), [{}, *WRONG], "output"),
         (lambda v: vm.simulate_many(car(), [STEER], v), [np.array(1.0), 10**400], "start"),
         (lambda v: vm.simulate_many(car(), [STEER], jobs=v), NO_JOBS, "jobs is"),
