@@ -104,7 +104,7 @@ def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
 def test_of(maneuver: str) -> str:
     """The test that a maneuver is; `InputError` if it is none."""
     name = maneuver.removeprefix(RACK) if isinstance(maneuver, str) else maneuver
-    if not name:
+    if isinstance(name, str) and not name:
         raise InputError(f"the run is of no registered maneuver: name one of {', '.join(TESTS)}")
     return choice("maneuver with numbers", name, TESTS)
 
