@@ -19,7 +19,7 @@ PERIOD = 0.01
 ASIDE, BRAKING, DRIVING, FASTEST = 4.0, 3.0, 1.5, 25.0
 # Of the car: mass (kg), wheel radius and wheelbase (m), understeer gradient (rad s^2/m), front
 # share of the brakes.
-MASS, RADIUS, WHEELBASE, UNDERSTEER, FRONT = 1093.3, 0.344, 2.579, 0.0016, 0.66
+MASS, RADIUS, WHEELBASE, UNDERSTEER, FRONT = 1093.3, 0.327, 2.58, 0.0005, 0.66
 # The driver looks so far ahead (s, m), and corrects the speed at this rate (1/s).
 AHEAD, NEAREST, HASTE = 0.5, 6.0, 1.0
 
@@ -98,6 +98,15 @@ def lap():
     return z, speed, car, np.array(record), seconds
 
 
+# %%
+# The recorded inputs are a signal: the same lap again in one call, and its film.
+def film(car, record, file):
+    t = PERIOD * np.arange(len(record))
+    inputs = ["delta", *INPUTS]
+    again = vm.Signal.from_samples(t, record[:, 3:], "zero", inputs=inputs, output_step=0.04)
+    return vm.animate(car.simulate(again), labels=["full order"], duration=6.0, out=file)
+
+
 if __name__ == "__main__":
     z, speed, car, record, seconds = lap()
     driven = PERIOD * len(record)
@@ -116,4 +125,5 @@ if __name__ == "__main__":
     axes[1].set(xlabel="time (s)", ylabel="speed (m/s)")
     axes[1].legend()
     figure.tight_layout()
+    print(f"written: {film(car, record, 'course.gif')}")
     plt.show()

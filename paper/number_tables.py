@@ -100,6 +100,18 @@ def errors(dataset: xr.Dataset) -> Variables:
     return {name: dataset[name] for name in wanted if name in dataset}
 
 
+def integrated(dataset: xr.Dataset) -> Variables:
+    """Steps, time of the loop in us, and largest distance from the reference in mm."""
+    off = [
+        dataset["max_error"].sel(output=f"{axis}_position") for axis in ("longitudinal", "lateral")
+    ]
+    return {
+        "steps": dataset["steps"],
+        "us": 1e6 * dataset["seconds"],
+        "mm": 1e3 * np.hypot(*off),
+    }
+
+
 def over_published(model: str, dataset: xr.Dataset) -> Variables:
     """Errors, and the largest one over the published number of its output."""
     numbers = rms_numbers(model)
@@ -252,6 +264,8 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
         yield f"{short}-zero-steer", partial(measure, f"zero_steer.{model}", ASIDE)
     for name in ("unseen-inputs", "unseen-inputs-ranks"):
         yield name, partial(measure, "unseen", f"{ASIDE}.max_error")
+    for name in ("driving-straight", "driving-locked", "driving-turns"):
+        yield name, partial(grid, name, integrated)
     yield "equation-order", orders
     yield "figure-14-spread", partial(spread, "figure-14-spread")
     yield "truck-ranks", partial(measure, "truck.ranks", "worst_relative_error")

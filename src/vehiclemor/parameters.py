@@ -182,8 +182,6 @@ def overridden(
     parameters: ParameterSet, expected: Mapping[str, Declared], overrides: Mapping[str, object]
 ) -> ParameterSet:
     """Parameters with some values replaced; `InputError` if a name, shape or value is wrong."""
-    if not isinstance(overrides, Mapping):
-        raise InputError(f"parameters must be a mapping of values by name, not {quoted(overrides)}")
     model, entries = parameters.model, dict(parameters.entries)
     for given, value in overrides.items():
         name, axis = parameter_and_axis(model, expected, given)

@@ -4,6 +4,7 @@ from .exceptions import InputError as InputError
 from .inputs.maneuver import Maneuver as Maneuver
 from .multibody.definition import ModelDefinition as ModelDefinition
 from .multibody.definition import Structure as Structure
+from .multibody.quantities import InputChoice as InputChoice
 from .multibody.quantities import Quantity as Quantity
 from .parameters import Declared as Declared
 from .reduction.interface import Method as Method

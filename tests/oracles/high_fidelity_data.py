@@ -157,6 +157,21 @@ def lane_change(
     )
 
 
+def brush(
+    friction: float, fz: float, kappa: float, t: float, p: Numbers
+) -> tuple[float, float, float]:
+    """As `fiala`, but one force along the bristles' deflection at combined slip."""
+    slip = min(1.0, np.hypot(kappa, t))
+    grip = friction * (p["tyre.mu_max"] - (p["tyre.mu_max"] - p["tyre.mu_min"]) * slip) * fz
+    x, y = p["tyre.c_long"] * kappa, p["tyre.c_alpha"] * t
+    if fz == 0 or (x, y) == (0, 0):
+        return 0.0, 0.0, 0.0
+    h = max(0.0, 1 - np.hypot(x, y) / (3 * grip))
+    force, lever = grip * (1 - h**3), p["tyre.width"] * (1 - h) * h**3
+    cosine, sine = x / np.hypot(x, y), y / np.hypot(x, y)
+    return force * cosine, -force * sine, grip * lever * sine
+
+
 def fiala(fz: float, kappa: float, t: float, p: Numbers) -> tuple[float, float, float]:
     """Longitudinal and lateral force in N, aligning moment in N m, by load and slips."""
     if fz == 0:

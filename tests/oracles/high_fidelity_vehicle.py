@@ -21,6 +21,7 @@ from tests.oracles.high_fidelity_data import (
     WHEELS,
     Numbers,
     arm_axis,
+    brush,
     fiala,
     front_points,
     masses_and_tensors,
@@ -28,6 +29,7 @@ from tests.oracles.high_fidelity_data import (
     tie_rod_length,
 )
 from tests.oracles.taylor import X, Y, Z, axial, euler_321, times, turned
+from tests.oracles.vehicle_lagrange import Driven
 
 
 def along(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -126,11 +128,18 @@ class Instant:
     """The vehicle in a state: velocities, accelerations without qdd, and Jacobians of bodies."""
 
     def __init__(
-        self, q: np.ndarray, qd: np.ndarray, s: float, sd: float, sdd: float, p: Numbers
+        self,
+        q: np.ndarray,
+        qd: np.ndarray,
+        s: float,
+        sd: float,
+        sdd: float,
+        p: Numbers,
+        driven: Driven | None = None,
     ) -> None:
         path, rack = paths(np.asarray(q), np.asarray(qd), s, sd, sdd)
         front, rear = front_axle(path, rack, p), rear_axle(path, p)
-        self.p, self.spins = p, np.asarray(qd)[22:]
+        self.p, self.spins, self.driven = p, np.asarray(qd)[22:], driven
         self.loops = front.loops
         self.springs = np.concatenate([front.springs, rear.springs], axis=2)
         self.masses, tensors = masses_and_tensors(p)
@@ -175,7 +184,12 @@ class Instant:
         heading = heading / np.linalg.norm(heading, axis=1, keepdims=True)
         down = np.cross(axis, heading)
         cos_camber = -down @ Z
-        radii = self.places[WHEELS][:, 2] / cos_camber
+        driven = self.driven or Driven()
+        road, road_rate, friction = (
+            np.broadcast_to(values, 4)
+            for values in (driven.road, driven.road_rate, driven.friction)
+        )
+        radii = (self.places[WHEELS][:, 2] - road) / cos_camber
         arms = radii[:, None] * down
         velocities = self.v[WHEELS] + np.cross(self.w[HOLDERS], arms)
         found = []
@@ -183,11 +197,15 @@ class Instant:
             frame = np.array([heading[number], np.cross(Z, heading[number]), Z])
             v_x, v_y, v_z = frame @ velocity
             elastic = p["tyre.vertical_stiffness"] * max(p["tyre.unloaded_radius"] - r, 0.0)
-            damping = -p["tyre.vertical_damping"] * v_z / cos_camber[number]
+            rise = v_z - road_rate[number]
+            damping = -p["tyre.vertical_damping"] * rise / cos_camber[number]
             fz = elastic + min(elastic, damping) if elastic + damping > 0 else 0.0
             bound = max(abs(v_x), p["tyre.v_low"])
             kappa, t = (self.spins[number] * r - v_x) / bound, v_y / bound
-            fx, fy, mz = fiala(fz, kappa, t, p)
+            if self.driven is None:
+                fx, fy, mz = fiala(fz, kappa, t, p)
+            else:
+                fx, fy, mz = brush(friction[number], fz, kappa, t, p)
             force = np.array([fx, fy, fz]) @ frame
             torque = np.cross(arms[number], force) + mz * Z
             values = {"r": r, "V_x": v_x, "kappa": kappa, "t": t, "Fx": fx, "Fy": fy, "Fz": fz}
@@ -205,6 +223,17 @@ class Instant:
         for wheel, tyre in zip(WHEELS, self.tyres(), strict=True):
             forces = forces + self.moving[:, wheel] @ tyre["force"]
             forces = forces + self.turning[:, wheel] @ tyre["torque"]
+        return forces if self.driven is None else forces + self.driven_forces(self.driven)
+
+    def driven_forces(self, driven: Driven) -> np.ndarray:
+        """Virtual work of half shafts from the chassis, of calipers on the carriers, of a push."""
+        axes = self.turns[HOLDERS][:, :, 1]
+        drive = np.broadcast_to(driven.drive, 4)
+        forces = driven.push * self.moving[:, 0] @ self.turns[0][:, 0]
+        for k, (wheel, holder) in enumerate(zip(WHEELS, HOLDERS, strict=True)):
+            against = driven.torque(self.spins)[k] - drive[k]
+            forces += (self.turning[:, wheel] - self.turning[:, 0]) @ axes[k] * drive[k]
+            forces += (self.turning[:, wheel] - self.turning[:, holder]) @ axes[k] * against
         return forces
 
 
@@ -218,10 +247,16 @@ def stabilised(
 
 
 def accelerations(
-    q: np.ndarray, qd: np.ndarray, s: float, sd: float, sdd: float, p: Numbers = PARAMETERS
+    q: np.ndarray,
+    qd: np.ndarray,
+    s: float,
+    sd: float,
+    sdd: float,
+    p: Numbers = PARAMETERS,
+    driven: Driven | None = None,
 ) -> np.ndarray:
     """The second derivative qdd (26,) of the coordinates."""
-    now = Instant(q, qd, s, sd, sdd, p)
+    now = Instant(q, qd, s, sd, sdd, p, driven)
     mass, bias = now.mass_and_bias()
     _, _, jacobian, gamma = stabilised(now.loops, p)
     system = np.block([[mass, -jacobian.T], [jacobian, np.zeros((12, 12))]])

@@ -118,6 +118,15 @@ def magic_formula(
     return fx, fy, -trail * fy
 
 
+def magic_formula_on(
+    friction: np.ndarray, load: np.ndarray, kappa: np.ndarray, alpha: np.ndarray, p: Numbers
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fx, Fy and Mz by similarity; the cosine of the trail is that of the slip angle itself."""
+    fx, fy, mz = magic_formula(load, kappa / friction, alpha / friction, p)
+    turn = np.cos(alpha) / np.cos(alpha / friction)
+    return friction * fx, friction * fy, friction * turn * mz
+
+
 def single_track_yaw_gain(p: Numbers = PARAMETERS, speed: float = 20.0) -> float:
     """Steady r/delta of the linear single-track car: static stiffnesses and pneumatic trails.
 
@@ -135,6 +144,22 @@ def single_track_yaw_gain(p: Numbers = PARAMETERS, speed: float = 20.0) -> float
 
 
 # Mechanics
+
+
+@dataclass
+class Driven:
+    """What drives and carries the vehicle; arrays are of the wheels FL, FR, RL, RR."""
+
+    drive: np.ndarray | float = 0.0
+    brake: np.ndarray | float = 0.0
+    friction: np.ndarray | float = 1.0
+    road: np.ndarray | float = 0.0
+    road_rate: np.ndarray | float = 0.0
+    push: float = 0.0  # along the chassis at the sprung centre
+
+    def torque(self, spin: np.ndarray) -> np.ndarray:
+        """Torque on the wheels about their axes."""
+        return self.drive - self.brake * spin / np.sqrt(1.0 + spin**2)
 
 
 @dataclass
@@ -189,8 +214,10 @@ def inner(a: Placement, i: int, b: Placement, j: int, p: Numbers) -> np.ndarray:
 class Instant:
     """A vehicle in a state: Jacobians, the coordinates' rates and the tyres' contact."""
 
-    def __init__(self, x: np.ndarray, delta: complex, p: Numbers) -> None:
-        q, nu = x[:14], x[14:]
+    def __init__(
+        self, x: np.ndarray, delta: complex, p: Numbers, driven: Driven | None = None
+    ) -> None:
+        q, nu, self.driven = x[:14], x[14:], driven or Driven()
         self.p, self.z, self.z_dot, self.nu = p, q[6:10], nu[6:10], nu
         eye = np.eye(14, dtype=np.result_type(x, float))
         self.units = place(q, eye, delta, p)
@@ -198,7 +225,7 @@ class Instant:
         self.speeds = self.quasi_speeds(self.units, 1)  # d(nu)/d(qdot)
         self.q_dot = np.linalg.solve(self.speeds, nu)
         self.path = place(q, self.q_dot[None], delta, p)
-        self.height = self.units.centres[0, 0, :, 2]
+        self.height = self.units.centres[0, 0, :, 2] - self.driven.road
 
         # the material point of every wheel on the road vertically below its centre
         arm = np.stack([0 * self.height, 0 * self.height, -self.height], axis=-1)
@@ -219,7 +246,8 @@ class Instant:
         self.slide_y = np.sum(self.sideward * sliding, axis=-1)
         rolling = np.sqrt(np.sum(self.forward * centre_velocity, axis=-1) ** 2 + p["v0"] ** 2)
         self.kappa, self.alpha = -self.slide_x / rolling, np.arctan(self.slide_y / rolling)
-        load = p["kt"] * (p["R0"] - self.height) - p["ct"] * centre_velocity[:, 2]
+        rise = centre_velocity[:, 2] - self.driven.road_rate
+        load = p["kt"] * (p["R0"] - self.height) - p["ct"] * rise
         self.touches = load.real > 0
         self.load = np.where(self.touches, load, 0.0)
 
@@ -239,7 +267,8 @@ class Instant:
     def shear_forces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Fx, Fy, Mz."""
         regular = np.where(self.touches, self.load, self.p["FNOMIN"])
-        forces = magic_formula(regular, self.kappa, self.alpha, self.p)
+        slips = self.kappa, self.alpha
+        forces = magic_formula_on(self.driven.friction + 0 * regular, regular, *slips, self.p)
         return tuple(np.where(self.touches, force, 0.0) for force in forces)
 
     def applied(self) -> np.ndarray:
@@ -254,12 +283,16 @@ class Instant:
         q -= p["m_s"] * p["g"] * self.units.cg[1, :, 2]
         q[6:10] -= per_wheel(d, "S0") + per_wheel(p, "k") * self.z
         q[6:10] -= per_wheel(p, "c") * self.z_dot
+        q += self.driven.push * self.units.cg[1] @ self.frame[:, 0]
+        q[10:14] += self.driven.torque(self.nu[10:])
         return q
 
 
-def accelerations(x: np.ndarray, delta: complex, p: Numbers = PARAMETERS) -> np.ndarray:
+def accelerations(
+    x: np.ndarray, delta: complex, p: Numbers = PARAMETERS, driven: Driven | None = None
+) -> np.ndarray:
     """Derivative (28,) of a real or complex state (q, nu), with the steering angle held."""
-    now = Instant(np.asarray(x), delta, p)
+    now = Instant(np.asarray(x), delta, p, driven)
     mass = inner(now.units, 1, now.units, 1, p)
     bias = 2 * inner(now.units, 1, now.path, 2, p)[:, 0]
     q_second = np.linalg.solve(mass, now.applied() - bias)
@@ -289,12 +322,17 @@ def tire_forces(x: np.ndarray, delta: complex, p: Numbers = PARAMETERS) -> dict[
     return {"Fx": fx, "Fy": fy, "Fz": now.load, "Mz": mz, **slips}
 
 
-def energy(x: np.ndarray, p: Numbers = PARAMETERS, delta: float = 0.0) -> float:
+def energy(
+    x: np.ndarray,
+    p: Numbers = PARAMETERS,
+    delta: float = 0.0,
+    driven: Driven | None = None,
+) -> float:
     """Kinetic and potential energy."""
-    now, d = Instant(np.asarray(x), delta, p), derived(p)
+    now, d = Instant(np.asarray(x), delta, p, driven), derived(p)
     kinetic = inner(now.path, 1, now.path, 1, p)[0, 0] / 2
     potential = p["m_s"] * p["g"] * x[2] + np.sum(
-        p["m_u"] * p["g"] * now.height
+        p["m_u"] * p["g"] * now.units.centres[0, 0, :, 2]
         + per_wheel(d, "S0") * now.z
         + per_wheel(p, "k") * now.z**2 / 2
         + p["kt"] * np.maximum(0, p["R0"] - now.height) ** 2 / 2
@@ -302,13 +340,18 @@ def energy(x: np.ndarray, p: Numbers = PARAMETERS, delta: float = 0.0) -> float:
     return kinetic + potential
 
 
-def power(x: np.ndarray, delta: float, p: Numbers = PARAMETERS) -> float:
+def power(
+    x: np.ndarray, delta: float, p: Numbers = PARAMETERS, driven: Driven | None = None
+) -> float:
     """Rate of the energy while the steering angle is held (without damping of the tyres)."""
-    now = Instant(np.asarray(x), delta, p)
+    now = Instant(np.asarray(x), delta, p, driven)
     fx, fy, mz = now.shear_forces()
     turning = now.q_dot @ now.turning
     lost = per_wheel(p, "c") * now.z_dot**2
-    return np.sum(fx * now.slide_x + fy * now.slide_y + mz * turning - lost)
+    inputs, spin = now.driven, now.nu[10:]
+    put_in = inputs.torque(spin) * spin + inputs.road_rate * now.load
+    pushed = inputs.push * now.nu[0]
+    return pushed + np.sum(put_in + fx * now.slide_x + fy * now.slide_y + mz * turning - lost)
 
 
 def mirror(x: np.ndarray) -> np.ndarray:

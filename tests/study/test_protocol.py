@@ -254,6 +254,8 @@ def test_only_a_miss_without_a_word_is_silent():
     assert found.missed.tolist() == [False, True, True, True, False]
     assert found.undetected.tolist() == [False, True, False, False, False]
     assert found.warned.tolist() == [False, False, True, True, True]
+    counts = {"runs": 5, "right": 2, "misses": 3, "silent": 1, "flagged": 3}
+    assert found.counts == counts
 
 
 def test_runs_of_a_sensitive_full_order_are_found(protocol):

@@ -40,6 +40,26 @@ def test_one_driver_drives_the_full_and_the_reduced_car(cars):
     assert known < 1.0
 
 
+def test_a_driver_keeps_to_the_course_with_steering_throttle_and_brake():
+    course = example("around_a_course")
+    middle, _, car, record, _ = course.lap()
+    x, y, speed, steering, drive, _, brake = record.T[:7]
+    off = np.abs((x + 1j * y)[:, None] - middle).min(axis=1)
+    assert off.max() < 1.5
+    # Once round: the heading turns by 360 degrees, to the left.
+    assert len(record) * course.PERIOD > np.abs(np.diff(middle)).sum() / course.FASTEST
+    assert min(drive.max(), brake.max()) > 100.0
+    assert np.ptp(speed) > 10.0
+    assert steering.mean() > 0.0
+    times = course.PERIOD * np.arange(len(record))
+    again = vm.Signal.from_samples(times, record[:, 3:], "zero", inputs=["delta", *course.INPUTS])
+    run = car.simulate(again)
+    assert (
+        np.hypot(run["longitudinal_position"][-1] - x[-1], run["lateral_position"][-1] - y[-1])
+        < 0.1
+    )
+
+
 def test_hard_points_are_an_optimum_within_bounds_that_the_path_map_finds():
     design = example("hard_points")
     place, found = (design.hard_points(method) for method in ("full_order", "path_map"))

@@ -33,17 +33,13 @@ def braking_in_turn(motion: Motion) -> dict[str, float]:
     begin = float(motion.times[_begin(motion)])
     then = begin + AFTER
     speed, yaw_rate = motion.at("speed", begin), motion.at("yaw_rate", begin)
-    # Chassis axes of the turn, with the centre of the circle at the left side of the course.
+    # The circle goes on; its centre lies to the left of the course, or at a negative radius right.
     course, radius = motion.at("yaw", begin) + motion.at("sideslip", begin), speed / yaw_rate
     centre = 1j * radius * np.exp(1j * course)
-    gone = complex(
-        motion.at("longitudinal_position", then) - motion.at("longitudinal_position", begin),
-        motion.at("lateral_position", then) - motion.at("lateral_position", begin),
-    )
     return {
         "yaw_rate_ratio": motion.at("yaw_rate", then) / yaw_rate,
         "mean_deceleration": (speed - motion.at("speed", then)) / AFTER,
-        "path_deviation": float(abs(radius) - abs(gone - centre)),
+        "path_deviation": float(abs(radius) - abs(motion.moved(begin, then) - centre)),
     }
 
 

@@ -53,8 +53,7 @@ def declared() -> MetricsFile:
 def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
     """Numbers of the standards of a handling test, of a full or a reduced vehicle.
 
-    Position, speed, sideslip and lateral acceleration are those of the sprung body's centre of
-    mass, see `docs/handling.md`.  What a run does not reach is not a number.
+    What a run does not reach is not a number.
 
     Parameters
     ----------
@@ -73,24 +72,41 @@ def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
     ------
     InputError
         If the run is of no such maneuver, of no vehicle, or has not come to its end.
+
+    Notes
+    -----
+    Simplified: motion is that of the sprung body's centre of mass along chassis axes (ISO 8855 has
+    horizontal ones), steering is the angle of the front wheels, and begins and ends at 5 % of its
+    largest value (49 CFR 571.126: 5 degrees of the steering wheel, zero).  The frequency response
+    is a fitted difference equation (ISO 7401: Fourier spectra).  ISO numbers follow common
+    definitions, since the standards are not public.
     """
+    import xarray as xr
+
     if not isinstance(run, Trajectory):
         raise InputError(f"run is {quoted(run)}, not a run as `simulate` gives it")
-    name = test_of(run.maneuver if maneuver is None else maneuver)
-    return _numbers(motion_of(run), name)
+    test = test_of(run.maneuver if maneuver is None else maneuver)
+    motion, standard = motion_of(run), declared().standards[test]
+    variables: dict[str, tuple] = {}
+    coordinates: dict[str, tuple] = {}
+    for name, value in TESTS[test](motion).items():
+        unit, definition = declared().numbers[test][name]
+        attributes = {"units": unit, "long_name": definition, "standard": standard}
+        variables[name] = ("frequency" if np.ndim(value) else (), value, attributes)
+        if np.ndim(value):
+            hertz = {"units": "Hz", "long_name": "frequency of the steering"}
+            coordinates["frequency"] = "frequency", steering_tests.FREQUENCIES, hertz
+    speed = {"units": "m/s", "long_name": "speed at the start"}
+    variables["speed"] = (), motion.speed[0], speed
+    return xr.Dataset(variables, coordinates, {"maneuver": test})
 
 
 def test_of(maneuver: str) -> str:
     """The test that a maneuver is; `InputError` if it is none."""
     name = maneuver.removeprefix(RACK) if isinstance(maneuver, str) else maneuver
-    if not name:
+    if isinstance(name, str) and not name:
         raise InputError(f"the run is of no registered maneuver: name one of {', '.join(TESTS)}")
     return choice("maneuver with numbers", name, TESTS)
-
-
-def standard_of(test: str) -> str:
-    """Number of the standard of a test."""
-    return declared().standards[test]
 
 
 def motion_of(run: Trajectory) -> Motion:
@@ -101,21 +117,3 @@ def motion_of(run: Trajectory) -> Motion:
     wheelbase = model.definition.wheelbase
     length = np.nan if wheelbase is None else float(wheelbase(model.parameters.values()))
     return Motion(run.times[:n], dict([*inputs, *outputs]), length)
-
-
-def _numbers(motion: Motion, test: str) -> xr.Dataset:
-    """Numbers of a test with units and definitions."""
-    import xarray as xr
-
-    variables: dict[str, tuple] = {}
-    coordinates: dict[str, tuple] = {}
-    for name, value in TESTS[test](motion).items():
-        unit, definition = declared().numbers[test][name]
-        attributes = {"units": unit, "long_name": definition, "standard": standard_of(test)}
-        variables[name] = ("frequency" if np.ndim(value) else (), value, attributes)
-        if np.ndim(value):
-            hertz = {"units": "Hz", "long_name": "frequency of the steering"}
-            coordinates["frequency"] = "frequency", steering_tests.FREQUENCIES, hertz
-    speed = {"units": "m/s", "long_name": "speed at the start"}
-    variables["speed"] = (), motion.speed[0], speed
-    return xr.Dataset(variables, coordinates, {"maneuver": test})

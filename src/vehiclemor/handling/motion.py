@@ -47,6 +47,11 @@ class Motion:
         """Value at a time in s, linear between the samples; not a number after the run."""
         return float(np.interp(time, self.times, self[name], right=np.nan))
 
+    def moved(self, begin: float, end: float) -> complex:
+        """Way from one time in s to another: x + 1j y in m."""
+        x, y = (self.at(name, end) - self.at(name, begin) for name in NEEDED[:2])
+        return complex(x, y)
+
     @property
     def steering(self) -> np.ndarray:
         """What the driver moves: angle of the front wheels in rad or displacement of the rack."""

@@ -125,10 +125,6 @@ def sine_with_dwell(motion: Motion) -> dict[str, float]:
         name: -side * motion.at("yaw_rate", end + after) / peak
         for name, after in RATIO_TIMES.items()
     }
-    heading, then = motion.at("yaw", begin), begin + DISPLACEMENT_TIME
-    ahead, aside = (
-        motion.at(name, then) - motion.at(name, begin)
-        for name in ("longitudinal_position", "lateral_position")
-    )
-    displacement = side * (aside * np.cos(heading) - ahead * np.sin(heading))
-    return numbers | {"lateral_displacement": displacement}
+    moved = motion.moved(begin, begin + DISPLACEMENT_TIME)
+    aside = (moved * np.exp(-1j * motion.at("yaw", begin))).imag
+    return numbers | {"lateral_displacement": side * aside}

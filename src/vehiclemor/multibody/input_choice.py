@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 
+from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError, did_you_mean
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.multibody.quantities import InputChoice, integral_of
@@ -26,6 +27,8 @@ def driving(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinitio
 
 def with_overrides(definition: ModelDefinition, overrides: Mapping[str, object]) -> ModelDefinition:
     """The declaration with the optional inputs as parameters for which there are values."""
+    if not isinstance(overrides, Mapping):
+        raise InputError(f"parameters must be a mapping of values by name, not {quoted(overrides)}")
     names = {quantity.name for quantity in definition.optional_inputs}
     return with_constants(definition, names.intersection(overrides))
 

@@ -85,7 +85,8 @@ def _model(
     name: str, overrides: Mapping[str, object] | None, parameter_file: Path | None
 ) -> Description:
     """Kind, parameters, starts, inputs, outputs and states of a model, and what reduces it."""
-    definition: ModelDefinition = with_overrides(component("model", name), overrides or {})
+    overrides = {} if overrides is None else overrides
+    definition: ModelDefinition = with_overrides(component("model", name), overrides)
     path = parameter_file or definition.parameter_file or parameter_path(name)
     parameters = load_parameters(name, definition.parameters, path, overrides)
     accepted = {method: _accepts(method, definition)[0] for method in names("method")}

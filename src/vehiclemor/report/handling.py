@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.handling.metrics import RACK, TESTS, metrics, standard_of, test_of
+from vehiclemor.handling.metrics import RACK, TESTS, declared, metrics, test_of
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.registry import names
 
@@ -47,7 +47,7 @@ def handling_rows(
     first, *reduced = models.values()
     start, speed = first.model.start(), first.parameters.get("initial_speed", np.nan)
     chosen = list(maneuvers) or maneuvers_of(first, reduced)
-    standards = {name: standard_of(test_of(name)) for name in chosen}
+    standards = {name: declared().standards[test_of(name)] for name in chosen}
     rows: list[dict[str, Any]] = []
     for name, standard in standards.items():
         maneuver = registered(name).perturbed(amplitude=amplitude)

@@ -105,9 +105,9 @@ def simulate_many(
     full = getattr(given, "model", given)
     if not isinstance(full, Model):
         raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
-    if given is full and isinstance(signals, Sequence):
-        driven = (name for signal in signals for name in getattr(signal, "inputs", ()))
-        given = full = full.driving(driven)
+    is_list = isinstance(signals, Sequence) and all(isinstance(s, Excitation) for s in signals)
+    if given is full and is_list:
+        given = full = full.driving([name for signal in signals for name in signal.inputs])
     runs, names = _count_of(signals, full), _names(full, outputs)
     kept, rows = _kept_times(times, signals)
     begins = _starts_of(starts, runs, full)

@@ -67,12 +67,10 @@ def build(
     if not isinstance(inputs, Mapping):
         raise InputError(f"inputs must be a mapping of values by name, not {quoted(inputs)}")
     definition = with_constants(definition, inputs)
-    if isinstance(overrides, Mapping):
-        definition = with_overrides(definition, overrides)
-        overrides = {**overrides, **inputs}
+    overrides = {} if overrides is None else overrides
+    definition = with_overrides(definition, overrides)
     path = parameter_file or definition.parameter_file
-    overrides = inputs if overrides is None else overrides
-    parameters = load_parameters(name, definition.parameters, path, overrides)
+    parameters = load_parameters(name, definition.parameters, path, {**overrides, **inputs})
     with first_use(name):
         return _made(definition, parameters)
 

@@ -15,6 +15,7 @@ from vehiclemor.multibody.quantities import DEFAULTS
 LARGEST = sys.float_info.max
 # Slip ratio beyond which the longitudinal force of a tire falls: the wheel locks or spins.
 LARGE_SLIP = 0.2
+LOCKED = f"slip beyond {LARGE_SLIP:g}, locked or spinning"
 
 
 def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
@@ -151,7 +152,7 @@ def wheel_remarks(
     if off := _wheels(loads, first[: len(loads)], times):
         remarks.append(f"off the ground for a time: {off}")
     if sliding := _wheels(slips, first[len(loads) :], times):
-        remarks.append(f"slip beyond {LARGE_SLIP:g}, locked or spinning: {sliding}")
+        remarks.append(f"{LOCKED}: {sliding}")
     return remarks
 
 

@@ -14,10 +14,10 @@ from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import STATE_KINDS
-from vehiclemor.simulation.checks import left_validity, stopped, wheel_remarks
+from vehiclemor.simulation.checks import LOCKED, left_validity, stopped, wheel_remarks
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.evaluation import By, chosen
-from vehiclemor.simulation.integrators.catalogue import integrator
+from vehiclemor.simulation.integrators.catalogue import frozen, integrator
 from vehiclemor.simulation.integrators.step_kernels import partners
 from vehiclemor.simulation.linear_model import LinearModel
 from vehiclemor.simulation.model import Model
@@ -212,6 +212,9 @@ class DynamicModel(Model):
             inputs = maneuver.at(run.times)
         trajectory = self.recorded(maneuver, run, inputs, run.recorded_states, outputs=outputs)
         run.give_back()
+        if LOCKED in trajectory.remark and frozen(how.name):
+            remark = f"{trajectory.remark}; {how.name} errs there, its Jacobian is frozen"
+            return Trajectory.of(**trajectory.__dict__ | {"remark": remark})
         return trajectory
 
     def trajectory(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
@@ -14,6 +14,7 @@ import numpy as np
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.columns import listed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.multibody.definition import ModelDefinition
@@ -168,9 +169,9 @@ class Model(ShortRepr):
         # To look one up for each run would take as long as a step.
         return {}
 
-    def driving(self, names: Iterable[str]) -> Self:
+    def driving(self, names: str | Sequence[str]) -> Self:
         """The model whose runs drive the optional inputs among these names too, cached."""
-        names = [*names]
+        names = listed(names)
         if self._undriven.isdisjoint(names) or self.rebuilt is None:
             return self
         return self.rebuilt(self, driving(self.definition, names))

@@ -169,7 +169,7 @@ def model_of_run(model: Model, scenario: Scenario) -> Model:
 
 def driven_by_all(model: Model, scenarios: Sequence[Scenario]) -> Model:
     """The model with all optional inputs that some scenarios drive."""
-    return model.driving(name for scenario in scenarios for name in scenario.maneuver.inputs)
+    return model.driving([name for scenario in scenarios for name in scenario.maneuver.inputs])
 
 
 # More than the runs of a protocol, over which all rows go.

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.oracles.high_fidelity_data import PARAMETERS as SPECIFIED
-from tests.oracles.high_fidelity_data import fiala
-from tests.oracles.vehicle_lagrange import PARAMETERS, magic_formula
+from tests.oracles.high_fidelity_data import brush, fiala
+from tests.oracles.vehicle_lagrange import PARAMETERS, magic_formula, magic_formula_on
 from tests.unit.programs import function_of
 from vehiclemor.multibody.components import tires
 from vehiclemor.multibody.quantities import FIALA
@@ -27,22 +27,29 @@ def exact(values: dict[str, float]) -> dict[str, sp.Float]:
 
 
 def compiled(name: str):
-    """(load, slip ratio, slip angle or its tangent) -> (Fx, Fy, Mz)."""
-    tape = Tape()
-    load, kappa, slip, cosine = symbols = sp.symbols("load kappa slip cosine", real=True)
-    if name == "fiala":
+    """(load, slip ratio, slip angle or its tangent, friction) -> (Fx, Fy, Mz)."""
+    tape, names = Tape(), "load kappa slip cosine friction"
+    load, kappa, slip, cosine, friction = symbols = sp.symbols(names, real=True)
+    if name != "magic formula":
         own = exact(dict(zip(FIALA, COEFFICIENTS, strict=True)))
-        forces = tires.fiala(tape, own, load, kappa, slip)
+        arguments = (friction,) if name == "brush" else ()
+        forces = getattr(tires, name)(tape, own, load, kappa, slip, *arguments)
     else:
         own = exact(PARAMETERS)
         sizes = sp.Float(REFERENCE_LOAD, 17), sp.Float(PARAMETERS["R0"], 17)
-        forces = tires.magic_formula(tape, own, load, *sizes, kappa, slip, cosine)
+        forces = tires.magic_formula(tape, own, load, *sizes, kappa, slip, cosine, friction)
     results = [forces.longitudinal, forces.lateral, forces.aligning]
     function = function_of(tape, symbols, results, "math")
-    return lambda load, kappa, slip: np.array(function(load, kappa, slip, math.cos(slip)))
+
+    def forces_at(load: float, kappa: float, slip: float, friction: float = 1.0) -> np.ndarray:
+        return np.array(function(load, kappa, slip, math.cos(slip), friction))
+
+    return forces_at
 
 
-TIRES = {name: compiled(name) for name in ("fiala", "magic formula")}
+TIRES = {name: compiled(name) for name in ("fiala", "brush", "magic formula")}
+# Tires that bear slip in both directions.
+combined = pytest.mark.parametrize("name", ["brush", "magic formula"])
 each = pytest.mark.parametrize("tire", TIRES.values(), ids=TIRES)
 loads, slips = st.floats(50.0, 9000.0), st.floats(-1.0, 1.0)
 
@@ -85,6 +92,49 @@ def test_an_unloaded_tire_has_no_force(tire, kappa, slip):
     # No load, and no slip in one or both directions: nothing is divided by zero.
     for slipping in ((kappa, slip), (0.0, 0.0), (kappa, 0.0), (0.0, slip)):
         assert not tire(0.0, *slipping).any()
+
+
+@given(load=loads, kappa=slips, slip=st.floats(-1.2, 1.2), friction=st.floats(0.05, 1.5))
+def test_friction_acts_on_independent_tires_alike(load, kappa, slip, friction):
+    for name, expected in (
+        ("brush", brush(friction, load, kappa, slip, SPECIFIED)),
+        ("magic formula", magic_formula_on(friction, load, kappa, slip, PARAMETERS)),
+    ):
+        found = TIRES[name](load, kappa, slip, friction)
+        assert found == pytest.approx([float(f) for f in expected], rel=1e-9, abs=1e-8)
+
+
+@given(load=loads, slip=st.floats(-3.0, 3.0))
+def test_without_longitudinal_slip_the_brush_is_fialas_tire(load, slip):
+    assert TIRES["brush"](load, 0.0, slip) == pytest.approx(TIRES["fiala"](load, 0.0, slip))
+
+
+@combined
+@pytest.mark.parametrize("friction", [0.3, 0.6, 1.0])
+def test_combined_slip_takes_energy_and_uses_the_friction_once(name, friction):
+    """Of the friction ellipse the published weights of the Magic Formula use 1.07 at most."""
+    for load in (1500.0, 4000.0, 6000.0):
+        d = load / REFERENCE_LOAD - 1.0
+        peaks = [PARAMETERS[f"{k}1"] + PARAMETERS[f"{k}2"] * d for k in ("PDX", "PDY")]
+        peaks, most = ([MOST, MOST], 1.0 + 1e-12) if name == "brush" else (peaks, 1.08)
+        for kappa in np.linspace(-1.0, 3.0, 41):
+            for angle in np.radians(np.linspace(-60.0, 60.0, 41)):
+                slip = angle if name == "magic formula" else math.tan(angle)
+                fx, fy, _ = TIRES[name](load, kappa, slip, friction)
+                # Sliding is by -kappa forwards and tan(alpha) to the left, per speed.
+                assert fy * math.tan(angle) - fx * kappa <= 1e-9
+                used = math.hypot(fx / peaks[0], fy / peaks[1]) / (friction * load)
+                assert used < most
+
+
+@combined
+@pytest.mark.parametrize(("friction", "degrees"), [(0.3, 7.2), (0.6, 6.0), (1.0, 6.0)])
+def test_a_locked_wheel_is_dragged_against_its_sliding(name, friction, degrees):
+    """Sliding up to 45 degrees aside; with little friction similarity turns the force further."""
+    for angle in np.radians(np.linspace(-45.0, 45.0, 91)):
+        slip = angle if name == "magic formula" else math.tan(angle)
+        fx, fy, _ = TIRES[name](4000.0, -1.0, slip, friction)
+        assert abs(math.degrees(math.atan2(-fy, -fx) - angle)) < degrees
 
 
 @pytest.mark.parametrize(

@@ -89,8 +89,15 @@ def test_a_vehicle_that_comes_to_rest_has_stopped():
 
 
 def test_a_remark_names_the_wheels_that_lock():
-    run = car(**dict.fromkeys(FRICTIONS, 0.3)).simulate(braking(1200.0))
+    slippery = car(**dict.fromkeys(FRICTIONS, 0.3))
+    run = slippery.simulate(braking(1200.0))
     assert "slip beyond 0.2, locked or spinning: FL (first at" in run.remark
+    assert "etdrk4 errs there" not in run.remark
+    frozen = slippery.simulate(braking(1200.0), solver="etdrk4", tolerance=1e-3)
+    assert "etdrk4 errs there" in frozen.remark
+    position = vm.errors(frozen, run)["max_error"].sel(output="longitudinal_position")
+    anew = slippery.simulate(braking(1200.0), solver="rodas4", tolerance=1e-3)
+    assert vm.errors(anew, run)["max_error"].sel(output="longitudinal_position") < 0.2 * position
     assert "slip" not in car().simulate(vm.maneuver("step_steer", 1.0, 3.0)).remark
 
 

@@ -123,8 +123,8 @@ def windows(model: Model, log: Log, folder: Path) -> list[Scenario]:
 def _straightened(signal: Signal, samples: np.ndarray, columns: np.ndarray) -> Signal:
     """A cubic signal, some columns of which are linear: a spline of brakes would be negative."""
     pieces, coefficients = signal.pieces, signal.pieces.coefficients.copy()
-    coefficients[:, columns, 1] = np.diff(samples[:, columns], axis=0)
-    coefficients[:, columns, 2:] = 0.0
+    coefficients[:, 1, columns] = np.diff(samples[:, columns], axis=0)
+    coefficients[:, 2:, columns] = 0.0
     return replace(signal, nominal_pieces=pieces._replace(coefficients=coefficients))
 
 

@@ -1,0 +1,144 @@
+"""Vehicles that drive, brake and meet roads, against independent mechanics and balances."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tests.models import CAR, FIDELITY
+from tests.oracles import high_fidelity_vehicle as fidelity_oracle
+from tests.oracles import vehicle_lagrange as oracle
+from tests.oracles.projected_simulation import projected_state
+from vehiclemor.multibody.quantities import OPTIONAL_INPUTS
+from vehiclemor.registry import component
+from vehiclemor.simulation.build import build
+from vehiclemor.simulation.dynamic import DynamicModel
+
+NAMES = [quantity.name for quantity in OPTIONAL_INPUTS]
+DEFAULTS = np.array([quantity.default for quantity in OPTIONAL_INPUTS])
+# Larger torques, rougher roads than a run has: every term shows.
+LOW = np.repeat([-3000.0, 0.0, 0.1, -0.05, -3.0], 4)
+HIGH = np.repeat([3000.0, 4000.0, 1.4, 0.05, 3.0], 4)
+
+
+@pytest.fixture(scope="module")
+def car() -> DynamicModel:
+    return build(CAR, driven=NAMES)
+
+
+@pytest.fixture(scope="module")
+def fidelity() -> DynamicModel:
+    return build(FIDELITY, driven=NAMES)
+
+
+def random_inputs(rng: np.random.Generator) -> np.ndarray:
+    """All optional inputs (21,)."""
+    return np.array([*rng.uniform(LOW, HIGH), rng.uniform(-5000.0, 5000.0)])
+
+
+def in_oracle(values: np.ndarray) -> oracle.Driven:
+    return oracle.Driven(*values[:20].reshape(5, 4), values[20])
+
+
+def random_state(rng: np.random.Generator, start: np.ndarray) -> np.ndarray:
+    """A large motion of the 14-DOF vehicle; one wheel is locked, one in reverse."""
+    x = start.copy()
+    x[2:6] += rng.uniform(-0.05, 0.05, 4)
+    x[6:10] = rng.uniform(-0.05, 0.05, 4)
+    x[14] = rng.uniform(5.0, 35.0)
+    x[15:24] = rng.uniform(-1.5, 1.5, 9)
+    x[24:] = x[14] / 0.32 * rng.uniform(0.7, 1.2, 4)
+    wheels = rng.permutation(4)
+    x[24 + wheels[0]], x[24 + wheels[1]] = 0.0, -3.0
+    return x
+
+
+def test_inputs_at_their_defaults_change_nothing(car, rng):
+    steered = build(CAR)
+    for _ in range(20):
+        x, delta = random_state(rng, car.start()), rng.uniform(-0.4, 0.4, 1)
+        expected = steered.rhs(x, delta)
+        found = car.rhs(x, np.concatenate([delta, DEFAULTS]))
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-9)
+
+
+def test_every_input_moves_the_car_as_in_dalemberts_principle(rng):
+    """Momenta, spins and travels of all bodies; tires that are damped feel the road's rate."""
+    damped = build(CAR, overrides={"tire_damping": 400.0}, driven=NAMES)
+    parameters = {**oracle.PARAMETERS, "ct": 400.0}
+    for _ in range(40):
+        x, delta = random_state(rng, damped.start()), rng.uniform(-0.4, 0.4)
+        values = random_inputs(rng)
+        found = damped.rhs(x, np.array([delta, *values]))
+        expected = oracle.accelerations(x, delta, parameters, in_oracle(values))
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-8)
+
+
+def test_every_input_moves_the_high_fidelity_vehicle_as_in_dalemberts_principle(fidelity, rng):
+    """Half shafts push the chassis back, calipers the carriers; forces are those of the brush."""
+    slipped = 0
+    for _ in range(20):
+        x, rack = fidelity.start(), rng.uniform(-1.0, 1.0, 3) * [0.02, 0.1, 1.0]
+        values = random_inputs(rng)
+        u = np.array([*rack, *values])
+        x[2:6] += rng.uniform(-0.03, 0.03, 4)
+        x[[10, 17, 20, 21]] = rng.uniform(-0.1, 0.1, 4)
+        x[26:] = rng.uniform(-1.0, 1.0, 26)
+        x[26] += rng.uniform(5.0, 30.0)
+        x[48:] = x[26] / 0.31 * rng.choice([0.0, 0.9, 1.0, 1.02], 4)
+        x = projected_state(fidelity, x, u)
+        state = x[:26], x[26:], *rack
+        expected = fidelity_oracle.accelerations(*state, driven=in_oracle(values))
+        found = fidelity.rhs(x, u)[26:]
+        assert np.abs(found - expected).max() < 1e-11 * max(1.0, np.abs(expected).max())
+        slipped += np.count_nonzero(x[48:] < 1.0)
+    assert slipped > 8
+
+
+def test_energy_changes_by_the_work_of_inputs_and_slip(car):
+    """A turn in which the car drives, brakes until it slips, crosses a bump and meets wind."""
+    delta, wheels = 0.01, np.arange(4)
+
+    def inputs(t: float) -> np.ndarray:
+        drive = np.where(wheels < 2, 0.0, 500.0) * np.sin(np.pi * t) ** 2 * (t < 1.0)
+        brake = np.array([900.0, 900.0, 400.0, 400.0]) * np.sin(np.pi * t) ** 2 * (t > 1.0)
+        bump = np.array([0.02, 0.0, 0.02, 0.0])
+        phase = 2.0 * np.pi * t
+        road, rate = bump * (1.0 - np.cos(phase)) / 2, bump * np.pi * np.sin(phase)
+        return np.concatenate([drive, brake, [0.6, 1.0, 0.6, 1.0], road, rate, [-400.0]])
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        x, values = y[:28], inputs(t)
+        power = oracle.power(x, delta, driven=in_oracle(values))
+        return [*car.rhs(x, np.array([delta, *values])), power]
+
+    state = np.array([*car.start(), 0.0])
+    stored = [oracle.energy(state[:28], driven=in_oracle(inputs(0.0)))]
+    for end in (1.0, 2.0):
+        state = solve_ivp(rates, (end - 1.0, end), state, rtol=1e-8, atol=1e-8).y[:, -1]
+        stored.append(oracle.energy(state[:28], driven=in_oracle(inputs(end))))
+    # It brakes by more than a tenth of its energy.
+    assert stored[0] - stored[-1] > 0.1 * stored[0]
+    assert stored[-1] - stored[0] == pytest.approx(state[28], abs=1e-6 * stored[0])
+
+
+@pytest.mark.parametrize(("speed", "limit"), [(20.0, 14e-3), (5.0, 3.5e-3)])
+def test_a_step_of_runge_kutta_is_limited_by_wheel_slip(speed, limit):
+    """The classical formula of order 4 at straight running; slip stiffens as the car slows."""
+    model = build(CAR, overrides={"initial_speed": speed})
+    eigenvalues = np.linalg.eigvals(model.jacobian(model.start(), [0.0]))
+
+    def growth(step: float) -> float:
+        z = step * eigenvalues[np.abs(eigenvalues) > 1e-3]
+        return np.abs(1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24).max()
+
+    assert growth(0.95 * limit) < 1.0 < growth(1.05 * limit)
+
+
+def test_torques_of_zero_keep_the_lane_of_the_high_fidelity_vehicle(fidelity):
+    """With torques its tires are combined: the lane change moves by less than a millimetre."""
+    lane_change = component("maneuver", "rack_lane_change")
+    times = np.linspace(0.0, 10.0, 101)
+    steered = build(FIDELITY).simulate(lane_change, times=times)
+    torques = fidelity.simulate(lane_change, times=times)
+    moved = steered["lateral_position"] - torques["lateral_position"]
+    assert 1e-5 < np.abs(moved).max() < 1e-3
