@@ -9,6 +9,9 @@ from vehiclemor.inputs.maneuver import registered
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import ModelDefinition
 
+# Part of an input's largest magnitude by which polynomials pass a bound that its samples keep.
+ROUNDING = 1e-9
+
 
 def checked_maneuver(maneuver: str | Excitation, definition: ModelDefinition) -> Excitation:
     """A maneuver, also by its name; a signal with all inputs that a model has.
@@ -57,11 +60,10 @@ def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
         outside, since = np.flatnonzero(beyond.any(axis=0)), times[beyond.argmax(axis=0)]
     else:
         extent = maneuver.extent
-        outside = np.flatnonzero((extent.low < low) | (extent.high > high))
-        however_quick = np.full((2, len(low)), np.inf)
-        since = (
-            maneuver.first_beyond(np.vstack([low, high, however_quick])) if len(outside) else low
-        )
+        rounding = ROUNDING * extent.largest[0]
+        outside = np.flatnonzero((extent.low < low - rounding) | (extent.high > high + rounding))
+        limits = np.vstack([low - rounding, high + rounding, *np.full((2, len(low)), np.inf)])
+        since = maneuver.first_beyond(limits) if len(outside) else low
     if len(outside):
         j = outside[since[outside].argmin()]
         quantity, value = definition.inputs[j], maneuver.at(since[j : j + 1])[0, j]

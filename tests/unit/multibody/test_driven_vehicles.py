@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import vehiclemor as vm
 from tests.models import CAR, FIDELITY
 from tests.oracles import high_fidelity_vehicle as fidelity_oracle
 from tests.oracles import vehicle_lagrange as oracle
 from tests.oracles.projected_simulation import projected_state
-from vehiclemor.multibody.quantities import OPTIONAL_INPUTS
+from vehiclemor.inputs.driving import BRAKING, MASS, RADIUS
+from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, WHEELS
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -142,3 +144,31 @@ def test_torques_of_zero_keep_the_lane_of_the_high_fidelity_vehicle(fidelity):
     torques = fidelity.simulate(lane_change, times=times)
     moved = steered["lateral_position"] - torques["lateral_position"]
     assert 1e-5 < np.abs(moved).max() < 1e-3
+
+
+@pytest.mark.parametrize("amplitude", [1.0, 0.8 / 0.3])
+def test_brakes_slow_the_mass_and_the_spinning_wheels(amplitude):
+    fast = vm.model(CAR, {"initial_speed": 30.0})
+    run = fast.simulate(vm.maneuver("straight_braking", amplitude=amplitude))
+    p = fast.parameters.values()
+    spinning = 4 * p["spin_inertia"] / RADIUS**2
+    mass = p["sprung_mass"] + 4 * p["unsprung_mass"] + spinning
+    speed = np.interp([1.7, 3.7], run.times, run["longitudinal_speed"])
+    # The loaded radius of a wheel changes with its load, by some percent.
+    deceleration = (speed[0] - speed[1]) / 2.0
+    assert deceleration == pytest.approx(MASS * BRAKING * amplitude / mass, rel=0.03)
+    assert (run["pitch"][50:100] > -1e-6).all()
+
+
+def test_locked_wheels_use_the_friction_that_there_is():
+    slippery = vm.model(CAR, {"initial_speed": 30.0}, inputs={f"friction_{w}": 0.3 for w in WHEELS})
+    run = slippery.simulate(vm.maneuver("straight_braking", amplitude=2.0))
+    p, locked = slippery.parameters.values(), (run.times > 2.0) & (run.times < 6.0)
+    assert max(run[f"slip_ratio_{wheel}"][locked].max() for wheel in WHEELS) < -0.5
+    for wheel in WHEELS:
+        load = run[f"Fz_{wheel}"]
+        d = load / (p["nominal_load"] * p["load_scale"]) - 1.0
+        share = np.abs(run[f"Fx_{wheel}"]) / (0.3 * load * (p["PDX1"] + p["PDX2"] * d))
+        assert share.max() < 1.0 + 1e-6
+        # A locked wheel slides with less than the peak, by the Magic Formula.
+        assert 0.5 < share[locked].min() < share[locked].max() < 0.95
