@@ -23,13 +23,13 @@ def torques(times, brake, drive):
     return vm.Signal.from_samples(np.array(times), values, inputs=INPUTS)
 
 
-@pytest.mark.parametrize("speed", [0.0, 1.0, 2.0, 5.0, 20.0, 30.0])
+@pytest.mark.parametrize("speed", [0.0, 1.0, 2.0, 5.0, 20.0, 30.0, 60.0])
 def test_it_is_no_stiffer_at_low_speed(speed):
-    """The contact and the spin of a wheel oscillate: 164 1/s, and 1 % more where it is damped."""
+    """Contact and spin of a wheel oscillate at 96 1/s; above 35 m/s the contact alone is faster."""
     model = vm.model(NAME, {"initial_speed": max(speed, 1.0)}).driving(INPUTS)
     state = model.start(None if speed else "standing")
     eigenvalues = np.linalg.eigvals(model.jacobian(state, model.inputs_at_rest))
-    assert abs(eigenvalues).max() < 166.0
+    assert abs(eigenvalues).max() < 164.0
     # The classical Runge-Kutta method is stable in steps of 16 ms.
     z = 0.016 * eigenvalues
     assert abs(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))).max() < 1.0 + 1e-6
@@ -71,7 +71,7 @@ def test_a_wheel_that_spins_at_standstill_winds_up_by_the_relaxation_length_at_m
     run = model.simulate(signal, start="standing")
     assert run["omega_RL"].max() > 100.0
     assert run["longitudinal_speed"].max() < 1.0
-    assert 0.1 < run["e_x_RL"].max() < 0.16
+    assert 0.9 < run["e_x_RL"].max() / model.parameters["longitudinal_relaxation"] < 1.01
 
 
 def test_further_states_stand_behind_the_speeds():

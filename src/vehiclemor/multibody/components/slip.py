@@ -48,7 +48,7 @@ def relaxed_slip(
 ) -> Slip:
     """Slips by deflections of the contact, which relax over a distance.
 
-    H. B. Pacejka, Tire and Vehicle Dynamics (3rd ed., 2012), sections 7.2 and 8.6: single contact
+    H. B. Pacejka, Tire and Vehicle Dynamics (3rd ed., 2012), chapters 7 and 8: a single contact
     point, with damping at low speed.  The distance is that of rolling and, at low speed, of
     sliding too: else a wheel that spins at standstill would wind its contact up without limit.
     """

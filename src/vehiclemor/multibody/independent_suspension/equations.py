@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import sympy as sp
 
@@ -36,7 +37,7 @@ def derive_with(
     slip_laws: Sequence[SlipLaw],  # Of the wheels.
     further_states: Sequence[sp.Symbol] = (),
 ) -> Program:
-    """As `derive`, by other laws of slip, the second-order form without further states alone."""
+    """As `derive` by laws of slip; with further states there is no second-order form."""
     tape = Tape()
     vehicle = _vehicle(tape, choice, declared_parameters)
     q, nu, attitude = vehicle.q, vehicle.nu, vehicle.attitude
@@ -51,9 +52,8 @@ def derive_with(
     solved = eliminate_symmetric(tape, mass, force, order)
     rates = [*body.rates(tape, attitude, nu), *nu[6:]]
     n = len(q)
-    # Rates of the further states: first those of all wheels that come first at each of them.
-    by_kind = zip(*(corner.wheel.slip_rates for corner in wheels), strict=True)
-    slip_rates = [rate for of_wheels in by_kind for rate in of_wheels]
+    # Of all wheels the first deflection, then the second.
+    slip_rates = chain(*zip(*(corner.wheel.slip_rates for corner in wheels), strict=True))
     derivative = [*rates, *(solved[k] for k in range(n)), *slip_rates]
     outputs = [*body.outputs(q, nu), *tire_outputs(tape, wheels)]
     functions = {
