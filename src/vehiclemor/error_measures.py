@@ -32,7 +32,8 @@ def signal_range(signal: np.ndarray) -> np.ndarray:
 def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
     """Errors of a run against the full-order run of the same input, for each output of the run.
 
-    Of a vehicle that stops they are those until the first of both runs has stopped.
+    Of a vehicle that stops they are those until the first of both runs has stopped; where a run
+    stops early they are not numbers.
 
     Parameters
     ----------
@@ -60,7 +61,9 @@ def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
         raise InputError("the runs are of models with other inputs: compare runs of one model")
     if not np.allclose(run.inputs, full.inputs, rtol=1e-6, atol=1e-9 * np.abs(full.inputs).max()):
         raise InputError("the runs have other inputs: simulate both with the same")
-    end = min(run.samples_to_stop, full.samples_to_stop)
+    end = full.samples_to_stop
+    if not run.stops_early(full):
+        end = min(run.samples_to_stop, end)
     reference = full.chosen(run.names).outputs[:end]
     difference, size = run.outputs[:end] - reference, signal_range(reference)
     labels = run.chosen(run.names).dataset().drop_dims(["time", "input"])

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 HISTORIES = ("coordinates", "outputs", "inputs", "speeds", "further_states")
+# s before the end of the full-order run, or its stop, from which on a stop is early.
+EARLY = 0.5
 # Times (s) that differ by less are one.
 SAME_TIME = 1e-9
 
@@ -240,6 +242,13 @@ class Trajectory(ShortRepr):
         if self.status != "stopped":
             return len(self.times)
         return int(np.isfinite(self.outputs[:, 0]).sum())
+
+    def stops_early(self, full: Trajectory) -> bool:
+        """Whether the vehicle stops where that of the full-order run drives on for a while."""
+        if self.status != "stopped":
+            return False
+        stop, full_stop = (min(run.samples_to_stop, len(run.times) - 1) for run in (self, full))
+        return bool(full.times[full_stop] - self.times[stop] > EARLY)
 
     def judged(self, trust: Trust | None) -> Trajectory:
         """The same with what its model tells of it; untrusted if that is that it has left."""

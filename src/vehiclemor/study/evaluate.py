@@ -249,6 +249,9 @@ def _tested(
     run = checked_run(tested, scenario.maneuver, start, reduced)
     if run.finished and not np.isfinite(run.outputs[: run.samples_to_stop]).all():
         run = replace(run, status="diverged", message="an output is not finite")
+    if reference is not None and run.stops_early(reference):
+        message = f"{run.message}, where the full order drives on"
+        run = replace(run, status="diverged", message=message)
     if remark := lower_rank(experiment.settings, reduced):
         run = replace(run, remark="; ".join(filter(None, (run.remark, remark))))
     judged = run

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -143,13 +143,13 @@ def _compared(
 
 def _missing(model: Model, maneuver: Excitation, failure: Failure) -> Trajectory:
     times = maneuver.times
-    histories = {
+    histories: dict[str, Any] = {
         kind: np.full((len(times), len(getattr(model, kind))), np.nan)
         for kind in (*STATE_KINDS, "outputs")
     }
     maneuver = completed(maneuver, model.definition)
-    inputs, end = maneuver.at(times), {"status": failure.status, "message": failure.message}
-    return Trajectory(times, inputs, counts={}, seconds=np.nan, **histories, **end)
+    end: Any = {"status": failure.status, "message": failure.message}
+    return Trajectory(times, maneuver.at(times), counts={}, seconds=np.nan, **histories, **end)
 
 
 def _measured(model: Model, outcome: Outcome) -> dict[str, object]:

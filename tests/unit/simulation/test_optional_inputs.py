@@ -164,3 +164,14 @@ def test_wrong_constant_inputs_are_refused(inputs, words):
 def test_inputs_beyond_their_range_are_refused(signal, words):
     with pytest.raises(InputError, match=words):
         car().simulate(signal)
+
+
+def test_a_run_that_stops_where_the_full_order_drives_on_has_failed():
+    """Errors until its stop would be those of the first seconds."""
+    full = car(5.0).simulate(braking(100.0))
+    early = car(5.0).simulate(braking(600.0))
+    assert (full.status, early.status) == ("ok", "stopped")
+    assert early.stops_early(full)
+    assert not early.stops_early(car(5.0).simulate(braking(600.0), solver="rodas4", tolerance=1e-3))
+    with pytest.raises(InputError, match="other inputs"):
+        vm.errors(early, full)

@@ -185,6 +185,8 @@ def _plot_until_it_leaves(
         first = int(outside[0])
         diverged = bool(np.isnan(values[first]))
         text = "has diverged" if diverged else "leaves the axes"
+        if diverged and curve.run["status"].item() == "stopped":
+            text = "stops"
         at = time[first - diverged], np.clip(values[first - diverged], *limits)
         axis.plot(*at, color=curve.style["color"], label=text, clip_on=False, **CROSS)
         values = np.where(np.arange(values.size) <= first, values, np.nan)
