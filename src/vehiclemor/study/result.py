@@ -148,8 +148,8 @@ def _missing(model: Model, maneuver: Excitation, failure: Failure) -> Trajectory
         for kind in (*STATE_KINDS, "outputs")
     }
     maneuver = completed(maneuver, model.definition)
-    inputs, end = maneuver.at(times), {"status": failure.status, "message": failure.message}
-    return Trajectory(times, inputs, counts={}, seconds=np.nan, **histories, **end)
+    ended = {"counts": {}, "seconds": np.nan, "status": failure.status, "message": failure.message}
+    return Trajectory.of(times=times, inputs=maneuver.at(times), **histories, **ended)
 
 
 def _measured(model: Model, outcome: Outcome) -> dict[str, object]:
