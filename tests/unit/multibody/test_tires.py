@@ -35,9 +35,9 @@ def compiled(name: str):
         arguments = (friction,) if name == "brush" else ()
         forces = getattr(tires, name)(tape, own, load, kappa, slip, *arguments)
     else:
-        own = exact(PARAMETERS)
-        sizes = sp.Float(REFERENCE_LOAD, 17), sp.Float(PARAMETERS["R0"], 17)
-        forces = tires.magic_formula(tape, own, load, *sizes, kappa, slip, cosine, friction)
+        own = exact(PARAMETERS | {"tire_radius": PARAMETERS["R0"]})
+        reference = sp.Float(REFERENCE_LOAD, 17)
+        forces = tires.magic_formula(tape, own, load, reference, kappa, slip, cosine, friction)
     results = [forces.longitudinal, forces.lateral, forces.aligning]
     function = function_of(tape, symbols, results, "math")
 

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from vehiclemor.multibody.components.body import Attitude
 from vehiclemor.multibody.components.slip import SlipLaw
 from vehiclemor.multibody.components.wheel_inputs import WheelInputs
 from vehiclemor.symbolic import geometry as g
@@ -33,6 +32,16 @@ class TireForces:
     longitudinal: sp.Expr
     lateral: sp.Expr
     aligning: sp.Expr
+
+
+@dataclass(frozen=True)
+class WheelMotion:
+    """A wheel and how it moves, chassis components."""
+
+    height: sp.Expr  # Of its centre above the plane z = 0 in m.
+    axle: Vector  # Unit spin axis.
+    velocity: Vector  # Of its centre.
+    rotation: Vector  # Angular velocity.
 
 
 @dataclass(frozen=True)
@@ -88,11 +97,11 @@ def tire_outputs(tape: Tape, corners: Sequence[Corner]) -> list[sp.Expr]:
 
 def magic_formula(
     tape: Tape,
-    c: Mapping[str, sp.Expr],  # Coefficients, dimensionless, by their published names.
+    # Coefficients, dimensionless, by their published names; `tire_radius`, unloaded, in m.
+    c: Mapping[str, sp.Expr],
     # Vertical force and F_z0 in N.
     load: sp.Expr,
     reference_load: sp.Expr,
-    radius: sp.Expr,  # Unloaded radius in m.
     # kappa, alpha in rad, and cos alpha.
     slip_ratio: sp.Expr,
     slip_angle: sp.Expr,
@@ -138,7 +147,7 @@ def magic_formula(
     # Pneumatic trail.
     b = let(c["QBZ1"] + d * (c["QBZ2"] + c["QBZ3"] * d))
     curvature = let(c["QEZ1"] + d * (c["QEZ2"] + c["QEZ3"] * d))
-    longest = let(load * (radius / reference_load) * (c["QDZ1"] + c["QDZ2"] * d))
+    longest = let(load * (c["tire_radius"] / reference_load) * (c["QDZ1"] + c["QDZ2"] * d))
     bent = let(c["QCZ1"] * _arc(tape, let(b * alpha), curvature))
     trail = let(longest * let(sp.cos(bent)) * cos_slip_angle)
     return TireForces(longitudinal, lateral, let(-trail * lateral))
@@ -239,14 +248,8 @@ def minimum(tape: Tape, a: sp.Expr, b: sp.Expr) -> sp.Expr:
 
 def upright_wheel(
     tape: Tape,
-    chassis: Attitude,
-    height: sp.Expr,  # Height of the chassis origin above the road.
-    # Wheel centre and spin axis in the chassis frame.
-    hub: Vector,
-    axle: Vector,
-    # Velocity of the wheel centre and complete angular velocity of the wheel.
-    velocity: Vector,
-    rotation: Vector,
+    up: Vector,  # Road normal.
+    wheel: WheelMotion,  # Its rotation is that of the rim, with the spin.
     p: Mapping[str, sp.Expr],  # Parameters of the vehicle.
     inputs: WheelInputs,
     slip_law: SlipLaw,
@@ -255,24 +258,24 @@ def upright_wheel(
 
     The vertical load has no arm.
     """
-    let, up = tape.let, chassis.road_normal
-    above = let(height + let(up @ hub) - inputs.road)
-    along = g.named(tape, axle.cross(up))
+    let = tape.let
+    above = let(wheel.height - inputs.road)
+    along = g.named(tape, wheel.axle.cross(up))
     inverse = let(1 / g.length(tape, along))
     heading = g.named(tape, along * inverse)
     leftward = g.named(tape, up.cross(heading))
     arm = g.named(tape, up * -above)
-    sliding = g.named(tape, velocity + rotation.cross(arm))
-    forward = let(heading @ velocity)
+    sliding = g.named(tape, wheel.velocity + wheel.rotation.cross(arm))
+    forward = let(heading @ wheel.velocity)
     slip = slip_law(tape, p, forward, let(heading @ sliding), let(leftward @ sliding))
-    rise = let(let(up @ velocity) - inputs.road_rate)
+    rise = let(let(up @ wheel.velocity) - inputs.road_rate)
     cos_angle = let(1 / sp.sqrt(let(1 + slip.tangent**2)))
     slips = slip.ratio, let(sp.atan(slip.tangent)), cos_angle
 
     pressed = let(p["tire_stiffness"] * (p["tire_radius"] - above) - p["tire_damping"] * rise)
     load = let((pressed + sp.Abs(pressed)) / 2)
     reference_load = let(p["nominal_load"] * p["load_scale"])
-    tire = magic_formula(tape, p, load, reference_load, p["tire_radius"], *slips, inputs.friction)
+    tire = magic_formula(tape, p, load, reference_load, *slips, inputs.friction)
     shear = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral)
     moment = arm.cross(shear) + up * tire.aligning
     force = g.named(tape, shear + up * load)
@@ -283,11 +286,7 @@ def upright_wheel(
 def tilted_wheel(
     tape: Tape,
     up: Vector,  # Road normal.
-    height: sp.Expr,  # Height of the wheel centre above the road.
-    axle: Vector,  # Unit spin axis.
-    # Velocity of the wheel centre, angular velocity of the carrier without the spin.
-    velocity: Vector,
-    turning: Vector,
+    wheel: WheelMotion,  # Its rotation is that of the carrier, without the spin.
     spin: sp.Expr,  # Spin of the wheel on its carrier in rad/s.
     p: Mapping[str, sp.Expr],  # Parameters of the vehicle.
     inputs: WheelInputs,
@@ -299,15 +298,15 @@ def tilted_wheel(
     the road; the loaded radius is also the effective rolling radius.
     """
     let = tape.let
-    across = g.named(tape, axle.cross(up))
+    across = g.named(tape, wheel.axle.cross(up))
     # The length of axle x up is the cosine of the camber angle.
     inverse = let(1 / g.length(tape, across))
     heading = g.named(tape, across * inverse)
     leftward = g.named(tape, up.cross(heading))
-    down = g.named(tape, axle.cross(heading))
-    radius = let((height - inputs.road) * inverse)
+    down = g.named(tape, wheel.axle.cross(heading))
+    radius = let((wheel.height - inputs.road) * inverse)
     arm = g.named(tape, down * radius)
-    sliding = g.named(tape, velocity + turning.cross(arm))
+    sliding = g.named(tape, wheel.velocity + wheel.rotation.cross(arm))
     forward, lateral = let(sliding @ heading), let(sliding @ leftward)
     rise = let(let(sliding @ up) - inputs.road_rate)
 

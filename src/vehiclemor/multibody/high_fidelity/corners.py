@@ -13,7 +13,7 @@ import sympy as sp
 
 from vehiclemor.multibody.components import body
 from vehiclemor.multibody.components import linkage as links
-from vehiclemor.multibody.components.tires import Corner, WheelOnRoad, tilted_wheel
+from vehiclemor.multibody.components.tires import Corner, WheelMotion, WheelOnRoad, tilted_wheel
 from vehiclemor.multibody.components.wheel_inputs import wheel_inputs
 from vehiclemor.multibody.double_wishbone.definition import POINTS
 from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SOLVED, SPINS
@@ -226,8 +226,8 @@ def _wheeled_body(
     )
     turning = frame.angular_velocity_of(tape, part.turn)
     height = tape.let(v.q[2] + tape.let(v.attitude.road_normal @ positions[1]))
-    motion = axle, wheel.value, turning.value, spin
-    on_road = tilted_wheel(tape, v.attitude.road_normal, height, *motion, v.p, inputs, v.combined)
+    motion = WheelMotion(height, axle, wheel.value, turning.value)
+    on_road = tilted_wheel(tape, v.attitude.road_normal, motion, spin, v.p, inputs, v.combined)
     force, moment = on_road.force, on_road.moment
     arm = g.named(tape, positions[1] - positions[0])
     inertia = v.p[f"{ENDS[k]}_wheel_spin_inertia"]

@@ -10,6 +10,7 @@ from vehiclemor.multibody.components import body
 from vehiclemor.multibody.components.slip import SlipLaw, static_slip
 from vehiclemor.multibody.components.tires import (
     Corner,
+    WheelMotion,
     kane_with_corners,
     tire_outputs,
     upright_wheel,
@@ -144,8 +145,10 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int, slip_law: SlipLaw) -> Corner:
     centre = frame.point(tape, hub, upwards)
     about = mechanics.axisymmetric_inertia(p["spin_inertia"], p["diametral_inertia"], axle)
     rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
-    motion = hub, axle, centre.value, rotation.value
-    on_road = upright_wheel(tape, v.attitude, v.q[2], *motion, p, v.at_wheels[wheel], slip_law)
+    up = v.attitude.road_normal
+    height = tape.let(v.q[2] + tape.let(up @ hub))
+    motion = WheelMotion(height, axle, centre.value, rotation.value)
+    on_road = upright_wheel(tape, up, motion, p, v.at_wheels[wheel], slip_law)
     mass = p["unsprung_mass"]
     applied = g.named(tape, on_road.force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate
