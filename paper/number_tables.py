@@ -108,7 +108,7 @@ def integrated(dataset: xr.Dataset) -> Variables:
     return {
         "steps": dataset["steps"],
         "us": 1e6 * dataset["seconds"],
-        "mm": 1e3 * np.hypot(*off),
+        "mm": 1e3 * (off[0] ** 2 + off[1] ** 2) ** 0.5,
     }
 
 

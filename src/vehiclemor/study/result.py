@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -143,13 +143,13 @@ def _compared(
 
 def _missing(model: Model, maneuver: Excitation, failure: Failure) -> Trajectory:
     times = maneuver.times
-    histories: dict[str, Any] = {
+    histories = {
         kind: np.full((len(times), len(getattr(model, kind))), np.nan)
         for kind in (*STATE_KINDS, "outputs")
     }
     maneuver = completed(maneuver, model.definition)
-    end: Any = {"status": failure.status, "message": failure.message}
-    return Trajectory(times, maneuver.at(times), counts={}, seconds=np.nan, **histories, **end)
+    ended = {"counts": {}, "seconds": np.nan, "status": failure.status, "message": failure.message}
+    return Trajectory.of(times=times, inputs=maneuver.at(times), **histories, **ended)
 
 
 def _measured(model: Model, outcome: Outcome) -> dict[str, object]:

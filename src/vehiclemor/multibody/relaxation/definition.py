@@ -16,7 +16,7 @@ from vehiclemor.multibody.independent_suspension.definition import starts as rig
 from vehiclemor.multibody.quantities import declared, equations_of
 
 DECLARED = declared("relaxation_vehicle")
-# It drives backwards too, as slowly as from a slope.
+# Longitudinal speed in m/s: it may roll backwards.
 SLOWEST = -5.0
 
 
