@@ -158,12 +158,12 @@ def reduce(
 
     ready = model if isinstance(model, Model) else build(model)
     definition = component("method", method)
-    if reason := definition.accepts(ready)[1]:
-        raise InputError(reason)
-    complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
-    checked_settings(definition, ready, complete)
+    definition.require(ready)
     scenarios = training_set(ready, method, training)
     ready = driven_by_all(ready, scenarios)
+    definition.require(ready)
+    complete = validated(definition, ready.kind, settings, preset, len(ready.coordinates))
+    checked_settings(definition, ready, complete)
     with first_use(f"{ready.name} with {method}"), one_thread():
         runs = [training_run(ready, scenario) for scenario in scenarios]
         reduced = fitted(definition, ready, runs, complete)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vehiclemor.exceptions import InputError
 from vehiclemor.handling.motion import Motion
 
 # Time (s) after the beginning of the braking at which a turn is compared with what it was.
@@ -9,8 +10,11 @@ AFTER = 1.0
 
 
 def _begin(motion: Motion) -> int:
-    """The last sample before a brake acts; the first of a run without any."""
-    return max(int(np.argmax(motion.of_wheels("brake_torque").any(axis=0))) - 1, 0)
+    """The last sample before a brake acts; `InputError` of a run without any."""
+    braked = (motion.of_wheels("brake_torque") > 0.0).any(axis=0)
+    if not braked.any():
+        raise InputError("no brake acts in the run: it has no numbers of a braking test")
+    return max(int(np.argmax(braked)) - 1, 0)
 
 
 def straight_braking(motion: Motion) -> dict[str, float]:

@@ -39,9 +39,9 @@ class Motion:
         return self.histories[name] if name in self.histories else getattr(self, name)
 
     def of_wheels(self, quantity: str) -> np.ndarray:
-        """Histories (wheels, samples) of an input or output of each wheel; zero if it has none."""
+        """Histories (wheels, samples) of a quantity of each wheel; not numbers without any."""
         wheels = [each for name, each in self.histories.items() if name.startswith(f"{quantity}_")]
-        return np.array(wheels or [np.zeros(len(self.times))])
+        return np.array(wheels or [np.full(len(self.times), np.nan)])
 
     def at(self, name: str, time: float) -> float:
         """Value at a time in s, linear between the samples; not a number after the run."""

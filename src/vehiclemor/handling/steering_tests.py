@@ -42,6 +42,8 @@ def step(motion: Motion) -> dict[str, float]:
     last = times >= times[-1] - STEADY
     names = ("steering", "wheel_angle", *RESPONSES)
     steady = {name: float(np.mean(motion[name][last])) for name in names}
+    if not steady["steering"]:
+        raise InputError("the steering is straight at the end: the run has no numbers of a step")
     half = first_time(times, motion.steering / steady["steering"], 0.5)
     yaw_rate, lateral = (motion[name] / steady[name] for name in RESPONSES)
     return {

@@ -38,9 +38,12 @@ def _checked(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
     names = tuple(quantity.name for quantity in definition.inputs)
     complete = completed(maneuver, definition)
     if complete.inputs != names:
+        optional = {quantity.name for quantity in definition.optional_inputs}
+        undriven = [name for name in maneuver.inputs if name in optional - {*names}]
+        hint = f": it is reduced from runs without {undriven[0]}" if undriven else ""
         raise InputError(
             f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "
-            f"{definition.name} needs {', '.join(names)}"
+            f"{definition.name} needs {', '.join(names)}{hint}"
         )
     _check_bounds(complete, definition)
     return complete

@@ -31,13 +31,18 @@ from vehiclemor.inputs.excitation import (
 )
 from vehiclemor.inputs.interpolation import HOLDS, interpolants, time_derivative
 from vehiclemor.inputs.polynomial_loops import Pieces
-from vehiclemor.multibody.quantities import integral_of
+from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, integral_of
 from vehiclemor.registry import choice
 
 # Time (s) between output times, as of the registered maneuvers of vehicles.
 OUTPUT_STEP = 0.02
 # Time (s) between the samples that are taken of a function.
 FUNCTION_STEP = 0.01
+
+# Inputs that an angle's unit or a steering ratio is not meant for.
+OF_ANOTHER_UNIT = frozenset(quantity.name for quantity in OPTIONAL_INPUTS)
+# Optional inputs that are no sizes, such as friction.
+NOT_SCALED = frozenset(quantity.name for quantity in OPTIONAL_INPUTS if quantity.default)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,10 +136,11 @@ class Signal(Excitation):
     @cached
     def _scaled_pieces(self) -> Pieces:
         edges, first, starts, coefficients = self.nominal_pieces
-        orders = np.zeros(coefficients.shape[2])
-        for column, name in enumerate(self.inputs):
-            orders[column] = derivative_order(name, self.inputs)
-        amplitudes = self.amplitude_factor * self.frequency_factor**orders
+        amplitudes = np.ones(coefficients.shape[2])
+        for column, name in enumerate(self.inputs or [""] * len(amplitudes)):
+            order = derivative_order(name, self.inputs)
+            if name not in NOT_SCALED:
+                amplitudes[column] = self.amplitude_factor * self.frequency_factor**order
         return Pieces(
             edges / self.frequency_factor,
             first,
@@ -163,7 +169,10 @@ class Signal(Excitation):
         return inputs
 
     def perturbed(self, frequency: float = 1.0, amplitude: float = 1.0) -> Signal:
-        """The signal with its factors set: so much faster and shorter, so many times as large."""
+        """The signal with its factors set: so much faster and shorter, so many times as large.
+
+        Friction, which is a factor itself, stays as it is.
+        """
         frequency = checked_factor("frequency", frequency)
         amplitude = checked_factor("amplitude", amplitude)
         if (frequency, amplitude) == (self.frequency_factor, self.amplitude_factor):
@@ -282,6 +291,12 @@ class Signal(Excitation):
         path = file_path("path", path)
         scale = unit_factor(unit, ratio)
         times, values, names = csv_samples(path, separator, decimal, time, inputs)
+        mixed = [name for name in names if name in OF_ANOTHER_UNIT]
+        if scale != 1.0 and mixed:
+            raise InputError(
+                f"unit and ratio convert all columns, {mixed[0]} too: write columns in SI units, "
+                "or run the log by a study, where each column has its unit"
+            )
         name = name or path.name
         return cls.from_samples(
             times, scale * values, hold, inputs=names, output_step=output_step, name=name

@@ -16,7 +16,7 @@ from vehiclemor.parameters import Declared
 def driving(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinition:
     """The declaration with the optional inputs among these names as inputs too.
 
-    With the height of a road its rate is driven.  What was a parameter is none any more.
+    With the height of a road its rate is driven.  An input that was a parameter is driven then.
     """
     named = {*names}
     driven = {*definition.choice.driven, *named}
@@ -26,7 +26,7 @@ def driving(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinitio
 
 
 def with_overrides(definition: ModelDefinition, overrides: Mapping[str, object]) -> ModelDefinition:
-    """The declaration with the optional inputs as parameters for which there are values."""
+    """The declaration in which each optional input with a value here is a parameter."""
     if not isinstance(overrides, Mapping):
         raise InputError(f"parameters must be a mapping of values by name, not {quoted(overrides)}")
     names = {quantity.name for quantity in definition.optional_inputs}

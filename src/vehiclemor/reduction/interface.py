@@ -227,6 +227,11 @@ class Method(ShortRepr):
             reason = f"method {self.name!r}: refusal gives {quoted(reason)}, not text"
         return not reason, reason
 
+    def require(self, model: Model) -> None:
+        """Raise `InputError` if the method can't reduce a model."""
+        if reason := self.accepts(model)[1]:
+            raise InputError(reason)
+
     def known_range(
         self, model: Model, settings: Mapping[str, Any], trained: Callable[[], InputRange | None]
     ) -> InputRange | None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import STATE_KINDS
 from vehiclemor.multibody.quantities import DROP, Quantity
@@ -55,7 +56,13 @@ class TrainingRun(ShortRepr):
 
     def at(self, times: np.ndarray) -> Trajectory:
         """Full-order trajectory, solved exactly at the given increasing times (samples,) in s."""
-        return self.model.simulate(self.maneuver, self.start, times)
+        run = self.model.simulate(self.maneuver, self.start, times)
+        if run.status == "stopped":
+            raise InputError(
+                f"training on {self.maneuver}: {run.message}; methods learn from runs that go on "
+                "until their end"
+            )
+        return run
 
     def recorded(self) -> Trajectory:
         """Full-order trajectory at the maneuver's output times."""

@@ -20,6 +20,7 @@ from vehiclemor.inputs.maneuver import registered
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.multibody.input_choice import driving
 from vehiclemor.parameters import ParameterSet
+from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.constants import components, constant_derivatives, solved_parameters
@@ -172,12 +173,21 @@ class Model(ShortRepr):
     def driving(self, names: str | Sequence[str]) -> Self:
         """The model whose runs drive the optional inputs among these names too, cached."""
         names = listed(names)
+        for name in names:
+            choice("input", name, (*self.inputs, *self._undriven))
+        return self._with_driven(names)
+
+    def driven_as(self, other: Model) -> Self:
+        """The model whose runs drive the optional inputs that those of another one drive."""
+        return self._with_driven(other.inputs)
+
+    def _with_driven(self, names: Sequence[str]) -> Self:
         if self._undriven.isdisjoint(names) or self.rebuilt is None:
             return self
         return self.rebuilt(self, driving(self.definition, names))
 
     def driven_by(self, maneuver: Any) -> Self:
-        """The model that has the optional inputs which a maneuver, or one of this name, names."""
+        """The model that also has the optional inputs of a maneuver, or of one of this name."""
         if not self._undriven:
             return self
         if isinstance(maneuver, str):
@@ -186,7 +196,7 @@ class Model(ShortRepr):
             return self
         names = maneuver.inputs
         if names not in self._driven_models:
-            self._driven_models[names] = self.driving(names)
+            self._driven_models[names] = self._with_driven(names)
         return self._driven_models[names]
 
     def start(self, name: Start | None = None) -> np.ndarray:

@@ -164,12 +164,16 @@ def parameters_of(model: Model) -> Values:
 
 def model_of_run(model: Model, scenario: Scenario) -> Model:
     """The model with the parameters of a scenario, whose maneuver drives it."""
-    return with_parameters(model.driven_by(scenario.maneuver), scenario.parameters)
+    driven = model.driven_by(scenario.maneuver)
+    # What a run drives is no parameter of it.
+    return with_parameters(driven, scenario.parameters).driven_as(driven)
 
 
 def driven_by_all(model: Model, scenarios: Sequence[Scenario]) -> Model:
     """The model with all optional inputs that some scenarios drive."""
-    return model.driving([name for scenario in scenarios for name in scenario.maneuver.inputs])
+    for scenario in scenarios:
+        model = model.driven_by(scenario.maneuver)
+    return model
 
 
 # More than the runs of a protocol, over which all rows go.

@@ -175,3 +175,34 @@ def test_a_run_that_stops_where_the_full_order_drives_on_has_failed():
     assert not early.stops_early(car(5.0).simulate(braking(600.0), solver="rodas4", tolerance=1e-3))
     with pytest.raises(InputError, match="other inputs"):
         vm.errors(early, full)
+
+
+@pytest.mark.parametrize(
+    ("reduced", "words"),
+    [
+        (lambda: vm.reduce(CAR, "slow_manifold", training="braking_in_turn"), "steer alone"),
+        (lambda: vm.reduce(car(5.0), "pod", training=braking(600.0)), "runs that go on until"),
+        (lambda: vm.rom(CAR).simulate("straight_braking"), "reduced from runs without brake_torque_FL"),
+        (lambda: car().driving("brake_torque_XX"), "unknown input 'brake_torque_XX'"),
+    ],
+)
+def test_methods_say_what_they_cannot_learn_from(reduced, words):
+    with pytest.raises(InputError, match=words):
+        reduced()
+
+
+def test_what_a_run_drives_is_no_parameter_of_it():
+    slippery = car(friction_FL=0.4)
+    run = slippery.simulate(braking(100.0, friction_FL=1.0))
+    np.testing.assert_allclose(run.states, car().simulate(braking(100.0)).states, 1e-6, 1e-6)
+    result = vm.simulate(slippery, maneuver=braking(100.0, friction_FL=1.0))
+    assert result["status"] == "ok"
+
+
+def test_amplitudes_leave_friction_as_it_is(tmp_path):
+    doubled = braking(100.0, friction_FL=0.7).perturbed(amplitude=2.0)
+    assert doubled.at(np.array([2.0]))[0].tolist() == [200.0, 200.0, 100.0, 100.0, 0.7]
+    (tmp_path / "log.csv").write_text("time,wheel,brake\n0,10,300\n1,20,300\n")
+    inputs = {"delta": "wheel", "brake_torque_FL": "brake"}
+    with pytest.raises(InputError, match="convert all columns, brake_torque_FL too"):
+        vm.Signal.from_csv(tmp_path / "log.csv", inputs=inputs, unit="deg")

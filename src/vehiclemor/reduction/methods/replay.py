@@ -11,6 +11,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from vehiclemor.arguments import require
+from vehiclemor.inputs.checks import completed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import KINDS, STATE_KINDS
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
@@ -66,7 +67,7 @@ class ReplayModel(ShortRepr):
         times: between samples linearly, after its end its last value.
         """
         times, conditions = maneuver.times, _conditions(self.model, start)
-        inputs = maneuver.at(times)
+        inputs = completed(maneuver, self.model.definition).at(times)
         numbers = range(len(self.recorded))
         alike = [k for k in numbers if np.array_equal(self.recorded[k].times, times)]
         distance = partial(self._distance, times, inputs, conditions)

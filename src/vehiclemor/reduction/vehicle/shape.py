@@ -39,6 +39,8 @@ def no_steered_vehicle(model: Model) -> str:
     missing = [name for name in SLIP_OUTPUTS if name not in model.outputs]
     if missing:
         return f"{model.name} has no output {', '.join(missing)}"
+    if driven := model.definition.choice.driven if hasattr(model, "definition") else ():
+        return f"it reduces vehicles that steer alone; this one is driven by {driven[0]} too"
     first, *others = model.inputs
     if others != [f"{first}_dot", f"{first}_ddot"][: len(others)]:
         return f"the inputs of {model.name} are not a steering and its derivatives"
