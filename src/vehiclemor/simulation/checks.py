@@ -147,8 +147,11 @@ def wheel_remarks(
     definition: ModelDefinition, first: Sequence[int], times: np.ndarray
 ) -> list[str]:
     """Which wheels have lifted, locked or spun, and when first, by the first sample of each."""
+    remarks: list[str] = []
+    # Most runs have none, and some take no longer than to look for them.
+    if min(first, default=len(times)) == len(times):
+        return remarks
     loads, slips = definition.loads, watched_slips(definition)
-    remarks = []
     if off := _wheels(loads, first[: len(loads)], times):
         remarks.append(f"off the ground for a time: {off}")
     if sliding := _wheels(slips, first[len(loads) :], times):
