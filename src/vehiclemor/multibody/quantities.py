@@ -101,10 +101,9 @@ def _optional_inputs() -> Iterator[tuple[Quantity, tuple[float, float]]]:
 
 
 # What drives, brakes and lifts a vehicle, and where these inputs mean anything.
-OPTIONAL_INPUTS, OPTIONAL_RANGES = (
-    tuple(quantity for quantity, _ in _optional_inputs()),
-    {quantity.name: valid for quantity, valid in _optional_inputs()},
-)
+_RANGES = dict(_optional_inputs())
+OPTIONAL_INPUTS = tuple(_RANGES)
+OPTIONAL_RANGES = {quantity.name: valid for quantity, valid in _RANGES.items()}
 
 
 def declared(model: str) -> dict[str, Any]:

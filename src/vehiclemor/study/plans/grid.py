@@ -2,7 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -107,16 +108,15 @@ def _driven(model: Model, study: GridFile, folder: Path) -> dict[str, Scenario]:
         names = [str(name) for name in values(axis)]
         return {name: Scenario(component("maneuver", name), model.starts[0]) for name in names}
     every = [run for log in study.logs for run in windows(model, log, folder)]
-    # What a log varies is in the name of the window.
-    driven = {run.maneuver.name if _alone(run, every) else run.label: run for run in every}
+    windows_of = Counter(run.maneuver.name for run in every)
+    driven: dict[str, Scenario] = {}
+    for run in every:
+        name = run.maneuver.name
+        # Windows that a log runs with several factors are told apart by these.
+        driven[name if windows_of[name] == 1 else run.label] = run
     if len(driven) < len(every):
         raise InputError("two windows of logs have the same name: give one log a name")
     return driven
-
-
-def _alone(run: Scenario, every: Sequence[Scenario]) -> bool:
-    """Whether no other window has its name."""
-    return sum(other.maneuver.name == run.maneuver.name for other in every) == 1
 
 
 def _check_histories(
