@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from scipy.integrate import cumulative_trapezoid
 
 import vehiclemor as vm
 from tests.models import CAR
 from vehiclemor.inputs.checks import check_resolved
+from vehiclemor.inputs.steering import LANE_CHANGE_AMPLITUDE, RACK_AMPLITUDE
+from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.registry import names
 
 factors, amplitudes = st.floats(0.1, 4.0), st.floats(-3.0, 3.0)
@@ -18,7 +21,7 @@ def test_every_maneuver_is_finite_scales_and_breaks_inside_its_run(name):
     maneuver = vm.maneuver(name)
     assert maneuver == maneuver.perturbed(np.float32(1.0), np.int64(1))
     assert maneuver.name == name
-    linear = not name.endswith(("_in_turn", "split_friction"))
+    linear = not name.endswith(("_in_turn", "split_friction", "random_drive"))
     assert maneuver.linear_in_amplitude == linear
     for frequency in (1.0, 0.8, 2.0):
         perturbed = vm.maneuver(name, frequency=frequency)
@@ -195,3 +198,41 @@ def test_the_bump_passes_the_rear_wheel_a_wheelbase_later():
     for wheel in ("FL", "RL"):
         rate = np.gradient(road[f"road_{wheel}"], times)
         np.testing.assert_allclose(road[f"road_{wheel}_dot"], rate, atol=1e-3)
+
+
+@pytest.mark.parametrize("seed", [1, 7, 4711])
+def test_a_rack_follows_random_steering_and_its_derivatives(seed):
+    angle, rack = vm.maneuver(f"random_steer:{seed}"), vm.maneuver(f"rack_random_steer:{seed}")
+    times = np.linspace(0.0, 10.0, 100001)
+    s, s_dot, s_ddot = rack.at(times).T
+    np.testing.assert_allclose(s, RACK_AMPLITUDE / LANE_CHANGE_AMPLITUDE * angle.at(times)[:, 0])
+    for value, rate in ((s, s_dot), (s_dot, s_ddot)):
+        change = cumulative_trapezoid(rate, times, initial=0.0)
+        np.testing.assert_allclose(value, change, atol=1e-5 * np.abs(value).max())
+    check_resolved(rack.perturbed(1.3))
+    other = vm.maneuver(f"random_steer:{seed + 1}")
+    assert np.abs(other.at(times) - angle.at(times)).max() > 0.2 * LANE_CHANGE_AMPLITUDE
+
+
+def test_random_driving_stays_below_lock_up_and_follows_the_friction():
+    frictions = []
+    for seed in range(20):
+        driven = vm.maneuver(f"random_drive:{seed}")
+        check_resolved(driven.perturbed(0.9))
+        inputs = columns(driven, driven.times)
+        friction = inputs["friction_RR"][0]
+        frictions.append(friction)
+        steering = vm.maneuver(f"random_steer:{seed}").at(driven.times)[:, 0]
+        np.testing.assert_allclose(inputs["delta"], friction * steering)
+        drive, brakes = (
+            sum(inputs[f"{torque}_torque_{wheel}"] for wheel in WHEELS)
+            for torque in ("drive", "brake")
+        )
+        assert not (drive * brakes).any()
+        # MASS and RADIUS of the car: at most 3 m/s^2 on a road of friction 1.
+        assert 0.0 <= brakes.min() <= brakes.max() <= friction * 1093.3 * 0.327 * 3.0
+        run = vm.model(CAR).simulate(driven)
+        slips = [run[f"slip_ratio_{wheel}"] for wheel in WHEELS]
+        assert (run.status, np.abs(slips).max() < 0.1) == ("ok", True)
+    assert 0.4 <= min(frictions) < 0.5
+    assert 0.9 < max(frictions) <= 1.0

@@ -9,7 +9,8 @@ from vehiclemor.inputs.maneuver import registered
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.multibody.definition import ModelDefinition
 
-# Part of an input's largest magnitude by which polynomials pass a bound that its samples keep.
+# Part of an input's largest magnitude by which polynomials pass a bound that its samples keep, and
+# by which a line between equal values is off.
 ROUNDING = 1e-9
 
 
@@ -104,7 +105,8 @@ def check_resolved(maneuver: Excitation) -> None:
         return
     off = np.abs(inside - (1.0 - between) * values[:-1] - between * values[1:])
     everywhere = np.concatenate([values, inside])
-    wrong = off > 0.25 * (everywhere.max(axis=0) - everywhere.min(axis=0))
+    rounding = ROUNDING * np.abs(everywhere).max(axis=0)
+    wrong = off > 0.25 * np.ptp(everywhere, axis=0) + rounding
     corners = np.searchsorted(times, maneuver.break_points, side="right") - 1
     wrong[corners[(corners >= 0) & (corners < len(wrong))]] = False
     wrong[:, [name.removesuffix("_dot") in names - {name} for name in maneuver.inputs]] = False

@@ -77,8 +77,8 @@ def digest_of(protocol: Protocol) -> str:
     It is a hash of texts that all machines have alike.  Matrices of a structure, which they round
     differently, count by six digits of weighted sums.
     """
-    model = protocol.model
     runs = sampled_sets(protocol).get("drawn") or protocol.sets["test"]
+    model = of_run.driven_by_all(protocol.model, runs)
     texts = [protocol.definition.model_dump_json(include={"model", "bounds"})]
     texts.append(of_run.parameters_of(model).text)
     texts += [repr(model.kernels.sources[name]) for name in EQUATIONS if name in model.kernels]
@@ -102,7 +102,7 @@ def _write(protocol: Protocol, folder: Path) -> None:
     sets = {name: protocol.sets[name] for name in SETS} | ({"test": drawn} if drawn else {})
     second = second_runs(protocol, sets["test"])
     # Its references stay in memory: those of the test are simulated once.
-    model = model_of(second)
+    model = of_run.driven_by_all(model_of(second), [*chain(*sets.values())])
     labels = [run.label for run in sets["test"]]
     digest = digest_of(protocol)
     for name in ("training", "validation", "test"):
