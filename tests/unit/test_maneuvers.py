@@ -225,7 +225,7 @@ def test_random_driving_stays_below_lock_up_and_follows_the_friction():
         steering = vm.maneuver(f"random_steer:{seed}").at(driven.times)[:, 0]
         np.testing.assert_allclose(inputs["delta"], friction * steering)
         drive, brakes = (
-            sum(inputs[f"{torque}_torque_{wheel}"] for wheel in WHEELS)
+            np.sum([inputs[f"{torque}_torque_{wheel}"] for wheel in WHEELS], axis=0)
             for torque in ("drive", "brake")
         )
         assert not (drive * brakes).any()

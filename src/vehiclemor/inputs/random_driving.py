@@ -14,7 +14,7 @@ size of the lane change.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -84,16 +84,13 @@ class RandomSteering:
 
 
 @dataclass(frozen=True)
-class RandomDriving:
+class RandomDriving(RandomSteering):
     """Signal of a seed: steering, torques of drive and brakes, and friction of the wheels."""
-
-    seed: int
-    rack: bool = False
 
     def __call__(self, times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         """Inputs (n, 13) or (n, 15) at the times (n,) in s."""
         road = road_of(self.seed)
-        steering = RandomSteering(self.seed, self.rack)(times, frequency, amplitude)
+        steering = road.friction * super().__call__(times, frequency, amplitude)
         torque = road.friction * MASS * RADIUS / 2.0
         drive = torque * total(road.driving, times)[:, :1]
         brakes = torque * total(road.braking, times)[:, :1]
@@ -101,13 +98,13 @@ class RandomDriving:
             [share, share, 1.0 - share, 1.0 - share] for share in (road.front_share, FRONT_SHARE)
         )
         friction = np.full((len(times), len(WHEELS)), road.friction)
-        return np.hstack([road.friction * steering, drive * driven, brakes * braked, friction])
+        return np.hstack([steering, drive * driven, brakes * braked, friction])
 
     def corners(self, frequency: float) -> tuple[float, ...]:
         """Times in s at which a correction or a change of torques begins or ends."""
         road = road_of(self.seed)
         torques = corners_of((*road.braking, *road.driving))
-        return tuple(sorted({*RandomSteering(self.seed).corners(frequency), *torques}))
+        return tuple(sorted({*super().corners(frequency), *torques}))
 
 
 @lru_cache(maxsize=4096)
@@ -173,21 +170,25 @@ def corners_of(changes: tuple[Change, ...], frequency: float = 1.0) -> tuple[flo
 
 
 @lru_cache(maxsize=4096)
-def _member(family: Maneuver, kind: type[RandomSteering | RandomDriving], seed: int) -> Maneuver:
-    signal = kind(seed, rack=family.signal.rack)
+def _member(family: Maneuver, seed: int) -> Maneuver:
+    of_family: Any = family.signal
+    signal = replace(of_family, seed=seed)
     name = f"{family.name}:{seed}"
     return replace(family, name=name, signal=signal, corners=signal.corners, member=None)
 
 
-def _family(signal: RandomSteering | RandomDriving, name: str, summary: str) -> Maneuver:
-    inputs: tuple[str, ...] = ("s", "s_dot", "s_ddot") if signal.rack else ("delta",)
-    if isinstance(signal, RandomDriving):
+def _family(signal: RandomSteering, name: str, summary: str) -> Maneuver:
+    inputs: tuple[str, ...] = ("delta",)
+    if signal.rack:
+        inputs, summary = ("s", "s_dot", "s_ddot"), f"{summary}, of the rack"
+    driven = isinstance(signal, RandomDriving)
+    if driven:
         inputs += (*DRIVE_TORQUES, *BRAKE_TORQUES, *FRICTIONS)
-    summary = f"{summary}{', of the rack' * signal.rack}, 10 s; {name}:SEED is another one"
+    summary = f"{summary}, 10 s; {name}:SEED is another one"
     samples = round(DURATION * RATE) + 1
     family = Maneuver(name, summary, signal, inputs, DURATION, samples, signal.corners)
-    family = replace(family, linear_in_amplitude=isinstance(signal, RandomSteering))
-    return replace(family, member=partial(_member, family, type(signal)))
+    family = replace(family, linear_in_amplitude=not driven)
+    return replace(family, member=partial(_member, family))
 
 
 STEERING = "corrections of the steering to random angles, with pauses"
