@@ -23,7 +23,14 @@ from vehiclemor.cli.options import (
     result_file,
 )
 from vehiclemor.exceptions import InputError
-from vehiclemor.exporting.export import STEP, FileTarget, destination, name_of
+from vehiclemor.exporting.export import (
+    STEP,
+    FileTarget,
+    Integrator,
+    Precision,
+    destination,
+    name_of,
+)
 from vehiclemor.report.labels import Kind
 from vehiclemor.report.printing import wrapped
 
@@ -254,7 +261,10 @@ def export(
     out: Path | None = None,
     overwrite: bool = False,
     step: float = STEP,
+    integrator: Integrator = "rk4",
+    precision: Precision = "double",
     inputs: Annotated[list[str] | None, Several, Parameter(name="--input")] = None,
+    outputs: Annotated[list[str] | None, Several, Parameter(name="--output")] = None,
 ) -> None:
     """Export a model, or a reduced one, for another tool.
 
@@ -275,8 +285,14 @@ def export(
         Replace an export that is there.
     step
         Step size in s of the integrator in C and FMU.
+    integrator
+        In C and FMU: rk4, explicit; ros2, linearly implicit with one Jacobian, for longer steps.
+    precision
+        Of the numbers in C and FMU.
     inputs
         Optional inputs of the full model that the export has, such as brake_torque_FL.
+    outputs
+        Outputs that the export computes; all by default.
     """
     given, values = key_values("--set", settings), key_values("--parameter", parameter)
     file = Path(model).suffix == ".nc"
@@ -294,7 +310,17 @@ def export(
         out = destination(name_of(model, method), to, out, overwrite)
         if method is not None:
             chosen = vm.reduce(chosen, method, **given)
-    written = vm.export(chosen, to, out, overwrite=overwrite, step=step, inputs=inputs or ())
+    written = vm.export(
+        chosen,
+        to,
+        out,
+        overwrite=overwrite,
+        step=step,
+        integrator=integrator,
+        precision=precision,
+        inputs=inputs or (),
+        outputs=outputs,
+    )
     print(f"written: {written}")
 
 

@@ -5,63 +5,89 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from vehiclemor.codegen.operations import COMPARISONS, uses
+from vehiclemor.exceptions import InputError
+from vehiclemor.exporting.ros2 import solve_function
 from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
 from vehiclemor.exporting.systems import SIGNATURES, TANGENTS, TOOL, ExportedSystem
 
 SOURCES = Path(__file__).parent / "c_sources"
 SELECT = """\
-static double select(int test, double then, double otherwise)
+static vehiclemor_real select(int test, vehiclemor_real then, vehiclemor_real otherwise)
 {
     return test ? then : otherwise;
 }"""
 ENTRY = """\
-static double entry(double row, int place)
+static vehiclemor_real entry(vehiclemor_real row, int place)
 {
     return vehiclemor_table[(long)row + place];
 }"""
 # Kind of operation -> how C writes it.
 FORMS = {
-    **{kind: f"{kind}({{}})" for kind in FUNCTIONS},
     **{sign: f"({{}} {sign} {{}})" for sign in COMPARISONS},
     "add": "({} + {})",
     "subtract": "({} - {})",
     "multiply": "({} * {})",
     "divide": "({} / {})",
     "negate": "(-{})",
-    "abs": "fabs({})",
-    "atan2": "atan2({}, {})",
-    "max": "fmax({}, {})",
-    "min": "fmin({}, {})",
-    "power": "pow({}, {})",
     "select": "select({}, {}, {})",
     "table": "entry({}, {})",
 }
+# Function -> its name in C, in double precision.
+MATH = {name: name for name in FUNCTIONS}
+MATH |= {"abs": "fabs", "max": "fmax", "min": "fmin", "power": "pow"}
 # Expressions that are written are less deep; of a longer one the inside gets a name.
 SHALLOW = 12
 # Of parameters on which no function depends; all are listed.
 START_ALONE = "of the start alone, no effect here"
 HEADER, MODEL, TANGENT = "vehiclemor_model.h", "vehiclemor_model.c", "vehiclemor_tangent.c"
 STEPPER, DRIVER = "vehiclemor_step.c", "vehiclemor_driver.c"
+# Precision -> type in C, and what follows a number and the name of a function.
+TYPES = {"double": ("double", ""), "single": ("float", "f")}
+# Name -> its summary, and how many vectors of states and of inputs a step holds.
+INTEGRATORS = {
+    "rk4": ("explicit Runge-Kutta method of order 4", 5, 1),
+    "ros2": ("linearly implicit method of order 2, with the Jacobian at the first start", 4, 0),
+}
+# Of `ros2`: the solution of the linear system of a stage.
+SIGNATURES_IN_C = SIGNATURES | TANGENTS | {"solve": ("x", "r", "k")}
 
 
-def c_files(system: ExportedSystem, step: float) -> dict[str, str]:
-    """Name -> text of the files of a system; the header names a step size in s."""
-    shipped = {name: (SOURCES / name).read_text(encoding="utf-8") for name in (STEPPER, DRIVER)}
-    values = [_array("parameters", system.values)]
-    values += [_array(_start(name), state) for name, state in system.starts.items()]
+class CSettings(NamedTuple):
+    """How a system is written: step size of its integrator in s, integrator and precision."""
+
+    step: float
+    integrator: str = "rk4"
+    precision: str = "double"
+
+
+def c_files(system: ExportedSystem, settings: CSettings) -> dict[str, str]:
+    """Name -> text of the files of a system."""
+    sources = {STEPPER: f"vehiclemor_step_{settings.integrator}.c", DRIVER: DRIVER}
+    shipped = {name: (SOURCES / file).read_text("utf-8") for name, file in sources.items()}
+    suffix = TYPES[settings.precision][1]
+    values = [_array("parameters", system.values, suffix)]
+    values += [_array(_start(name), state, suffix) for name, state in system.starts.items()]
+    functions = dict(system.functions)
+    if settings.integrator == "ros2":
+        if system.dynamics is None:
+            raise InputError(f"{system.name} has no states, which ros2 could integrate")
+        start = next(iter(system.starts.values()))
+        inputs = np.array([q.default or 0.0 for q in system.inputs])
+        functions["solve"] = solve_function(system.dynamics, start, inputs, settings.step)
     tangents = {f"{name}_tangent": function for name, function in system.tangents().items()}
     return {
-        HEADER: _header(system, step),
-        MODEL: _source(system, "its functions", values, system.functions),
-        TANGENT: _source(system, "derivatives of its functions", [], tangents),
+        HEADER: _header(system, settings),
+        MODEL: _source(system, "its functions", values, functions, suffix),
+        TANGENT: _source(system, "derivatives of its functions", [], tangents, suffix),
     } | shipped
 
 
-def _header(system: ExportedSystem, step: float) -> str:
+def _header(system: ExportedSystem, settings: CSettings) -> str:
     def listed(title: str, quantities: Sequence) -> list[str]:
         rows = [
             f"     {i:3d}  {q.name} ({q.unit}): {q.long_name}" for i, q in enumerate(quantities)
@@ -73,13 +99,18 @@ def _header(system: ExportedSystem, step: float) -> str:
         q if i in system.acting else replace(q, long_name=f"{q.long_name}; {START_ALONE}")
         for i, q in enumerate(system.parameters)
     ]
+    summary, of_states, of_inputs = INTEGRATORS[settings.integrator]
     counts = {
         "STATES": sizes["x"],
         "INPUTS": sizes["u"],
         "OUTPUTS": len(system.outputs),
         "PARAMETERS": sizes["p"],
         "CONSTANTS": sizes["c"],
+        "SCRATCH": of_states * max(sizes["x"], 1) + of_inputs * max(sizes["u"], 1),
     }
+    of_integrator = []
+    if settings.integrator == "ros2":
+        of_integrator = ["", "/* Solve the linear system of a step. */", f"{_signature('solve')};"]
     starts = list(system.starts)
     states = [_declared(_start(name), sizes["x"]) for name in starts]
     lines = [
@@ -95,12 +126,18 @@ def _header(system: ExportedSystem, step: float) -> str:
         "#ifndef VEHICLEMOR_MODEL_H",
         "#define VEHICLEMOR_MODEL_H",
         "",
-        "/* Sizes; an array in C holds one number at least. */",
+        f"/* Numbers are in {settings.precision} precision. */",
+        f"typedef {TYPES[settings.precision][0]} vehiclemor_real;",
+        "",
+        "/* Sizes; an array in C holds one number at least.  Scratch are the numbers that a step",
+        "   holds on the stack, beside what the functions have there. */",
         *(f"#define VEHICLEMOR_{name} {count}" for name, count in counts.items()),
         "#define VEHICLEMOR_FLOATS(count) ((count) > 0 ? (count) : 1)",
         "",
-        "/* Step size in s at which vehiclemor_step is stable and accurate. */",
-        f"#define VEHICLEMOR_STEP {step!r}",
+        f"/* Integrator: {summary}.",
+        "   Step size in s that it is exported for, the longest one to use. */",
+        f'#define VEHICLEMOR_INTEGRATOR "{settings.integrator}"',
+        f"#define VEHICLEMOR_STEP {settings.step!r}",
         "",
         *(f"extern {declared};" for declared in (_declared("parameters", sizes["p"]), *states)),
         f"#define vehiclemor_start vehiclemor_{_start(starts[0])}",
@@ -112,8 +149,10 @@ def _header(system: ExportedSystem, step: float) -> str:
         *(f"{_signature(name)};" for name in TANGENTS),
         "",
         "/* Take x over a step of h seconds; inputs are linear from u to u_end, which may be u. */",
-        "void vehiclemor_step(double *x, const double *u, const double *u_end, const double *c,",
-        "                     double h);",
+        "void vehiclemor_step(vehiclemor_real *x, const vehiclemor_real *u,",
+        "                     const vehiclemor_real *u_end, const vehiclemor_real *c,",
+        "                     vehiclemor_real h);",
+        *of_integrator,
         "",
         "#endif",
     ]
@@ -121,7 +160,7 @@ def _header(system: ExportedSystem, step: float) -> str:
 
 
 def _declared(name: str, size: int) -> str:
-    return f"const double vehiclemor_{name}[{max(size, 1)}]"
+    return f"const vehiclemor_real vehiclemor_{name}[{max(size, 1)}]"
 
 
 def _start(name: str) -> str:
@@ -129,9 +168,9 @@ def _start(name: str) -> str:
 
 
 def _signature(name: str) -> str:
-    *given, result = (SIGNATURES | TANGENTS)[name]
-    arguments = ", ".join(f"const double *{argument}" for argument in given)
-    return f"void vehiclemor_{name}({arguments}, double *{result})"
+    *given, result = SIGNATURES_IN_C[name]
+    arguments = ", ".join(f"const vehiclemor_real *{argument}" for argument in given)
+    return f"void vehiclemor_{name}({arguments}, vehiclemor_real *{result})"
 
 
 def _source(
@@ -139,28 +178,33 @@ def _source(
     what: str,
     parts: Sequence[str],
     functions: Mapping[str, StraightLine],
+    suffix: str,
 ) -> str:
-    """Text of a file of functions, after other parts."""
-    texts = [_function(name, function) for name, function in functions.items()]
+    """Text of a file of functions, after other parts; a suffix ends names and numbers."""
+    texts = [_function(name, function, suffix) for name, function in functions.items()]
     called = "\n".join(texts)
     helpers = [SELECT] if "select(" in called else []
     if "entry(" in called:
-        helpers += [f"static {_array('table', system.table)}", ENTRY]
+        helpers += [f"static {_array('table', system.table, suffix)}", ENTRY]
     head = f"/* {system.name}: {what}, written by {TOOL}. */"
     included = f'#include <math.h>\n\n#include "{HEADER}"'
     return "\n\n".join([head, included, *parts, *helpers, *texts]) + "\n"
 
 
-def _array(name: str, values: np.ndarray) -> str:
-    numbers = [repr(value) for value in values.tolist()] or ["0.0"]
+def _number(value: float, suffix: str) -> str:
+    return f"{np.float32(value)!s}f" if suffix else repr(value)
+
+
+def _array(name: str, values: np.ndarray, suffix: str) -> str:
+    numbers = [_number(value, suffix) for value in values.tolist()] or ["0"]
     rows = [", ".join(numbers[i : i + 4]) for i in range(0, len(numbers), 4)]
     body = ",\n    ".join(rows)
     return f"{_declared(name, len(values))} = {{\n    {body}\n}};"
 
 
-def _function(name: str, function: StraightLine) -> str:
+def _function(name: str, function: StraightLine, suffix: str) -> str:
     """Definition of a function."""
-    *given, result = (SIGNATURES | TANGENTS)[name]
+    *given, result = SIGNATURES_IN_C[name]
     operations, counts = function.operations, uses(function.operations)
     texts: dict[int, str] = {}
     depths: dict[int, int] = {}
@@ -169,14 +213,19 @@ def _function(name: str, function: StraightLine) -> str:
         kind, numbers, detail = operations[number]
         depth = 1 + max((depths[n] for n in numbers), default=-1)
         if kind == "number":
-            text = repr(detail) if detail >= 0.0 else f"({detail!r})"
+            text = _number(detail, suffix)
+            text = text if detail >= 0.0 else f"({text})"
         elif kind == "entry":
             text = f"{detail[0]}[{detail[1]}]"
         else:
-            text = FORMS[kind].format(*(texts[n] for n in numbers), detail)
+            values = [texts[n] for n in numbers]
+            if kind in MATH:
+                text = f"{MATH[kind]}{suffix}({', '.join(values)})"
+            else:
+                text = FORMS[kind].format(*values, detail)
             # What is used more than once has a name.
             if counts[number] > 1 or depth > SHALLOW:
-                lines.append(f"    const double v{number} = {text};")
+                lines.append(f"    const vehiclemor_real v{number} = {text};")
                 text, depth = f"v{number}", 0
         texts[number], depths[number] = text, depth
     lines += [f"    {result}[{i}] = {texts[n]};" for i, n in enumerate(function.results)]

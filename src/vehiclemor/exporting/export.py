@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 FileTarget = Literal["c", "fmu", "casadi"]
 Target = Literal[FileTarget, "jax", "sympy"]
 TARGETS: tuple[str, ...] = Target.__args__
+Integrator = Literal["rk4", "ros2"]
+Precision = Literal["double", "single"]
 # How the name of what is written ends; C is a folder.
 ENDINGS = {"c": "", "fmu": ".fmu", "casadi": ".casadi"}
 # Step in s of the integrator in C: stable for modes of up to 2780 1/s.
@@ -48,7 +50,10 @@ def export(
     *,
     overwrite: bool = False,
     step: float = STEP,
+    integrator: Integrator = "rk4",
+    precision: Precision = "double",
     inputs: str | Sequence[str] = (),
+    outputs: str | Sequence[str] | None = None,
 ) -> Any:
     """A full or reduced model for another tool.
 
@@ -68,10 +73,18 @@ def export(
     overwrite
         Whether an export that is there is replaced.
     step
-        Of the integrator that C and FMU bring along, in s (Runge-Kutta of order 4).
+        Of the integrator that C and FMU bring along, in s.
+    integrator
+        `rk4`: explicit Runge-Kutta of order 4.  `ros2`: linearly implicit of order 2 with one
+        Jacobian, that of the model's first start at this step: stable at longer steps where the
+        car isn't slower than there.
+    precision
+        Of the numbers in C and FMU: `double`, or `single` for processors that have no other.
     inputs
         Optional inputs of a full model that the export has behind those of every run, such as
         `brake_torque_FL`.
+    outputs
+        Outputs that the export computes, all by default.
 
     Returns
     -------
@@ -86,6 +99,10 @@ def export(
     """
     choice("target", to, TARGETS)
     step = within("step", number("step", step), STEPS, " s")
+    choice("integrator", integrator, Integrator.__args__)
+    choice("precision", precision, Precision.__args__)
+    if to not in FILES and (integrator, precision) != ("rk4", "double"):
+        raise InputError(f"integrator and precision are choices for C and FMU, not for {to}")
     if out is not None and to not in ENDINGS:
         raise InputError(f"out: an export to {to} is an object, no file")
     if isinstance(model, str):
@@ -93,19 +110,23 @@ def export(
 
         model = build(model)
     system = system_of(_with_inputs(model, listed(inputs)))
+    if outputs is not None:
+        system = system.with_outputs(listed(outputs, "outputs"))
     path: Any = None
     if out is not None or to in FILES:
         path = destination(system.name, to, out, overwrite)
     if len(system.table) and to in ("casadi", "sympy"):
         raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
     if to == "c":
-        from vehiclemor.exporting.c import c_files
+        from vehiclemor.exporting.c import CSettings, c_files
 
-        return _write_folder(path, c_files(system, step))
+        settings = CSettings(step, integrator, precision)
+        return _write_folder(path, c_files(system, settings))
     if to == "fmu":
+        from vehiclemor.exporting.c import CSettings
         from vehiclemor.exporting.fmu import fmu_files, write_archive
 
-        files = fmu_files(system, step)
+        files = fmu_files(system, CSettings(step, integrator, precision))
         return write_whole(path, lambda temporary: write_archive(files, temporary))
     from vehiclemor.exporting.libraries import OBJECTS
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.exporting.c import DRIVER, MODEL, SOURCES, STEPPER, TANGENT, c_files
+from vehiclemor.exporting.c import DRIVER, MODEL, SOURCES, STEPPER, TANGENT, CSettings, c_files
 from vehiclemor.exporting.systems import TOOL, ExportedSystem
 
 _LOG = logging.getLogger("vehiclemor")
@@ -41,14 +41,14 @@ STOP, COMMUNICATION = 10.0, 0.01
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
 
 
-def fmu_files(system: ExportedSystem, step: float) -> dict[str, bytes]:
-    """Path in the archive -> content, with the integrator's step in s; a binary if it compiles."""
-    texts = {name: text for name, text in c_files(system, step).items() if name != DRIVER}
+def fmu_files(system: ExportedSystem, settings: CSettings) -> dict[str, bytes]:
+    """Path in the archive -> content; a binary if it compiles."""
+    texts = {name: text for name, text in c_files(system, settings).items() if name != DRIVER}
     texts[UNIT] = (SOURCES / UNIT).read_text(encoding="utf-8")
     token = hashlib.sha256("".join(texts.values()).encode()).hexdigest()[:32]
     texts["vehiclemor_token.h"] = f'#define VEHICLEMOR_TOKEN "{token}"\n'
     files = {f"sources/{name}": text.encode() for name, text in texts.items()}
-    files["modelDescription.xml"] = model_description(system, token)
+    files["modelDescription.xml"] = model_description(system, token, settings.step)
     binary = shared_library(texts)
     if binary is not None:
         kind = platform.system()
@@ -128,8 +128,11 @@ def variables_of(system: ExportedSystem) -> dict[int, Variable]:
     return by_reference
 
 
-def model_description(system: ExportedSystem, token: str) -> bytes:
-    """The file; by the token an importer's file and binary know one another."""
+def model_description(system: ExportedSystem, token: str, step: float) -> bytes:
+    """The file, with the integrator's step in s.
+
+    By the token an importer's file and binary know one another.
+    """
     every = variables_of(system)
     root = ElementTree.Element(
         "fmiModelDescription",
@@ -153,7 +156,8 @@ def model_description(system: ExportedSystem, token: str) -> bytes:
     units = ElementTree.SubElement(root, "UnitDefinitions")
     for name in dict.fromkeys(v.unit for v in every.values() if v.unit != "1"):
         ElementTree.SubElement(units, "Unit", name=name)
-    times = {"startTime": "0.0", "stopTime": repr(STOP), "stepSize": repr(COMMUNICATION)}
+    exchange = max(COMMUNICATION, step)
+    times = {"startTime": "0.0", "stopTime": repr(STOP), "stepSize": repr(exchange)}
     ElementTree.SubElement(root, "DefaultExperiment", times)
     listed = ElementTree.SubElement(root, "ModelVariables")
     for reference, variable in every.items():

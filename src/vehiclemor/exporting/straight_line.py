@@ -11,6 +11,8 @@ import operator
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from vehiclemor.codegen.derivatives import derivative
 from vehiclemor.codegen.operations import (
     SEED,
@@ -134,6 +136,17 @@ class Lines(Listing):
                     terms.append(weight if alone else weight * factor)
             sums.append(self._total(terms))
         return sums
+
+    def product(self, matrix: np.ndarray, vector: Sequence[Value]) -> list[Value]:
+        """A matrix times a vector; zeros are left out."""
+        rows = []
+        for weights in matrix.tolist():
+            terms = []
+            for weight, value in zip(weights, vector, strict=True):
+                if weight:
+                    terms.append(value if weight == 1.0 else weight * value)
+            rows.append(self._total(terms))
+        return rows
 
     def _total(self, terms: Sequence[Value]) -> Value:
         """Sum of terms in pairs: shallow for whoever walks through it, and rounded less."""

@@ -6,7 +6,7 @@ It is that of a full or a reduced model.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
 from typing import Any
@@ -22,10 +22,12 @@ from vehiclemor.reduction.methods.full_order import FullOrder
 from vehiclemor.reduction.methods.path_map import PathMapModel, map_kernel
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
+from vehiclemor.simulation.system import System
 
 TOOL = f"vehiclemor {version('vehiclemor')}"
 # Function -> names of its arguments, in order, and of its result.
@@ -70,6 +72,25 @@ class ExportedSystem(ShortRepr):
     tangents: Callable[[], Mapping[str, StraightLine]]
     # Numbers that `entry(row, offset)` reads, at row + offset; may be empty.
     table: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    # Has the Jacobian of an implicit step; none without states.
+    dynamics: System | None = None
+
+    def with_outputs(self, names: Sequence[str]) -> ExportedSystem:
+        """The system with these outputs alone, in this order; `InputError` if it lacks one."""
+        numbers = {q.name: i for i, q in enumerate(self.outputs)}
+        chosen = [numbers[choice("output", name, numbers)] for name in dict.fromkeys(names)]
+
+        def selected(functions: Mapping[str, StraightLine]) -> dict[str, StraightLine]:
+            operations, results = functions["outputs"]
+            few = StraightLine(operations, [results[i] for i in chosen])
+            return {**functions, "outputs": few}
+
+        return replace(
+            self,
+            outputs=tuple(self.outputs[i] for i in chosen),
+            functions=selected(self.functions),
+            tangents=lambda: selected(self.tangents()),
+        )
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -104,7 +125,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
         case PathMapModel():
             return map_system(what, name)
         case ReducedVehicle():
-            return reduced_system(what, name, what.decoder.kernel(0))
+            return reduced_system(what, name, what.decoder.kernel)
         case ReducedSystem() if what.spaces.formulation == "full":
             if what.states == what.model.definition.states:
                 return reduced_system(what, name, None)
@@ -135,6 +156,7 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
         model.initial,
         lines.functions({name: lines.include(sources[name], arrays) for name in SIGNATURES}),
         tangents,
+        dynamics=model.system,
     )
 
 
@@ -262,6 +284,7 @@ def reduced_system(
         {key: reduced.begin(key, at_rest) for key in model.starts},
         lines.functions({"derivative": derivative, "outputs": outputs}),
         tangents,
+        dynamics=system,
     )
 
 

@@ -106,11 +106,11 @@ def sample_arrays(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
         raise InputError(f"samples of a signal: {one_line(error)}") from None
 
 
-def listed(inputs: Any) -> tuple[str, ...]:
+def listed(given: Any, argument: str = "inputs") -> tuple[str, ...]:
     """Names, of which one may stand alone."""
-    names = (inputs,) if isinstance(inputs, str) else inputs
+    names = (given,) if isinstance(given, str) else given
     if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
-        raise InputError(f"inputs is {quoted(inputs)}, not a list of names")
+        raise InputError(f"{argument} is {quoted(given)}, not a list of names")
     return tuple(names)
 
 

@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -19,21 +20,20 @@ from tests.unit.exporting.programs import (
     steering,
 )
 
+CAR = "independent_suspension_vehicle"
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 STEP = 1e-3
 
 
 @pytest.fixture(scope="module")
 def drivers(tmp_path_factory):
-    """(model, kind) -> model in use and compiled driver."""
-    made = {}
+    """(model, kind), options of an export -> model in use and compiled driver."""
 
-    def driver(name, kind):
-        if (name, kind) not in made:
-            folder = tmp_path_factory.mktemp("c") / "car"
-            model = in_use(name, kind)
-            made[name, kind] = model, compiled(vm.export(model, "c", folder))
-        return made[name, kind]
+    @cache
+    def driver(name, kind, **options):
+        folder = tmp_path_factory.mktemp("c") / "car"
+        model = in_use(name, kind)
+        return model, compiled(vm.export(model, "c", folder, **options))
 
     return driver
 
@@ -67,19 +67,83 @@ def test_rates_outputs_and_steps_are_the_models(drivers, name, kind):
         assert outputs[:, own].max() == pytest.approx(model.trust(states, inputs).indicator)
 
 
-def test_the_step_that_is_proposed_is_of_order_4_and_accurate(drivers):
-    model, driver = drivers("independent_suspension_vehicle", "full")
-    # Held inputs: what is left is the method's own error.
-    errors = []
-    for step in (4e-3, 2e-3, STEP):
-        inputs = np.full((round(0.4 / step) + 1, 1), 0.03)
-        _, rows = driven(driver, inputs, step)
-        errors.append(rows[-1, :28])
+def errors_of(drivers, integrator, steps):
+    """Largest error of a state after 0.4 s of a turn, by step size."""
     signal = vm.Signal.from_samples([0.0, 0.4], [[0.03], [0.03]])
-    exact = model.model.simulate(signal, times=np.array([0.0, 0.4]), tolerance=1e-12).states[-1]
-    errors = [np.abs(found - exact).max() for found in errors]
+    errors = []
+    for step in steps:
+        model, driver = drivers(CAR, "full", step=step, integrator=integrator)
+        # Held inputs: what is left is the method's own error.
+        _, rows = driven(driver, np.full((round(0.4 / step) + 1, 1), 0.03), step)
+        times = np.array([0.0, 0.4])
+        exact = model.model.simulate(signal, times=times, tolerance=1e-12).states[-1]
+        errors.append(np.abs(rows[-1, : len(exact)] - exact).max())
+    return errors
+
+
+def test_the_explicit_step_is_of_order_4_and_accurate(drivers):
+    errors = errors_of(drivers, "rk4", (4e-3, 2e-3, STEP))
     assert errors[2] < 1e-8
     assert 10.0 < errors[0] / errors[1] < 26.0
+
+
+def test_the_implicit_step_is_of_order_2_and_stable_where_the_explicit_one_is_not(drivers):
+    # In the turn the Jacobian is no longer that of the start.
+    errors = errors_of(drivers, "ros2", (4e-2, 5e-3, 2.5e-3))
+    assert errors[0] < 0.05
+    assert 3.5 < errors[1] / errors[2] < 4.5
+    assert not errors_of(drivers, "rk4", (4e-2,))[0] < 1.0
+
+
+def test_chosen_outputs_are_computed_alone(drivers, tmp_path):
+    names = ["yaw_rate", "lateral_position"]
+    model, every = drivers(CAR, "reduced")
+    _, few = drivers(CAR, "reduced", outputs=tuple(names))
+    inputs = steering(model, 11, STEP)
+    n, rows = len(model.states), driven(every, inputs, STEP)[1]
+    columns = [n + model.output_names.index(name) for name in names]
+    assert np.array_equal(driven(few, inputs, STEP)[1][:, n:], rows[:, columns])
+    texts = [(driver.parent / "vehiclemor_model.c").read_text() for driver in (every, few)]
+    functions = [text.split("vehiclemor_outputs")[1] for text in texts]
+    # Half of them is the decoder; no tire is left.
+    assert len(functions[1]) < 0.2 * len(functions[0])
+    assert "atan" in functions[0]
+    assert "atan" not in functions[1]
+    with pytest.raises(vm.VehiclemorError, match="yaw_rates"):
+        vm.export(CAR, "c", tmp_path / "c", outputs=["yaw_rates"])
+
+
+@pytest.mark.parametrize("integrator", ["rk4", "ros2"])
+@pytest.mark.parametrize("kind", ["full", "reduced"])
+def test_single_precision_is_single_everywhere_and_as_accurate(drivers, kind, integrator):
+    options = {"integrator": integrator, "step": 0.005}
+    model, double = drivers(CAR, kind, **options)
+    _, single = drivers(CAR, kind, precision="single", **options)
+    inputs = steering(model, 201, 0.005)
+    found, wanted = (driven(driver, inputs, 0.005)[1] for driver in (single, double))
+    position = len(model.states) + model.output_names.index("lateral_position")
+    assert np.abs(wanted[:, position]).max() > 0.1
+    assert 0.0 < np.abs(found - wanted)[:, position].max() < 1e-4
+    strict = ["-std=c99", "-Wdouble-promotion", "-Wfloat-conversion", "-Werror", "-fsyntax-only"]
+    command = ["cc", *strict]
+    for part in ("model", "step", "tangent"):
+        source = f"vehiclemor_{part}.c"
+        assert "double" not in (single.parent / source).read_text().replace("double precision", "")
+        subprocess.run([*command, source], cwd=single.parent, check=True)
+
+
+def test_the_header_names_sizes_step_and_integrator(drivers):
+    options = {"integrator": "ros2", "step": 0.02, "precision": "single", "outputs": ("yaw_rate",)}
+    model, driver = drivers(CAR, "full", **options)
+    header = (driver.parent / "vehiclemor_model.h").read_text()
+    defined = dict(re.findall(r"#define VEHICLEMOR_(\w+) (\S+)$", header, re.MULTILINE))
+    assert {"INTEGRATOR": '"ros2"', "STEP": "0.02", "INPUTS": "1"}.items() <= defined.items()
+    assert int(defined["STATES"]) == len(model.states)
+    assert int(defined["OUTPUTS"]) == 1
+    # Rates, two stages and a shifted state.
+    assert int(defined["SCRATCH"]) == 4 * len(model.states)
+    assert "typedef float" in header
+    assert "vehiclemor_solve" in header
 
 
 @pytest.mark.parametrize("kind", ["full", "reduced"])

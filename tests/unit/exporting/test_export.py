@@ -107,6 +107,10 @@ def test_sympy(rng):
         (CAR, {"to": "c", "out": "no-such-folder/car"}, "no-such-folder"),
         (CAR, {"to": "jax", "out": "car.py"}, "jax"),
         (3, {"to": "casadi"}, "model: 3"),
+        (CAR, {"to": "c", "integrator": "euler"}, "'euler'"),
+        (CAR, {"to": "jax", "precision": "single"}, "not for jax"),
+        (CAR, {"to": "c", "outputs": 3}, "outputs is 3"),
+        ("double_wishbone", {"to": "c", "integrator": "ros2"}, "no states"),
     ],
 )
 def test_wrong_arguments(tmp_path, monkeypatch, model, arguments, words):

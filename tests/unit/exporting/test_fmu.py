@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -12,7 +13,7 @@ import pytest
 import vehiclemor as vm
 from tests.unit.exporting.programs import in_use, relative, runge_kutta, steering
 from vehiclemor.exporting import fmu
-from vehiclemor.exporting.c import START_ALONE, c_files
+from vehiclemor.exporting.c import START_ALONE, CSettings, c_files
 from vehiclemor.exporting.export import system_of
 from vehiclemor.exporting.fmu import variables_of
 from vehiclemor.simulation.constants import hoisted_constants
@@ -31,17 +32,15 @@ CASES = [
 
 @pytest.fixture(scope="module")
 def units(tmp_path_factory):
-    """(model, kind) -> model in use and path of its unit, quickly compiled."""
-    made = {}
+    """(model, kind), options -> model in use and path of its unit, quickly compiled."""
 
-    def unit(name, kind):
-        if (name, kind) not in made:
-            path = tmp_path_factory.mktemp("unit") / "car.fmu"
-            model = in_use(name, kind)
-            with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(fmu, "OPTIMISED", ("-std=c99", "-O0", "-Wall", "-Werror"))
-                made[name, kind] = model, vm.export(model, "fmu", path)
-        return made[name, kind]
+    @cache
+    def unit(name, kind, **options):
+        path = tmp_path_factory.mktemp("unit") / "car.fmu"
+        model = in_use(name, kind)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(fmu, "OPTIMISED", ("-std=c99", "-O0", "-Wall", "-Werror"))
+            return model, vm.export(model, "fmu", path, **options)
 
     return unit
 
@@ -88,8 +87,8 @@ def started(units, tmp_path):
     """Start a unit."""
     with ExitStack() as stack:
 
-        def start(*case):
-            model, path = units(*case)
+        def start(*case, **options):
+            model, path = units(*case, **options)
             unit = Instance(path, tmp_path)
             stack.callback(unit.slave.freeInstance)
             stack.callback(unit.slave.terminate)
@@ -132,6 +131,45 @@ def test_model_exchange_with_another_integrator(units, case):
     states = runge_kutta(model.rhs, model.state(), inputs, STEP)[::100]
     wanted = model.outputs(states, inputs[::100])
     assert relative(found[:, : wanted.shape[1]], wanted) < 1e-5
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_a_long_implicit_step_with_chosen_outputs(units, precision):
+    names = ("yaw_rate", "lateral_position")
+    options = {"step": 0.02, "integrator": "ros2", "precision": precision, "outputs": names}
+    model, path = units(*CASES[0], **options)
+    assert validate_fmu(str(path)) == []
+    described = fmpy.read_model_description(str(path))
+    assert described.defaultExperiment.stepSize == "0.02"
+    found = simulated(path, "CoSimulation", 1.0, start_values={"delta": 0.03}, step_size=0.02)
+    signal = vm.Signal.from_samples([0.0, 1.0], [[0.03], [0.03]])
+    run = model.model.simulate(signal, tolerance=1e-9)
+    wanted = [run[name][-1] for name in names]
+    assert found[-1] == pytest.approx(wanted, rel=2e-3)
+
+
+def test_a_turned_car_moves_as_the_same_car_turned(started):
+    model, unit = started(*CASES[2], integrator="ros2", step=0.02)
+    names, angle = [f"state.{name}" for name in model.states], 2.0
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    heading, *pairs = model.model.system.rotating
+    unit.set(model.inputs[:1], [0.003])
+    ends = []
+    for turned in (False, True):
+        start = model.state()
+        if turned:
+            start[heading] += angle
+            start[pairs[2:]] = turn @ start[pairs[2:]]
+        unit.set(names, start)
+        unit.slave.doStep(0.0, 0.5)
+        ends.append(unit.get(names))
+    straight, turned = ends
+    wanted = straight.copy()
+    wanted[heading] += angle
+    for pair in (pairs[:2], pairs[2:]):
+        wanted[pair] = turn @ straight[pair]
+    assert abs(straight[pairs[1]]) > 1e-3
+    assert np.abs(turned - wanted).max() < 1e-9
 
 
 def test_quantities_have_the_units_of_the_model(units):
@@ -218,7 +256,7 @@ def test_parameters_are_those_that_rates_or_outputs_change_with(name, rng):
     assert set(listed) - acting <= {"parameter.rear_arm_pivot.y"}
     assert acting <= set(listed)
     assert "parameter.initial_speed" not in acting
-    header = c_files(system, STEP)["vehiclemor_model.h"]
+    header = c_files(system, CSettings(STEP))["vehiclemor_model.h"]
     assert header.count(START_ALONE) == len(system.parameters) - len(listed) > 0
 
 

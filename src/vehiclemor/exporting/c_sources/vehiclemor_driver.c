@@ -26,27 +26,33 @@ static int later(const void *a, const void *b)
     return (first > second) - (first < second);
 }
 
-static void row(const double *values, int count)
+static void row(const vehiclemor_real *values, int count)
 {
     int i;
     for (i = 0; i < count; i++)
-        printf("%.17g ", values[i]);
+        printf("%.17g ", (double)values[i]);
 }
 
-static int inputs(double *u)
+static int inputs(vehiclemor_real *u)
 {
+    double value;
     int i;
-    for (i = 0; i < VEHICLEMOR_INPUTS; i++)
-        if (scanf("%lf", &u[i]) != 1)
+    for (i = 0; i < VEHICLEMOR_INPUTS; i++) {
+        if (scanf("%lf", &value) != 1)
             return 0;
+        u[i] = (vehiclemor_real)value;
+    }
     return 1;
 }
 
 int main(void)
 {
-    double x[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)], dx[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)];
-    double u[2][VEHICLEMOR_FLOATS(VEHICLEMOR_INPUTS)], y[VEHICLEMOR_FLOATS(VEHICLEMOR_OUTPUTS)];
-    double c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)], h, total = 0.0, *taken;
+    vehiclemor_real x[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)];
+    vehiclemor_real dx[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)];
+    vehiclemor_real u[2][VEHICLEMOR_FLOATS(VEHICLEMOR_INPUTS)];
+    vehiclemor_real y[VEHICLEMOR_FLOATS(VEHICLEMOR_OUTPUTS)];
+    vehiclemor_real c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
+    double h, total = 0.0, *taken;
     long steps, n;
     int i;
     if (scanf("%ld %lf", &steps, &h) != 2 || steps < 1 || !inputs(u[0])) {
@@ -74,7 +80,7 @@ int main(void)
             return EXIT_FAILURE;
         }
         taken[n] = seconds();
-        vehiclemor_step(x, u[n % 2], u[(n + 1) % 2], c, h);
+        vehiclemor_step(x, u[n % 2], u[(n + 1) % 2], c, (vehiclemor_real)h);
         vehiclemor_outputs(x, u[(n + 1) % 2], c, y);
         taken[n] = seconds() - taken[n];
         total += taken[n];

@@ -58,17 +58,19 @@ enum {
 typedef struct {
     int known;
     double time;
-    double x[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)], dx[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)];
-    double u[VEHICLEMOR_FLOATS(VEHICLEMOR_INPUTS)], y[VEHICLEMOR_FLOATS(VEHICLEMOR_OUTPUTS)];
-    double p[VEHICLEMOR_FLOATS(VEHICLEMOR_PARAMETERS)];
-    double c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
+    vehiclemor_real x[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)];
+    vehiclemor_real dx[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)];
+    vehiclemor_real u[VEHICLEMOR_FLOATS(VEHICLEMOR_INPUTS)];
+    vehiclemor_real y[VEHICLEMOR_FLOATS(VEHICLEMOR_OUTPUTS)];
+    vehiclemor_real p[VEHICLEMOR_FLOATS(VEHICLEMOR_PARAMETERS)];
+    vehiclemor_real c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
 } Instance;
 
 static void reset(Instance *m)
 {
     memset(m, 0, sizeof *m);
-    memcpy(m->x, vehiclemor_start, VEHICLEMOR_STATES * sizeof(double));
-    memcpy(m->p, vehiclemor_parameters, VEHICLEMOR_PARAMETERS * sizeof(double));
+    memcpy(m->x, vehiclemor_start, sizeof m->x);
+    memcpy(m->p, vehiclemor_parameters, sizeof m->p);
     vehiclemor_constants(m->p, m->c);
 }
 
@@ -80,14 +82,14 @@ static Instance *instance(const char *token)
     return m;
 }
 
-/* Place of a variable; none if there is no such variable. */
-static double *variable(Instance *m, unsigned number)
+/* Place of a variable other than the time; none if there is no such variable. */
+static vehiclemor_real *variable(Instance *m, unsigned number)
 {
     if (number >= P && number < END)
         return &m->p[number - P];
     if (number >= U)
         return number < Y ? &m->u[number - U] : number < P ? &m->y[number - Y] : NULL;
-    return number >= DX ? &m->dx[number - DX] : number >= X ? &m->x[number - X] : &m->time;
+    return number >= DX ? &m->dx[number - DX] : number >= X ? &m->x[number - X] : NULL;
 }
 
 static void evaluate(Instance *m)
@@ -103,7 +105,11 @@ static int get(Instance *m, const unsigned *numbers, size_t count, double *value
 {
     size_t i;
     for (i = 0; i < count; i++) {
-        const double *place = variable(m, numbers[i]);
+        const vehiclemor_real *place = variable(m, numbers[i]);
+        if (numbers[i] == TIME) {
+            values[i] = m->time;
+            continue;
+        }
         if (!place)
             return 0;
         if ((numbers[i] >= DX && numbers[i] < U) || (numbers[i] >= Y && numbers[i] < P))
@@ -125,7 +131,7 @@ static int set(Instance *m, const unsigned *numbers, size_t count, const double 
         changed |= n >= P;
     }
     for (i = 0; i < count; i++)
-        *variable(m, numbers[i]) = values[i];
+        *variable(m, numbers[i]) = (vehiclemor_real)values[i];
     if (changed)
         vehiclemor_constants(m->p, m->c);
     m->known = 0;
@@ -136,12 +142,12 @@ static int set(Instance *m, const unsigned *numbers, size_t count, const double 
 static int directional(Instance *m, const unsigned *unknown, size_t unknowns, const unsigned *known,
                        size_t knowns, const double *seed, double *change)
 {
-    double s[END] = {0.0}, c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
+    vehiclemor_real s[END] = {0}, c[VEHICLEMOR_FLOATS(VEHICLEMOR_CONSTANTS)];
     size_t i;
     for (i = 0; i < knowns; i++) {
         if (known[i] >= END)
             return 0;
-        s[known[i]] += seed[i];
+        s[known[i]] += (vehiclemor_real)seed[i];
     }
     vehiclemor_constants_tangent(m->p, s + P, c);
     vehiclemor_derivative_tangent(m->x, m->u, m->c, s + X, s + U, c, s + DX);
@@ -165,11 +171,11 @@ static int advance(Instance *m, double time, double length)
         return 0;
     steps = 1 + (long)(count - 1e-9);
     for (n = 0; n < steps; n++)
-        vehiclemor_step(m->x, m->u, m->u, m->c, length / (double)steps);
+        vehiclemor_step(m->x, m->u, m->u, m->c, (vehiclemor_real)(length / (double)steps));
     m->time = time + length;
     m->known = 0;
     for (i = 0; i < VEHICLEMOR_STATES; i++)
-        if (m->x[i] - m->x[i] != 0.0)
+        if (m->x[i] - m->x[i] != 0)
             return 0;
     return 1;
 }
@@ -331,27 +337,33 @@ STATUS fmi2SetTime(fmi2Component m, fmi2Real time)
 
 STATUS fmi2SetContinuousStates(fmi2Component m, const fmi2Real x[], size_t n)
 {
+    size_t i;
     if (n != VEHICLEMOR_STATES)
         return fmi2Error;
-    memcpy(((Instance *)m)->x, x, n * sizeof *x);
+    for (i = 0; i < n; i++)
+        ((Instance *)m)->x[i] = (vehiclemor_real)x[i];
     ((Instance *)m)->known = 0;
     return fmi2OK;
 }
 
 STATUS fmi2GetContinuousStates(fmi2Component m, fmi2Real x[], size_t n)
 {
+    size_t i;
     if (n != VEHICLEMOR_STATES)
         return fmi2Error;
-    memcpy(x, ((Instance *)m)->x, n * sizeof *x);
+    for (i = 0; i < n; i++)
+        x[i] = ((Instance *)m)->x[i];
     return fmi2OK;
 }
 
 STATUS fmi2GetDerivatives(fmi2Component m, fmi2Real dx[], size_t n)
 {
+    size_t i;
     if (n != VEHICLEMOR_STATES)
         return fmi2Error;
     evaluate(m);
-    memcpy(dx, ((Instance *)m)->dx, n * sizeof *dx);
+    for (i = 0; i < n; i++)
+        dx[i] = ((Instance *)m)->dx[i];
     return fmi2OK;
 }
 

@@ -2,23 +2,25 @@
 
 #include "vehiclemor_model.h"
 
-void vehiclemor_step(double *x, const double *u, const double *u_end, const double *c, double h)
+void vehiclemor_step(vehiclemor_real *x, const vehiclemor_real *u, const vehiclemor_real *u_end,
+                     const vehiclemor_real *c, vehiclemor_real h)
 {
-    double k[4][VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)], y[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)];
-    double middle[VEHICLEMOR_FLOATS(VEHICLEMOR_INPUTS)];
+    vehiclemor_real k[4][VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)];
+    vehiclemor_real y[VEHICLEMOR_FLOATS(VEHICLEMOR_STATES)];
+    vehiclemor_real middle[VEHICLEMOR_FLOATS(VEHICLEMOR_INPUTS)];
     int i;
     for (i = 0; i < VEHICLEMOR_INPUTS; i++)
-        middle[i] = 0.5 * (u[i] + u_end[i]);
+        middle[i] = (u[i] + u_end[i]) / 2;
     vehiclemor_derivative(x, u, c, k[0]);
     for (i = 0; i < VEHICLEMOR_STATES; i++)
-        y[i] = x[i] + 0.5 * h * k[0][i];
+        y[i] = x[i] + h / 2 * k[0][i];
     vehiclemor_derivative(y, middle, c, k[1]);
     for (i = 0; i < VEHICLEMOR_STATES; i++)
-        y[i] = x[i] + 0.5 * h * k[1][i];
+        y[i] = x[i] + h / 2 * k[1][i];
     vehiclemor_derivative(y, middle, c, k[2]);
     for (i = 0; i < VEHICLEMOR_STATES; i++)
         y[i] = x[i] + h * k[2][i];
     vehiclemor_derivative(y, u_end, c, k[3]);
     for (i = 0; i < VEHICLEMOR_STATES; i++)
-        x[i] += h / 6.0 * (k[0][i] + 2.0 * (k[1][i] + k[2][i]) + k[3][i]);
+        x[i] += h / 6 * (k[0][i] + 2 * (k[1][i] + k[2][i]) + k[3][i]);
 }
