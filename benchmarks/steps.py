@@ -261,7 +261,8 @@ def tables(vehicle: str, content: dict[str, Any]) -> str:
                 time = cost[(*pair, "double")]["nanoseconds"] * 1e-3 / step if step else np.inf
                 cells += [f"{1e3 * step:g}" if step else "none", f"{time:.3g}" if step else ""]
                 text = f"{time:.3g} us ({pair[1]}, {1e3 * step:g} ms)"
-                best[pair[0], level] = min(best.get((pair[0], level), (np.inf, "none")), (time, text))
+                fastest = best.get((pair[0], level), (np.inf, "none"))
+                best[pair[0], level] = min(fastest, (time, text))
             least = min(r["score"] for r in rows)
             lines.append(_row([f"{speed:g}", *pair, *cells, f"{least:.2g}"]))
         for level in LEVELS:
@@ -282,7 +283,8 @@ def about() -> str:
         [COMPILER, "--version"], capture_output=True, text=True, check=True
     ).stdout.splitlines()[0]
     cpu = re.sub(r"\s+", " ", machine())
-    return f"{version}, -std=c99 -O3; {cpu}; CPU time, minimum of {ROUNDS} rounds; {len(READ)} outputs"
+    how = f"CPU time, minimum of {ROUNDS} rounds; {len(READ)} outputs"
+    return f"{version}, -std=c99 -O3; {cpu}; {how}"
 
 
 def main() -> None:
