@@ -1,7 +1,7 @@
 """Fallback: the full order repeats the runs of a reduced vehicle that are not to be trusted.
 
 It repeats them from the beginning: the reduced model has mostly gone wrong before its trust
-indicator passes 1.
+indicator passes 1, and errors at a restart near the edge grow.
 """
 
 from dataclasses import dataclass, replace
