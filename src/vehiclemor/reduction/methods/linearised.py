@@ -200,6 +200,7 @@ def linear_vehicle(model: DynamicModel, settings: Any, reductor: Reductor) -> Re
         offline=linearisation_cost(shape, began),
         solver=settings.solver,
         tolerance=settings.tolerance,
+        transient=modes.symmetric,
     )
 
 
