@@ -125,7 +125,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
         case PathMapModel():
             return map_system(what, name)
         case ReducedVehicle():
-            return reduced_system(what, name, what.decoder.kernel(0))
+            return reduced_system(what, name, what.decoder.kernel)
         case ReducedSystem() if what.spaces.formulation == "full":
             if what.states == what.model.definition.states:
                 return reduced_system(what, name, None)

@@ -200,7 +200,6 @@ def linear_vehicle(model: DynamicModel, settings: Any, reductor: Reductor) -> Re
         offline=linearisation_cost(shape, began),
         solver=settings.solver,
         tolerance=settings.tolerance,
-        transient=modes.symmetric,
     )
 
 

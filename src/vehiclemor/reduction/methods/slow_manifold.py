@@ -9,9 +9,8 @@ which lie on it, and the lag of the fast modes is learnt with them:
     z' = C phi(z, speed, u)
 
 Features phi are z, the inputs, the tire forces of the axles, and products that are chosen one after
-the other.  Heave and pitch, as slow as the lateral modes, are coordinates too if a training run is
-dropped.  The coefficients are improved on complete runs, since a heading that is off is a lateral
-position that is off.
+the other.  Heave and pitch, as slow as the lateral modes, are coordinates too.  The coefficients
+are improved on complete runs, since a heading that is off is a lateral position that is off.
 """
 
 import time
@@ -28,14 +27,11 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.fitting import (
     YAW_BOUND,
-    after_transient,
     forward_selection,
     improved,
     largest,
     ridge_fit,
     targets_of,
-    training_reach,
-    with_transients,
 )
 from vehiclemor.reduction.vehicle.linear_modes import SlowModes, slow_modes
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
@@ -58,7 +54,7 @@ from vehiclemor.simulation.trajectory import Trajectory
 
 # Speed (m/s), heading (rad) and position (m) below which their errors count absolutely.
 ABSOLUTE = (10.0, 0.03, 10.0, 10.0)
-# Symmetric modes, heave and pitch, that are coordinates where training runs are dropped.
+# Symmetric modes that are coordinates: heave and pitch.
 SYMMETRIC = 2
 # Products chosen for the decoded shape.
 DECODED = 24
@@ -68,14 +64,12 @@ class SlowManifoldSettings(FallbackSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
-    terms: int = Field(20, ge=0, description="chosen products in the lateral equations")
+    terms: int = Field(24, ge=0, description="chosen products in the lateral equations")
     even_terms: int = Field(
-        12, ge=0, description="chosen products in those of speed, heave and pitch"
+        16, ge=0, description="chosen products in those of speed, heave and pitch"
     )
     ridge: float = Field(1e-12, ge=0.0, description="weight of the coefficients' size in the fit")
-    steps: int = Field(
-        8, ge=0, description="Gauss-Newton steps on whole training runs, once and again"
-    )
+    steps: int = Field(8, ge=0, description="Gauss-Newton steps on whole training runs")
     heading_error: float = Field(
         YAW_BOUND,
         gt=0.0,
@@ -116,17 +110,10 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     """Fit the slow dynamics and the manifold on the training runs."""
     began = time.process_time()
     runs, shape = [run.recorded() for run in training], VehicleShape(model)
-    modes = slow_modes(shape, settings.fastest)
-    starts = [shape.of(run.states[:1])[0] - shape.reference for run in runs]
-    dropped = any(modes.symmetric.amplitudes(start).size for start in starts)
-    if dropped:
-        modes = slow_modes(shape, settings.fastest, SYMMETRIC)
-    settled = [after_transient(modes.symmetric, shape, run) for run in runs]
-    samples = shape_samples(shape, settled)
+    modes = slow_modes(shape, settings.fastest, SYMMETRIC)
+    samples = shape_samples(shape, runs)
     listing = slow_features(shape, modes, samples, settings.trusted, settings.reversal)
     reduced = _fitted_on_rates(shape, modes, listing, samples, settings)
-    if dropped:
-        reduced = with_transients(reduced, modes, runs)
     if settings.steps:
         targets = targets_of(reduced, training, runs, settings.heading_error)
         (odd, lateral), (even, symmetric) = reduced.features.groups
@@ -134,12 +121,10 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
         even = even[2 + listing.symmetric :]
         free = [(odd, i) for i in lateral]
         free += [(even, i) for i in symmetric]
-        reduced = improved(reduced, targets, free, settings.steps, power=1.0)
         reduced = improved(reduced, targets, free, settings.steps)
-    reduced = _with_decoding(reduced, training, settled, samples, settings.ridge)
+    reduced = _with_decoding(reduced, training, runs, samples, settings.ridge)
     return replace(
         reduced,
-        reach=training_reach(reduced, training, runs),
         offline=offline_cost(began, model, runs, len(samples.inputs)),
         solver=settings.solver,
         tolerance=settings.tolerance,
@@ -200,7 +185,6 @@ def _fitted_on_rates(
         encoding=modes.encoding,
         feedthrough=modes.input_shift,
         error_scale=np.concatenate([3.0 * scale, ABSOLUTE]),
-        transient=modes.symmetric,
         decoded_features=listing.of_terms(decoded, sum(term in odd for term in decoded)),
     )
 
@@ -208,7 +192,7 @@ def _fitted_on_rates(
 def _with_decoding(
     reduced: ReducedVehicle,
     training: Training,
-    settled: Sequence[Trajectory],
+    runs: Sequence[Trajectory],
     samples: ShapeSamples,
     ridge: float,
 ) -> ReducedVehicle:
@@ -221,8 +205,8 @@ def _with_decoding(
     assert features is not None
     paths = [reduced.path(run.maneuver, run.start) for run in training]
     parts = [
-        reduced.encoded_path(true.states, true.inputs) if path is None else path[-len(true.times) :]
-        for path, true in zip(paths, settled, strict=True)
+        reduced.encoded_path(true.states, true.inputs) if path is None else path
+        for path, true in zip(paths, runs, strict=True)
     ]
     z = np.ascontiguousarray(np.concatenate(parts)[:, :states])
     columns = feature_columns(features, z, samples.inputs, reduced.parameters)

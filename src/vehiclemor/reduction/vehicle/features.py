@@ -61,9 +61,6 @@ class Features:
     # (operation, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
     # the training range.
     watched: tuple[tuple[int, str], ...] = ()
-    # How many of these, the first ones, move when the vehicle is steered: how long they do counts
-    # too.
-    lateral: int = 0
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if the operations are more than arithmetic of what they are given."""
@@ -121,7 +118,6 @@ class FeatureListing(Listing):
         terms: Sequence[Term],
         groups: Any = (),
         watched: Sequence[tuple[Term, str]] = (),
-        lateral: int = 0,
     ) -> Features:
         """Features, each the product of its factors, and no operation that none needs."""
         numbers = [product(term).number for term in terms]
@@ -137,7 +133,6 @@ class FeatureListing(Listing):
             terms=tuple(renumbered[n] for n in numbers),
             groups=groups,
             watched=tuple((renumbered[n], what) for n, what in watches),
-            lateral=lateral,
         )
 
 
@@ -186,16 +181,15 @@ def rates_kernel(features: Features, parameters: int) -> Kernel:
     return listing.kernel("derivative", ARGUMENTS)
 
 
-def decoding_kernel(features: Features, layout: Layout, parameters: int, modes: int) -> Kernel:
+def decoding_kernel(features: Features, layout: Layout, parameters: int) -> Kernel:
     """What gives full states, and after them what is watched.
 
-    Constants are the features' parameters, then rows of coefficients: of the terms, of the shape at
-    straight running, and two of each mode of the transient, whose parts follow the inputs.
+    Constants are the features' parameters, then rows of coefficients: of the terms, and of the
+    shape at straight running.
     """
-    k, first = features.states, features.inputs
+    k = features.states
     listing, factors = _listed(features)
     factors.append(listing.number(1.0))
-    factors += [listing.entry("_u", first + i) for i in range(2 * modes)]
     values = listing.sums("_constants", parameters, len(layout.shape), factors)
     shape = dict(zip(layout.shape, values, strict=True))
     sine, cosine = listing.parts(listing.new("sincos", listing.entry("_x", k)), 2)

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.decoding import Transient
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 # Modes that steering moves by less than this (relative) are symmetric: they don't steer.
@@ -41,8 +40,6 @@ class SlowModes:
     # Mode of the speed (n,), scaled so that U grows by one.
     speed_left: np.ndarray
     speed_right: np.ndarray
-    # The other modes that steering does not move, as the transient of a start.
-    symmetric: Transient
 
     @property
     def encoding(self) -> np.ndarray:
@@ -78,13 +75,11 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         chosen = np.isin(np.arange(len(values)), quiet[:symmetric])
         more_w, more_v = real_modes(values, left, right, chosen)
         w, v = np.vstack([w, more_w]), np.hstack([v, more_v])
-        quiet = quiet[symmetric:]
     rates = w @ linear.a @ v
     b = w @ linear.b
     shift, driven = without_derivatives(rates, b)
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.velocity_a[1] @ right[:, still].real
-    double = np.where(np.imag(values[quiet]) > 0.0, 2.0, 1.0)
     return SlowModes(
         count,
         rates,
@@ -95,7 +90,6 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         static + v @ np.linalg.solve(rates, driven),
         left[still].real * scale,
         right[:, still].real / scale,
-        Transient(values[quiet], left[quiet], double[:, None] * right[:, quiet].T),
     )
 
 

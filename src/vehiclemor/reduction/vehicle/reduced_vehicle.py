@@ -1,9 +1,7 @@
 """Reduced vehicles: few coordinates of the shape, heading and position as quadratures."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
@@ -11,16 +9,9 @@ from vehiclemor.arguments import check_shapes, require
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost
-from vehiclemor.reduction.reduced_system import MOST_STARTS, ReducedSystem
+from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.trust import trust_of
-from vehiclemor.reduction.vehicle.decoding import (
-    NO_TRANSIENT,
-    NOTHING_KNOWN,
-    Decoding,
-    TrainingReach,
-    Transient,
-    decayed,
-)
+from vehiclemor.reduction.vehicle.decoding import Decoding
 from vehiclemor.reduction.vehicle.features import (
     PLANAR,
     Features,
@@ -36,22 +27,7 @@ from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
 # Step of the reduced coordinates in differences.
 DIFFERENCE = 1e-6
-NOTHING_EXCITED = np.empty((2, 0, 2))
 NO_COST = OfflineCost()
-
-
-class KnownStart(NamedTuple):
-    """A full state as a start, its reduced state, what of the transient it excites, until when (s).
-
-    `start_trust` has the time (s) from which on this is as in training runs; how far the start is
-    from theirs, 1 at the edge; 1.
-    """
-
-    state: np.ndarray
-    encoded: np.ndarray
-    excited: np.ndarray
-    until: float
-    start_trust: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,16 +53,12 @@ class ReducedVehicle(ReducedSystem):
     offline: OfflineCost = NO_COST
     solver: str = "dopri5"
     tolerance: float = 1e-6
-    transient: Transient = NO_TRANSIENT  # What is added to the decoded shapes.
     # Features of the decoding, with the same parameters, if not those of the equations.
     decoded_features: Features | None = None
-    # What the training runs have shown of durations and starts.
-    reach: TrainingReach = NOTHING_KNOWN
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if kernels would read or write beyond these arrays."""
-        features, reach = self.features, self.reach
-        decoded = self.decoded_features or features
+        features, decoded = self.features, self.decoded_features or self.features
         k, n, inputs = features.states, len(self.shape.indices), len(self.model.inputs)
         require((features.inputs, decoded.inputs) == (inputs, inputs), "features")
         require(decoded.states == k, "features")
@@ -97,14 +69,6 @@ class ReducedVehicle(ReducedSystem):
         check_shapes("decoding", (self.decoding, len(decoded.terms), n))
         check_shapes("encoding", (self.encoding, k, n), (self.feedthrough, k, inputs))
         check_shapes("error_scale", (self.error_scale, k + PLANAR))
-        modes = len(self.transient.rates)
-        require(not modes or self.transient.left.shape[1:] == (n,), "transient")
-        require(modes <= n, "modes")
-        require(reach.inputs.shape[1] in (0, inputs), "reach")
-        require(0 <= features.lateral == decoded.lateral <= len(decoded.watched), "lateral")
-        if len(reach.lasted):
-            known = len(reach.lasted), len(reach.decaying), len(reach.left)
-            require(known == (2 * decoded.lateral, modes, n), "lasted")
 
     @property
     def order(self) -> int:
@@ -135,16 +99,13 @@ class ReducedVehicle(ReducedSystem):
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the reduced states: they tell nothing of what has decayed after the start."""
+        """Names of the reduced states."""
         x, y, heading = self.model.definition.planar
         return (*(f"z{i}" for i in range(self.features.states)), heading, x, y)
 
     def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Full states (samples, 2 n) of reduced ones."""
-        return self._decoded(states, inputs)[:, : len(self.model.definition.states)]
-
-    def _decoded(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        return self.decoder.states(np.zeros(len(states)), states, inputs, NOTHING_EXCITED)[0]
+        return self.decoder.states(states, inputs)[:, : self.decoder.layout.size]
 
     def decoder_slopes(
         self, state: np.ndarray, inputs: np.ndarray
@@ -153,10 +114,12 @@ class ReducedVehicle(ReducedSystem):
         return self.decoder.slopes(state, inputs)
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
-        """Of states one by one: they tell neither how long a run has lasted nor of its start."""
+        """How far states (samples, states + 3) go in the ranges that are watched."""
+        return self._trust(np.zeros(len(states)), self.decoder.states(states, inputs))
+
+    def _trust(self, times: np.ndarray, decoded: np.ndarray) -> Trust | None:
         names = [name for _, name in self.decoder.features.watched]
-        used = self._decoded(states, inputs)[:, self.decoder.layout.size :]
-        return trust_of(np.zeros(len(states)), used, names) if names else None
+        return trust_of(times, decoded[:, self.decoder.layout.size :], names) if names else None
 
     def encode(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
@@ -173,8 +136,7 @@ class ReducedVehicle(ReducedSystem):
     def decoder(self) -> Decoding:
         """The compiled way back to full states."""
         shape, features = self.shape, self.decoded_features or self.features
-        of_shape = self.decoding, shape.reference, shape.layout
-        return Decoding(features, self.parameters, *of_shape, self.transient, self.reach)
+        return Decoding(features, self.parameters, self.decoding, shape.reference, shape.layout)
 
     def path(
         self, maneuver: Excitation, start: Start, times: np.ndarray | None = None
@@ -189,50 +151,23 @@ class ReducedVehicle(ReducedSystem):
         self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
     ) -> Trajectory:
         """Integrate the reduced equations, then decode states at the maneuver's output times."""
-        maneuver, inputs, input_use = self._checked_inputs(maneuver)
-        known = self.known(start, inputs[0])
-        run = self.run(maneuver, known.encoded, direct_until=known.until)
-        states, trust = self.decoder.of_run(
-            run, inputs, known.excited, (*known.start_trust, *input_use)
-        )
+        maneuver = checked_maneuver(maneuver, self.model.definition)
+        inputs = maneuver.recorded_inputs[1]
+        state, encoded = self.known(start, inputs[0])
+        run = self.run(maneuver, encoded, direct_until=0.0)
+        times, states = self.decoder.of_run(run, inputs)
+        trust = self._trust(times[: run.rows], states[: run.rows])
         if not len(run.point_of_sample) or run.point_of_sample[0, 1] < 0.0:
             # The start is known better than its slow part.
-            states[0, : len(known.state)] = known.state
+            states[0, : len(state)] = state
         trajectory = self.model.recorded(maneuver, run, inputs, states, trust, outputs)
         run.give_back()
         return trajectory
 
-    @cached_property
-    def _checked_inputs(
-        self,
-    ) -> Callable[[Excitation], tuple[Excitation, np.ndarray, tuple[float, float]]]:
-        """Of the last maneuvers: checked, inputs at the output times, how far these go."""
-
-        def check(maneuver: Excitation) -> tuple[Excitation, np.ndarray, tuple[float, float]]:
-            maneuver = checked_maneuver(maneuver, self.model.definition)
-            return maneuver, maneuver.recorded_inputs[1], self.reach.input_use(maneuver)
-
-        return lru_cache(MOST_STARTS)(check)
-
-    def excited(self, state: np.ndarray) -> np.ndarray:
-        """What of the transient a full state excites, see `Decoding.excited`."""
-        return self.decoder.excited(self.shape.of(state[None])[0] - self.shape.reference)
-
-    def remainder(
-        self, states: np.ndarray, inputs: np.ndarray, excited: np.ndarray = NOTHING_EXCITED
-    ) -> np.ndarray:
-        """What of the shapes (samples, n) of full states their reduced states don't give."""
-        path = self.encoded_path(states, inputs)
-        decoded, _ = self.decoder.states(np.zeros(len(path)), path, inputs, excited)
-        return self.shape.of(states) - self.shape.of(decoded[:, : states.shape[1]])
-
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
         """Reduced state of a start."""
-        return self.known(start, inputs).encoded.copy()
+        return self.known(start, inputs)[1].copy()
 
-    def prepared(self, state: np.ndarray, inputs: np.ndarray) -> KnownStart:
-        """A start with what it excites, at inputs."""
-        excited = self.excited(state)
-        remainder = self.remainder(state[None], inputs[None], excited)[0]
-        start_trust = self.reach.decay_time(excited), self.reach.start_distance(remainder), 1.0
-        return KnownStart(state, self.encode(state, inputs), excited, decayed(excited), start_trust)
+    def prepared(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A full state as a start, and its reduced state at inputs."""
+        return state, self.encode(state, inputs)

@@ -20,7 +20,6 @@ import numpy as np
 
 from vehiclemor.codegen.operations import Value
 from vehiclemor.multibody.quantities import FIALA, WHEELS
-from vehiclemor.reduction.vehicle.decoding_loops import MOVING
 from vehiclemor.reduction.vehicle.features import (
     FeatureListing,
     Features,
@@ -61,9 +60,6 @@ WHEEL_TERMS, RIDGE = 9, 1e-12
 LEAST_LOAD = 0.02
 # Part of the slip at which all of a tire's contact slides that is trusted.
 SATURATION = 1.2
-# Part of heave and pitch at the start that samples after the landing still show, and how much of
-# it, in parts of what samples show, a car may have that is steered.
-AFTER_LANDING, STEERED = 0.3, 1.2
 
 
 def clipped(value: Value) -> Value:
@@ -81,9 +77,7 @@ class SlowFeatures(FeatureListing):
         self.values: list[float] = []  # Of the parameters.
         # Name of a line -> its value.
         self.by_name = {f"z{i}": z for i, z in enumerate(self.z)} | {"1": self.number(1.0)}
-        # (value, what it is) of what is watched: lateral motion, then the rest.
-        self.watched: list[tuple[Value, str]] = []
-        self.besides: list[tuple[Value, str]] = []
+        self.watched: list[tuple[Value, str]] = []  # (value, what it is).
         # Kinds of lines of an axle, whose index stands behind them.
         self.forces: tuple[str, ...] = ()
 
@@ -136,9 +130,9 @@ class SlowFeatures(FeatureListing):
         """Features of these terms; the first ones are the odd ones."""
         indices = tuple(range(len(terms)))
         groups = (indices[:odd], self.odd_columns), (indices[odd:], self.even_columns)
-        watched = [((value,), meaning) for value, meaning in (*self.watched, *self.besides)]
+        watched = [((value,), meaning) for value, meaning in self.watched]
         factors = [self.term(names) for names in terms]
-        return self.features(factors, groups if odd else (), watched, len(self.watched))
+        return self.features(factors, groups if odd else (), watched)
 
     def columns(self, terms: Sequence[Names], z: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Terms (samples, terms) of coordinates (samples, states) and inputs."""
@@ -190,9 +184,7 @@ def _add_arguments(
     factor, names = features.parameter(edges[0]), (*NAMES, *DERIVATIVES[: len(features.u) - 1])
     for i, (line, name) in enumerate(zip(lines, names, strict=True)):
         raw = features.line(f"raw{i}", line)
-        # Alone of them the speed changes without steering.
-        watched = features.besides if name == NAMES[-1] else features.watched
-        watched.append((factor * raw, name))
+        features.watched.append((factor * raw, name))
     for i, name in enumerate((*ARGUMENTS, "m")):
         features.line(name, clipped(features.by_name[f"raw{i}"]))
     if len(features.u) > 1:
@@ -201,12 +193,6 @@ def _add_arguments(
         features.watched.append((reversal, "reversal of the steering"))
     for (name,), coordinate, most in zip(features.coordinates, features.z, sizes, strict=False):
         features.line(name, features.parameter(1.0 / most) * coordinate)
-    # More heave and pitch than corners make is known only where the car runs straight.
-    first, *rest = map(abs, features.term(ARGUMENTS))
-    steered = clipped(1.0 / MOVING * reduce(add, rest, first))
-    alive = AFTER_LANDING + (1.0 / STEERED - AFTER_LANDING) * steered
-    symmetric = [features.by_name[name] for (name,) in features.coordinates[k:]]
-    features.besides += [(alive * coordinate, "heave and pitch") for coordinate in symmetric]
 
 
 def _add_axles(

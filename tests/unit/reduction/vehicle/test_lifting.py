@@ -7,7 +7,6 @@ import pytest
 
 from tests.reducing import CARS
 from vehiclemor.exceptions import InputError
-from vehiclemor.reduction.vehicle.decoding import NOTHING_KNOWN
 from vehiclemor.reduction.vehicle.features import feature_columns
 from vehiclemor.simulation.build import build
 
@@ -15,14 +14,12 @@ from vehiclemor.simulation.build import build
 def lifted(reduced, maneuver, start):
     """States (samples, 2 n) by the formulas, in NumPy."""
     path = reduced.path(maneuver, start)
-    k, shape, decay = reduced.features.states, reduced.shape, reduced.transient
+    k, shape = reduced.features.states, reduced.shape
     inputs = maneuver.at(maneuver.times)
     features = reduced.decoded_features
     assert len(features.terms) < len(reduced.features.terms)
     columns = feature_columns(features, path[:, :k], inputs, reduced.parameters)
-    deviation = shape.of(reduced.model.start(start)[None])[0] - shape.reference
-    motion = np.exp(np.outer(maneuver.times, decay.rates)) * (decay.left @ deviation) @ decay.right
-    shapes = shape.reference + columns @ reduced.decoding + motion.real
+    shapes = shape.reference + columns @ reduced.decoding
     return shape.states(shapes, path[:, [k + 1, k + 2, k]])
 
 
@@ -31,10 +28,9 @@ def test_the_compiled_lifting_is_the_formula(reduced, start):
     model, maneuver = reduced.model, CARS[reduced.model.name].perturbed(1.2, 0.8)
     run, states = reduced.simulate(maneuver, start), lifted(reduced, maneuver, start)
     outputs = model.outputs_at(states, run.inputs)
-    excited = known(reduced, start).excited
     # At the samples themselves there is only rounding.
     path = reduced.path(maneuver, start)
-    direct, _ = reduced.decoder.states(maneuver.times, path, run.inputs, excited)
+    direct = reduced.decoder.states(path, run.inputs)
     n = states.shape[1]
     scale = np.abs(states).max(axis=0) + 1e-3
     np.testing.assert_allclose(direct[:, :n] / scale, states / scale, atol=1e-9)
@@ -54,7 +50,6 @@ def test_few_samples_are_lifted_alike(reduced):
 
 
 def test_a_run_tells_how_far_it_has_gone(reduced):
-    reduced = replace(reduced, reach=NOTHING_KNOWN)
     maneuver, features = CARS[reduced.model.name], reduced.features
     watched = replace(features, terms=tuple(name for name, _ in features.watched))
 
@@ -83,22 +78,18 @@ def test_a_run_tells_how_far_it_has_gone(reduced):
     assert run.message.endswith(f", from t = {run.trust.until:.4g} s on")
 
 
-def known(reduced, start):
-    """What is known of a start without steering."""
-    return reduced.known(start, np.zeros(len(reduced.model.inputs)))
-
-
 def at_speed(reduced, start, speed):
     """State (2 n,) of a start at another speed."""
     return build(reduced.model.name, overrides={"initial_speed": speed}).start(start)
 
 
 @pytest.mark.parametrize("speed", [18.0, 20.3, 22.0])
-def test_straight_running_at_another_speed_excites_nothing(reduced, speed):
-    still = known(reduced, at_speed(reduced, "equilibrium", speed))
-    assert still.excited.shape[1] == 0
-    assert still.until == 0.0
-    assert known(reduced, at_speed(reduced, "dropped", speed)).until > 0.0
+def test_straight_running_at_another_speed_is_known_to_stay_as_it_is(reduced, speed):
+    maneuver = CARS[reduced.model.name].perturbed(1.0, 0.0)
+    start = at_speed(reduced, "equilibrium", speed)
+    shapes = reduced.shape.of(reduced.simulate(maneuver, start).states)
+    size = np.abs(reduced.shape.reference).max()
+    assert np.abs(shapes - shapes[0]).max() < 1e-3 * size
 
 
 @pytest.mark.parametrize("start", ["equilibrium", "dropped"])
