@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -28,9 +28,6 @@ from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 # Longest time in s between nodes: a fifth of the period of wheel hop.
 SPACING = 0.02
 FEWEST_NODES = 8
-# Passes that are made in any case, and at most; what they find in bounds is settled where it is
-# small, or changes by no more than this part.
-FIRST_PASSES, MOST_PASSES, SMALL, SETTLED = 3, 10, 0.3, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +44,8 @@ class ErrorEstimate:
         Of the outputs.
     bounds
         Output -> measure and bound, by which the run is judged.
+    settled
+        Whether all corrections were small in the end.
     """
 
     times: np.ndarray
@@ -54,6 +53,7 @@ class ErrorEstimate:
     names: tuple[str, ...]
     units: tuple[str, ...]
     bounds: Mapping[str, ErrorBound]
+    settled: bool
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Estimated error (nodes,) of an output."""
@@ -149,18 +149,14 @@ def error_estimate(
     times = run.times[rows]
     states, inputs = (np.ascontiguousarray(part[rows]) for part in (run.states, run.inputs))
     own = model.outputs_at(states, inputs)
+    corrected, settled = error_model(model).corrected(
+        float(times[1] - times[0]), states, inputs, start
+    )
+    errors = np.full(own.shape, np.inf)
+    if corrected is not None:
+        errors = own - model.outputs_at(corrected, inputs)
     units = tuple(q.unit for q in model.definition.outputs)
-    found = ErrorEstimate(times, np.full(own.shape, np.inf), model.outputs, units, bounds)
-    step, last = float(times[1] - times[0]), np.inf
-    for number, corrected in enumerate(error_model(model).passes(step, states, inputs, start), 1):
-        if number < FIRST_PASSES:
-            continue
-        found = replace(found, errors=own - model.outputs_at(corrected, inputs))
-        size = found.in_bounds
-        if size < SMALL or abs(size - last) < SETTLED * size or number >= MOST_PASSES:
-            return found
-        last = size
-    return replace(found, errors=np.full(own.shape, np.inf))
+    return ErrorEstimate(times, errors, model.outputs, units, bounds, settled)
 
 
 def estimates(model: object) -> bool:
