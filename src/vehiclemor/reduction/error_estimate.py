@@ -25,9 +25,14 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
-# Longest time in s between nodes: a fifth of the period of wheel hop.
-SPACING = 0.02
+# Times in s between nodes: of a first look, which is enough where it finds so small an error in
+# bounds; and of the estimate, a tenth of the period of wheel hop.
+FIRST_LOOK, SMALL, SPACING = 0.04, 0.5, 0.01
+# Changes of the shape that settle a window, in ranges of its coordinates.
+FIRST_SETTLED, SETTLED = 1e-3, 1e-4
 FEWEST_NODES = 8
+# What the estimate is multiplied by for its own error before a run is judged.
+RESERVE = 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,14 +81,15 @@ class ErrorEstimate:
         return max((float(used[-1]) for used in self.used.values()), default=0.0)
 
     def trust(self) -> Trust:
-        """Trust of the run: its indicator is the estimated error in bounds."""
-        if not self.in_bounds > 1.0:
-            return Trust(self.in_bounds)
-        since = {name: used.searchsorted(1.0, "right") for name, used in self.used.items()}
+        """Trust of the run: its indicator is the estimated error in bounds, with a reserve."""
+        indicator = RESERVE * self.in_bounds
+        if not indicator > 1.0:
+            return Trust(indicator)
+        since = {n: used.searchsorted(1.0 / RESERVE, "right") for n, used in self.used.items()}
         first = min(since, key=lambda name: since[name])
         until, share = float(self.times[since[first]]), self.used[first][-1]
         size = "too large to be known" if np.isinf(share) else f"{share:.3g} times its bound"
-        return Trust(self.in_bounds, until, f"the estimated error of {first} is {size}")
+        return Trust(indicator, until, f"the estimated error of {first} is {size}")
 
 
 def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBound]:
@@ -141,22 +147,35 @@ def error_estimate(
 
     None where the model is no vehicle on a plane road, or the run ends at once.
     """
+    first = _estimate(run, start, bounds, (FIRST_LOOK, FIRST_SETTLED))
+    if first is None or first.in_bounds < SMALL:
+        return first
+    return _estimate(run, start, bounds, (SPACING, SETTLED))
+
+
+def _estimate(
+    run: Trajectory,
+    start: np.ndarray,
+    bounds: Mapping[str, ErrorBound],
+    accuracy: tuple[float, float],
+) -> ErrorEstimate | None:
+    """The estimate with nodes so far apart (s), and with corrections that are settled so far."""
     from vehiclemor.reduction.error_model import error_model
 
-    model, rows = run.model, slice(0, run.samples_to_stop, nodes_apart(run.times))
+    (spacing, settled), model = accuracy, run.model
+    rows = slice(0, run.samples_to_stop, nodes_apart(run.times, spacing))
     if not estimates(model) or len(run.times[rows]) < FEWEST_NODES:
         return None
     times = run.times[rows]
     states, inputs = (np.ascontiguousarray(part[rows]) for part in (run.states, run.inputs))
     own = model.outputs_at(states, inputs)
-    corrected, settled = error_model(model).corrected(
-        float(times[1] - times[0]), states, inputs, start
-    )
+    step = float(times[1] - times[0])
+    corrected, is_settled = error_model(model).corrected(step, states, inputs, start, settled)
     errors = np.full(own.shape, np.inf)
     if corrected is not None:
         errors = own - model.outputs_at(corrected, inputs)
     units = tuple(q.unit for q in model.definition.outputs)
-    return ErrorEstimate(times, errors, model.outputs, units, bounds, settled)
+    return ErrorEstimate(times, errors, model.outputs, units, bounds, is_settled)
 
 
 def estimates(model: object) -> bool:
@@ -164,6 +183,6 @@ def estimates(model: object) -> bool:
     return isinstance(model, DynamicModel) and len(model.planar) == 3
 
 
-def nodes_apart(times: np.ndarray) -> int:
-    """How many output times (s) lie between nodes."""
-    return max(int(SPACING / (times[1] - times[0]) + 1e-6), 1)
+def nodes_apart(times: np.ndarray, spacing: float) -> int:
+    """How many output times (s) lie between nodes that are so far apart (s) at most."""
+    return max(int(spacing / (times[1] - times[0]) + 1e-6), 1)

@@ -6,10 +6,11 @@ drives an error e,
     e' = f(d + e, u) - d' = A e + (f(d + e, u) - d' - A e),
 
 in which A is their linearisation at straight running.  It is propagated exactly, mode by mode, and
-the bracket is taken from the pass before, in windows of time one after another: deferred correction
-by an exponential integrator (A. Dutt, L. Greengard, V. Rokhlin, BIT 40, 2000, 241-266; M. Hochbruck,
-A. Ostermann, Acta Numerica 19, 2010, 209-286).  Constraints are met by Newton's method
-with a frozen Jacobian.  Heading and position of the corrected shape are quadratures.
+the bracket is taken from the pass before, in windows of time one after another.  This is deferred
+correction by an exponential integrator (A. Dutt, L. Greengard, V. Rokhlin, BIT 40, 2000, 241-266;
+M. Hochbruck, A. Ostermann, Acta Numerica 19, 2010, 209-286).  Constraints are met by Newton's
+method with a frozen Jacobian.  Heading and position of the corrected shape
+are quadratures.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from vehiclemor.simulation.evaluation import address_of, at_samples
 
 # Modes faster than this (1/s) start without an error: their start passes before it matters.
 FASTEST_START = 100.0
-# Nodes in a window, the most passes that it takes, and the change that settles it, in ranges of the
-# shape's coordinates, which are at least so large (m, rad, m/s, rad/s).
-WINDOW, MOST_PASSES, SETTLED, LEAST_RANGE = 33, 12, 1e-4, 1e-3
+# Nodes in a window, and the most passes that it takes; least range of a coordinate of the shape, in
+# which changes are measured (m, rad, m/s, rad/s).
+WINDOW, MOST_PASSES, LEAST_RANGE = 17, 12, 1e-3
 # Step of differences; magnitude of a mode's rate times the step below which weights are series.
 DIFFERENCE, SERIES = 1e-6, 1e-3
 # Derivatives on equidistant nodes of order 4, times 12 steps: inside, and at the first two nodes.
@@ -53,12 +54,18 @@ class ErrorModel:
     shape: VehicleShape
 
     def corrected(
-        self, step: float, states: np.ndarray, inputs: np.ndarray, start: np.ndarray
+        self,
+        step: float,
+        states: np.ndarray,
+        inputs: np.ndarray,
+        start: np.ndarray,
+        settled: float,
     ) -> tuple[np.ndarray | None, bool]:
         """States (nodes, n) of the full model along a run, none if they can't be followed.
 
         Given are states of the run and inputs (nodes, inputs) at nodes that are a step in s apart,
-        and the start (n,) of the full model.  The truth value tells whether they are settled.
+        and the start (n,) of the full model.  The truth value tells whether all changes were small
+        enough in the end to be settled.
         """
         shape, nodes, modes = self.shape, len(states), self._modes
         path = np.ascontiguousarray(shape.of(states) - shape.reference)
@@ -88,7 +95,7 @@ class ErrorModel:
                 self._free.correction,
                 np.ascontiguousarray(shape.linearised.velocity_a),
             ),
-            Passes(WINDOW, MOST_PASSES, SETTLED, scale),
+            Passes(WINDOW, MOST_PASSES, settled, scale),
             scratch,
         )
         motion = np.empty((nodes, 3))
