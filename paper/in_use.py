@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 import vehiclemor as vm
@@ -97,11 +98,13 @@ def restarts() -> Iterator[tuple[str, float]]:
         yield f"restart {restart} 1.2, m", run["rms_error"].sel(output=ASIDE).item()
 
 
-def store(values: Values, title: str, path: Path) -> None:
-    """Write values named `name, unit`."""
+def store(values: Values, title: str, path: Path, runs: pd.DataFrame | None = None) -> None:
+    """Write values named `name, unit`, and what there is to know of single runs."""
     names, units = zip(*(name.rsplit(", ", 1) for name in values), strict=True)
     coordinates = {"name": list(names), "output_unit": ("name", list(units))}
     data = xr.Dataset({"value": ("name", [*map(float, values.values())])}, coordinates)
+    if runs is not None:
+        data = data.merge(runs.rename_axis("run").to_xarray())
     make_folder(path.parent)
     write_dataset(data.assign_attrs(attributes(title, "")), path)
 
