@@ -13,6 +13,7 @@ status is `ok`.
 import argparse
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -169,12 +170,16 @@ def judged(name: str, count: int, seed: int) -> Iterator[dict[str, Any]]:
 
 def counted(runs: pd.DataFrame) -> Iterator[tuple[str, float]]:
     """Of runs of each kind how many miss, are undetected, and are warned of though right."""
-    for (name, kind), part in runs.groupby(["model", "kind"], sort=False):
-        missed, warned = ~(part["score"] <= 1.0), part["warned"]
-        yield f"{name} {kind} runs, 1", len(part)
-        yield f"{name} {kind} missed, 1", missed.sum()
-        yield f"{name} {kind} undetected, 1", (missed & ~warned).sum()
-        yield f"{name} {kind} warned and right, 1", (~missed & warned).sum()
+    for name, kind in product(VEHICLES, KINDS):
+        part = runs[(runs["model"] == name) & (runs["kind"] == kind)]
+        missed, warned = ~(part["score"].to_numpy() <= 1.0), part["warned"].to_numpy()
+        counts = {
+            "runs": len(part),
+            "missed": missed.sum(),
+            "undetected": (missed & ~warned).sum(),
+            "warned and right": (~missed & warned).sum(),
+        }
+        yield from ((f"{name} {kind} {what}, 1", float(number)) for what, number in counts.items())
 
 
 def main() -> None:
