@@ -87,7 +87,7 @@ def calls(model: str) -> Iterator[tuple[str, float]]:
         models = contestants(model, onset)
         for who, _, error in models:
             yield f"{model} {onset} {who} error, 1", error
-        yield f"{model} {onset} tolerance, 1", models[-1].model.settings["tolerance"]
+        yield f"{model} {onset} tolerance, 1", float(models[-1].model.settings["tolerance"])
         seconds: dict[str, list[tuple[float, float]]] = {who: [] for who, *_ in models}
         warned = 0
         for number in range(SIGNALS):

@@ -172,7 +172,7 @@ def counted(runs: pd.DataFrame) -> Iterator[tuple[str, float]]:
     """Of runs of each kind how many miss, are undetected, and are warned of though right."""
     for name, kind in product(VEHICLES, KINDS):
         part = runs[(runs["model"] == name) & (runs["kind"] == kind)]
-        missed, warned = ~(part["score"].to_numpy() <= 1.0), part["warned"].to_numpy()
+        missed, warned = ~(np.asarray(part["score"]) <= 1.0), np.asarray(part["warned"])
         counts = {
             "runs": len(part),
             "missed": missed.sum(),
