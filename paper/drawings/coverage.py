@@ -35,7 +35,7 @@ def figure_coverage(results: Mapping[str, xr.Dataset]) -> Figure:
         part = runs_of(results, name, "speeds")
         # What is infinite would be blank.
         errors = np.minimum(largest_errors(part).T, 2.0 * ERRORS[-1])
-        cells = axis.pcolorfast(SPEEDS, ACCELERATIONS, errors, cmap=COLORS, norm=norm, alpha=0.6)
+        axis.pcolorfast(SPEEDS, ACCELERATIONS, errors, cmap=COLORS, norm=norm, alpha=0.6)
         axis.grid(False)
         right, warned = part["score"].values <= 1.0, part["warned"].values
         for chosen, text in zip((right & ~warned, warned, ~right & ~warned), MARKS, strict=True):
@@ -45,7 +45,9 @@ def figure_coverage(results: Mapping[str, xr.Dataset]) -> Figure:
         axis.set_xlim(SPEEDS[0], SPEEDS[-1])
         axis.set_ylim(ACCELERATIONS[0], ACCELERATIONS[-1])
     axes[0].set_ylabel("lateral acceleration (m/s$^2$)")
-    figure.colorbar(cells, ax=axes, label="largest error / bound", pad=0.01, format="%g")
+    figure.colorbar(
+        axes[0].images[0], ax=axes, label="largest error / bound", pad=0.01, format="%g"
+    )
     look.legend(figure, axes, 3)
     return figure
 
