@@ -24,6 +24,12 @@ from pydantic import Field
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import AnyIntegrator, FallbackSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle.axle_forces import add_axles
+from vehiclemor.reduction.vehicle.candidates import (
+    even_candidates,
+    odd_candidates,
+    required_terms,
+)
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.fitting import (
     YAW_BOUND,
@@ -38,17 +44,10 @@ from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import (
     ShapeSamples,
     VehicleShape,
-    no_steered_vehicle,
+    no_vehicle,
     shape_samples,
 )
-from vehiclemor.reduction.vehicle.slow_features import (
-    Names,
-    SlowFeatures,
-    even_candidates,
-    odd_candidates,
-    required_terms,
-    slow_features,
-)
+from vehiclemor.reduction.vehicle.slow_features import Names, SlowFeatures, slow_features
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.trajectory import Trajectory
 
@@ -113,6 +112,8 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     modes = slow_modes(shape, settings.fastest, SYMMETRIC)
     samples = shape_samples(shape, runs)
     listing = slow_features(shape, modes, samples, settings.trusted, settings.reversal)
+    z = modes.coordinates(samples.deviations, samples.inputs)
+    add_axles(listing, model, samples, z)
     reduced = _fitted_on_rates(shape, modes, listing, samples, settings)
     if settings.steps:
         targets = targets_of(reduced, training, runs, settings.heading_error)
@@ -141,8 +142,9 @@ def _fitted_on_rates(
     """Equations fitted on the rates of the training runs; nothing is decoded yet."""
     u, motion, k, n = samples.inputs, samples.planar_velocity, listing.lateral, listing.speed
     z = modes.coordinates(samples.deviations, u)
-    # Inputs are derivatives of the first one.
-    rates = samples.rates @ modes.encoding.T - u[:, 1:] @ modes.input_shift[:, :-1].T
+    # Of the steering the next input is the derivative.
+    moved = modes.input_shift[:, : shape.inputs.steering - 1]
+    rates = samples.rates @ modes.encoding.T - u[:, 1 : shape.inputs.steering] @ moved.T
     lateral = np.column_stack([rates[:, :k], motion[:, 0], motion[:, 2]])
     # Of heave and pitch in straight running: their rates, and the forward speed.
     heave, forward = modes.rates[k:, k:], shape.linearised.velocity_a[1] @ modes.right[:, k:]
@@ -157,10 +159,10 @@ def _fitted_on_rates(
         columns = listing.columns(terms, z, u)
         return [terms[i] for i in forward_selection(columns, values, len(fixed), more)]
 
-    linear, straight = required_terms(listing)
+    linear, straight, driven = required_terms(listing)
     even_others = even_candidates(listing)
     odd = chosen(linear, odd_candidates(listing), rates[:, :k], settings.terms)
-    even = [*straight, *chosen([], even_others, symmetric, settings.even_terms)]
+    even = [*straight, *chosen(driven, even_others, symmetric, settings.even_terms)]
     terms = [*odd, *even]
     columns, scale = listing.columns(terms, z, u), largest(z[:, :n])
     first, last = len(odd), len(odd) + len(straight)
@@ -173,7 +175,7 @@ def _fitted_on_rates(
     c[first + 2 : last, forward_speed] = forward * scale[k:]
     c[last:, listing.even_columns] = ridge_fit(columns[:, last:], symmetric, settings.ridge)
     every_term = [*terms, *even_others]
-    decoded = chosen([*linear, *straight], every_term, samples.deviations, DECODED)
+    decoded = chosen([*linear, *straight, *driven], every_term, samples.deviations, DECODED)
     decoded.sort(key=lambda term: term not in odd)
     return ReducedVehicle(
         shape.model,
@@ -222,7 +224,7 @@ METHOD = Method(
     summary="slow modes with a right-hand side fitted on training runs, fast motion slaved",
     reference="10.1137/1.9781611971118",
     settings=dict.fromkeys(("ode", "dae"), SlowManifoldSettings),
-    refusal=no_steered_vehicle,
+    refusal=no_vehicle,
     fit=fit,
 )
 
