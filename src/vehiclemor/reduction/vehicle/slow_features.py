@@ -7,7 +7,7 @@ steering, each clipped to its training range; with torques, those of the axles t
 
 from collections.abc import Iterable, Sequence
 from functools import reduce
-from operator import add
+from operator import add, mul
 
 import numpy as np
 
@@ -129,8 +129,14 @@ class SlowFeatures(FeatureListing):
         return self.features(factors, groups if odd else (), watched)
 
     def columns(self, terms: Sequence[Names], z: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Terms (samples, terms) of coordinates (samples, states) and inputs."""
-        return feature_columns(self.of_terms(terms), z, u, np.array(self.values))
+        """Terms (samples, terms) of coordinates (samples, states) and inputs.
+
+        Lines are computed by a kernel, their products are not: it would take seconds to compile.
+        """
+        names = sorted({name for term in terms for name in term})
+        lines = feature_columns(self.of_terms([(n,) for n in names]), z, u, np.array(self.values))
+        by_name = dict(zip(names, lines.T, strict=True))
+        return np.stack([reduce(mul, map(by_name.__getitem__, term)) for term in terms], axis=1)
 
 
 def slow_features(
