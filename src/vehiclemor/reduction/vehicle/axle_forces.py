@@ -13,15 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from vehiclemor.codegen.operations import Value
-from vehiclemor.multibody.quantities import FIALA, WHEELS
+from vehiclemor.multibody.quantities import FIALA
 from vehiclemor.reduction.vehicle.candidates import LINEAR, wheel_terms
 from vehiclemor.reduction.vehicle.features import product
 from vehiclemor.reduction.vehicle.fitting import forward_selection, largest, ridge_fit
 from vehiclemor.reduction.vehicle.shape import ShapeSamples
-from vehiclemor.reduction.vehicle.slow_features import HULL, Names, SlowFeatures, clipped
+from vehiclemor.reduction.vehicle.slow_features import AXLES, HULL, Names, SlowFeatures, clipped
 from vehiclemor.simulation.dynamic import DynamicModel
 
-AXLES = (WHEELS[:2], WHEELS[2:])
 # Lines of an axle: sums of both wheels' lateral force, aligning moment and part of the contact that
 # sticks, and what the left one has more.
 FORCES = ("F", "M", "G", "FD", "MD", "GD")
@@ -120,7 +119,10 @@ def _add_powers(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence
 def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[str]) -> None:
     """Forces of both tires of an axle by their own law."""
     features = fit.features
-    slips, loads = np.tan(fit.outputs(model, "slip_angle", wheels)), fit.outputs(model, "Fz", wheels)
+    slips, loads = (
+        np.tan(fit.outputs(model, "slip_angle", wheels)),
+        fit.outputs(model, "Fz", wheels),
+    )
     slip, slip_half = fit(slips @ MEAN, fit.odd), fit(slips @ HALF, fit.turning)
     load, load_half = fit(loads @ MEAN, fit.even), fit(loads @ HALF, fit.odd)
     tire = Tire({name: float(model.parameters[name]) for name in FIALA}, float(loads.mean()))
@@ -140,8 +142,7 @@ def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[
         for side, ratio, grip in zip(sides, ratios, grips_of, strict=True)
     ]
     left, right = (
-        add_fiala(features, wheel, state, tire)
-        for wheel, state in zip(wheels, states, strict=True)
+        add_fiala(features, wheel, state, tire) for wheel, state in zip(wheels, states, strict=True)
     )
     for kind, one, other in zip(FORCES, left, right, strict=False):
         features.line(f"{kind}{axle}", one + other)
@@ -165,12 +166,12 @@ def add_fiala(
     limit = let(load * (parameter(values["largest_friction"]) - fall * sliding))
     if state.friction is not None:
         limit = let(limit * state.friction)
-    across = parameter(values["cornering_stiffness"] / 3.0) * slip
+    across, deflection = let(parameter(values["cornering_stiffness"] / 3.0) * slip), None
     if ratio is None:
         raw = let(across / limit)
     else:
         along = let(parameter(values["longitudinal_slip_stiffness"] / 3.0) * ratio)
-        across, nothing = let(across), parameter(LEAST_DEFLECTION * tire.static**2)
+        nothing = parameter(LEAST_DEFLECTION * tire.static**2)
         deflection = let(np.sqrt(across * across + along * along + nothing))
         raw = let(deflection / limit)
     features.watched.append((parameter(1.0 / SATURATION) * raw, f"saturation of the {wheel} tire"))
@@ -178,7 +179,7 @@ def add_fiala(
     left = let(1.0 - abs(y))
     sticking = let(left * left)
     share = let(parameter(1.0 / tire.static) * limit * y)
-    if ratio is not None:
+    if deflection is not None:
         share = let(share * across / deflection)
     force = let(-share * (3.0 - 3.0 * abs(y) + y * y))
     return force, let(share * sticking * left), sticking

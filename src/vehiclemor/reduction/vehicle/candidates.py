@@ -5,6 +5,8 @@ in those of speed, heave and pitch.  Torques of both wheels of an axle are even,
 has more is odd.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations_with_replacement, product
 
 from vehiclemor.reduction.vehicle.slow_features import ARGUMENTS, FAST, ONE, Names, SlowFeatures
@@ -15,8 +17,10 @@ LINEAR = tuple((f"raw{i}",) for i in range(len(ARGUMENTS)))
 # What changes with the speed.
 FASTER = tuple(("m", a) for a in ARGUMENTS)
 FASTER_SQUARE = tuple(("m", *pair) for pair in SQUARE)
-# Torques of both axles, and how much of their friction the tires need for them.
+# Torques of both axles, and how much of their friction the tires need for them; what the left wheel
+# has more.
 TORQUES, USES = ("T0", "T1"), ("t0", "t1")
+LEFT = (("D0",), ("D1",))
 
 
 def wheel_terms(features: SlowFeatures) -> tuple[list[Names], list[Names], list[Names]]:
@@ -26,7 +30,7 @@ def wheel_terms(features: SlowFeatures) -> tuple[list[Names], list[Names], list[
     if not features.inputs.torques:
         return odd, even, []
     odd += [(torque, a) for torque in (*TORQUES, *USES) for a in ARGUMENTS]
-    odd += [("D0",), ("D1",)]
+    odd += LEFT
     even += [*((torque,) for torque in TORQUES), *product(TORQUES, FAST)]
     even += combinations_with_replacement(TORQUES, 2)
     ratios = []
@@ -36,18 +40,34 @@ def wheel_terms(features: SlowFeatures) -> tuple[list[Names], list[Names], list[
     return odd, even, ratios
 
 
-def required_terms(features: SlowFeatures) -> tuple[list[Names], list[Names], list[Names]]:
-    """Terms that the equations always have: odd ones, those of straight running, other even ones.
+@dataclass(frozen=True)
+class Required:
+    """Terms that the equations always have.
 
+    Attributes
+    ----------
+    left, straight
+        What left wheels have more, and straight running: odd and even ones whose coefficients are
+        those of the linearised vehicle.
+    odd, even
+        Others, whose coefficients are fitted.
     """
+
+    left: Sequence[Names]
+    straight: Sequence[Names]
+    odd: Sequence[Names]
+    even: Sequence[Names]
+
+
+def required_terms(features: SlowFeatures) -> Required:
+    """Terms that the equations always have."""
     k, forces = features.lateral, [(f"{kind}{axle}",) for kind in "FM" for axle in (0, 1)]
     odd = [*features.coordinates[:k], LINEAR[-1], *features.derivatives, *forces]
     straight = [ONE, (f"z{features.speed}",), *features.coordinates[k:]]
     if not features.inputs.torques:
-        return odd, straight, []
+        return Required((), straight, odd, ())
     odd += [*LINEAR[:-1], *(("m", *coordinate) for coordinate in features.coordinates[:k])]
-    odd += [("D0",), ("D1",)]
-    return odd, straight, [(torque,) for torque in (*TORQUES, *USES)]
+    return Required(LEFT, straight, odd, [(torque,) for torque in (*TORQUES, *USES)])
 
 
 def odd_candidates(features: SlowFeatures) -> list[Names]:

@@ -95,6 +95,19 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
     )
 
 
+def response(
+    shape: VehicleShape, modes: SlowModes, inputs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What inputs (inputs,) do in straight running: to z' (k,), and at once to psi', U and V (3,).
+
+    Fast motion follows them without delay.
+    """
+    linear, b = shape.linearised, shape.linearised.b @ inputs
+    slow = modes.right @ (modes.left @ b) + modes.speed_right * (modes.speed_left @ b)
+    fast = -np.linalg.lstsq(linear.a, b - slow, rcond=1e-10)[0]
+    return modes.left @ b, linear.velocity_b @ inputs + linear.velocity_a @ fast
+
+
 def eigenmodes(a: np.ndarray) -> tuple[Any, Any, Any]:
     """Eigenvalues (n,), left eigenvectors by rows (n, n), and the inverse of these."""
     values, vectors = np.linalg.eig(a.T)

@@ -51,6 +51,7 @@ class SlowFeatures(FeatureListing):
         # Name of a line -> its value.
         self.by_name = {f"z{i}": z for i, z in enumerate(self.z)} | {"1": self.number(1.0)}
         self.watched: list[tuple[Value, str]] = []  # (value, what it is).
+        self.reach: dict[str, float] = {}  # Largest values in training, by which lines are divided.
         # Kinds of lines of an axle, whose index stands behind them.
         self.forces: tuple[str, ...] = ()
 
@@ -117,8 +118,10 @@ class SlowFeatures(FeatureListing):
 
     def grips(self, axle: int, u: np.ndarray) -> np.ndarray:
         """The same (samples,) of inputs (samples, inputs); else 1."""
-        indices = [self.inputs.of_wheel(FRICTION, wheel) for wheel in AXLES[axle]]
-        return np.ones(len(u)) if None in indices else u[:, indices].mean(axis=1)
+        left, right = (self.inputs.of_wheel(FRICTION, wheel) for wheel in AXLES[axle])
+        if left is None or right is None:
+            return np.ones(len(u))
+        return u[:, [left, right]].mean(axis=1)
 
     def of_terms(self, terms: Sequence[Names], odd: int = 0) -> Features:
         """Features of these terms; the first ones are the odd ones."""
@@ -133,10 +136,11 @@ class SlowFeatures(FeatureListing):
 
         Lines are computed by a kernel, their products are not: it would take seconds to compile.
         """
-        names = sorted({name for term in terms for name in term})
+        names = sorted({name for term in terms for name in term}) or ["1"]
         lines = feature_columns(self.of_terms([(n,) for n in names]), z, u, np.array(self.values))
         by_name = dict(zip(names, lines.T, strict=True))
-        return np.stack([reduce(mul, map(by_name.__getitem__, term)) for term in terms], axis=1)
+        columns = [reduce(mul, map(by_name.__getitem__, term)) for term in terms]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(z), 0))
 
 
 def slow_features(
@@ -219,10 +223,11 @@ def _add_torques(
         features.line(f"t{axle}", per_grip)
     names = [f"{kind}{axle}" for kind in "TDt" for axle in (0, 1)]
     sizes = largest(features.columns([(name,) for name in names], *samples))
-    for name, most in zip(names, sizes, strict=True):
+    features.reach = dict(zip(names, sizes.tolist(), strict=True))
+    for name, most in features.reach.items():
         features.line(name, features.parameter(1.0 / most) * features.by_name[name])
     for axle in (0, 1):
-        use = features.by_name[f"t{axle}"]
-        features.watched.append((features.parameter(edge / HULL) * use, f"torque of axle {axle + 1}"))
+        use, name = features.by_name[f"t{axle}"], f"torque of axle {axle + 1}"
+        features.watched.append((features.parameter(edge / HULL) * use, name))
         clip = features.line(f"t{axle}", clipped(use))
         features.line(f"g{axle}", abs(clip))

@@ -41,6 +41,17 @@ class VehicleInputs:
         torque = [name.startswith((DRIVE, BRAKE)) for name in self.names]
         return np.where(torque, TORQUE_STEP, INPUT_STEP)
 
+    def left_torque(self, left: str, right: str) -> np.ndarray:
+        """Inputs (inputs,) by which the left wheel has 1 N m of drive more, and no more in sum."""
+        change = np.zeros(len(self.names))
+        for wheel, half in ((left, 0.5), (right, -0.5)):
+            drive, brake = self.of_wheel(DRIVE, wheel), self.of_wheel(BRAKE, wheel)
+            if drive is not None:
+                change[drive] = half
+            elif brake is not None:
+                change[brake] = -half
+        return change
+
     def of_wheel(self, kind: str, wheel: str) -> int | None:
         """Index of an input at a wheel, if it is one."""
         name = f"{kind}_{wheel}"
