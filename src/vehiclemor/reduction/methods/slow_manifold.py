@@ -24,6 +24,12 @@ from pydantic import Field
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import AnyIntegrator, FallbackSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle.axle_forces import add_axles
+from vehiclemor.reduction.vehicle.candidates import (
+    even_candidates,
+    odd_candidates,
+    required_terms,
+)
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.fitting import (
     YAW_BOUND,
@@ -33,20 +39,18 @@ from vehiclemor.reduction.vehicle.fitting import (
     ridge_fit,
     targets_of,
 )
-from vehiclemor.reduction.vehicle.linear_modes import SlowModes, slow_modes
+from vehiclemor.reduction.vehicle.linear_modes import SlowModes, response, slow_modes
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import (
     ShapeSamples,
     VehicleShape,
-    no_steered_vehicle,
+    no_vehicle,
     shape_samples,
 )
 from vehiclemor.reduction.vehicle.slow_features import (
+    AXLES,
     Names,
     SlowFeatures,
-    even_candidates,
-    odd_candidates,
-    required_terms,
     slow_features,
 )
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -113,12 +117,16 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     modes = slow_modes(shape, settings.fastest, SYMMETRIC)
     samples = shape_samples(shape, runs)
     listing = slow_features(shape, modes, samples, settings.trusted, settings.reversal)
+    z = modes.coordinates(samples.deviations, samples.inputs)
+    add_axles(listing, model, samples, z)
     reduced = _fitted_on_rates(shape, modes, listing, samples, settings)
     if settings.steps:
         targets = targets_of(reduced, training, runs, settings.heading_error)
         (odd, lateral), (even, symmetric) = reduced.features.groups
-        # What heave and pitch do in straight running is exact, and speed is constant there.
-        even = even[2 + listing.symmetric :]
+        # What torques of left wheels, heave and pitch do in straight running is exact, and speed is
+        # constant there.
+        required = required_terms(listing)
+        odd, even = odd[len(required.left) :], even[len(required.straight) :]
         free = [(odd, i) for i in lateral]
         free += [(even, i) for i in symmetric]
         reduced = improved(reduced, targets, free, settings.steps)
@@ -141,8 +149,9 @@ def _fitted_on_rates(
     """Equations fitted on the rates of the training runs; nothing is decoded yet."""
     u, motion, k, n = samples.inputs, samples.planar_velocity, listing.lateral, listing.speed
     z = modes.coordinates(samples.deviations, u)
-    # Inputs are derivatives of the first one.
-    rates = samples.rates @ modes.encoding.T - u[:, 1:] @ modes.input_shift[:, :-1].T
+    # Of the steering the next input is the derivative.
+    moved = modes.input_shift[:, : shape.inputs.steering - 1]
+    rates = samples.rates @ modes.encoding.T - u[:, 1 : shape.inputs.steering] @ moved.T
     lateral = np.column_stack([rates[:, :k], motion[:, 0], motion[:, 2]])
     # Of heave and pitch in straight running: their rates, and the forward speed.
     heave, forward = modes.rates[k:, k:], shape.linearised.velocity_a[1] @ modes.right[:, k:]
@@ -157,15 +166,20 @@ def _fitted_on_rates(
         columns = listing.columns(terms, z, u)
         return [terms[i] for i in forward_selection(columns, values, len(fixed), more)]
 
-    linear, straight = required_terms(listing)
-    even_others = even_candidates(listing)
-    odd = chosen(linear, odd_candidates(listing), rates[:, :k], settings.terms)
-    even = [*straight, *chosen([], even_others, symmetric, settings.even_terms)]
-    terms = [*odd, *even]
+    required, even_others = required_terms(listing), even_candidates(listing)
+    left, straight = required.left, required.straight
+    turned = left_torques(shape, modes, listing)
+    lateral -= listing.columns(left, z, u) @ turned
+    odd = chosen(required.odd, odd_candidates(listing), lateral[:, :k], settings.terms)
+    even = chosen(required.even, even_others, symmetric, settings.even_terms)
+    terms = [*left, *odd, *straight, *even]
     columns, scale = listing.columns(terms, z, u), largest(z[:, :n])
-    first, last = len(odd), len(odd) + len(straight)
+    first, last = len(left) + len(odd), len(terms) - len(even)
     c = np.zeros((len(terms), n + 1 + PLANAR))
-    c[:first, listing.odd_columns] = ridge_fit(columns[:, :first], lateral, settings.ridge)
+    c[: len(left), listing.odd_columns] = turned
+    c[len(left) : first, listing.odd_columns] = ridge_fit(
+        columns[:, len(left) : first], lateral, settings.ridge
+    )
     # Straight running at any speed is an equilibrium: the terms 1 and speed make up U.
     forward_speed = n + 2
     c[[first, first + 1], forward_speed] = shape.speed, 1.0
@@ -173,8 +187,10 @@ def _fitted_on_rates(
     c[first + 2 : last, forward_speed] = forward * scale[k:]
     c[last:, listing.even_columns] = ridge_fit(columns[:, last:], symmetric, settings.ridge)
     every_term = [*terms, *even_others]
-    decoded = chosen([*linear, *straight], every_term, samples.deviations, DECODED)
-    decoded.sort(key=lambda term: term not in odd)
+    linear = [*required.odd, *straight, *required.even]
+    decoded = chosen(linear, every_term, samples.deviations, DECODED)
+    lateral_terms = {*left, *odd}
+    decoded.sort(key=lambda term: term not in lateral_terms)
     return ReducedVehicle(
         shape.model,
         shape,
@@ -185,8 +201,18 @@ def _fitted_on_rates(
         encoding=modes.encoding,
         feedthrough=modes.input_shift,
         error_scale=np.concatenate([3.0 * scale, ABSOLUTE]),
-        decoded_features=listing.of_terms(decoded, sum(term in odd for term in decoded)),
+        decoded_features=listing.of_terms(decoded, sum(term in lateral_terms for term in decoded)),
     )
+
+
+def left_torques(shape: VehicleShape, modes: SlowModes, listing: SlowFeatures) -> np.ndarray:
+    """Coefficients (terms, odd columns) of what left wheels have more, linearised."""
+    rows = np.zeros((len(required_terms(listing).left), len(listing.odd_columns)))
+    for axle in range(len(rows)):
+        change = shape.inputs.left_torque(*AXLES[axle]) * listing.reach[f"D{axle}"]
+        rates, velocity = response(shape, modes, change)
+        rows[axle] = [*rates[: listing.lateral], velocity[0], velocity[2]]
+    return rows
 
 
 def _with_decoding(
@@ -222,7 +248,7 @@ METHOD = Method(
     summary="slow modes with a right-hand side fitted on training runs, fast motion slaved",
     reference="10.1137/1.9781611971118",
     settings=dict.fromkeys(("ode", "dae"), SlowManifoldSettings),
-    refusal=no_steered_vehicle,
+    refusal=no_vehicle,
     fit=fit,
 )
 

@@ -54,7 +54,8 @@ class SlowModes:
 def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowModes:
     """Slow modes with |lambda| up to `fastest` (1/s), and so many symmetric ones (or pairs).
 
-    The inputs are the steering and its derivatives, as many as the model has.
+    The derivatives of the steering are taken out of the coordinates.  Torques stay: left
+    eigenvectors hold the momentum of the wheels' spin, so that no coordinate needs their rates.
     """
     linear = shape.linearised
     values, left, right = eigenmodes(linear.a)
@@ -76,8 +77,9 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         more_w, more_v = real_modes(values, left, right, chosen)
         w, v = np.vstack([w, more_w]), np.hstack([v, more_v])
     rates = w @ linear.a @ v
-    b = w @ linear.b
-    shift, driven = without_derivatives(rates, b)
+    steering, b = shape.inputs.steering, w @ linear.b
+    shift = np.zeros((len(w) + 1, b.shape[1]))
+    shift[:-1, :steering], driven = without_derivatives(rates, b[:, :steering])
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.velocity_a[1] @ right[:, still].real
     return SlowModes(
@@ -86,11 +88,24 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         w,
         v,
         driven,
-        np.vstack([shift, np.zeros(shift.shape[1])]),
+        shift,
         static + v @ np.linalg.solve(rates, driven),
         left[still].real * scale,
         right[:, still].real / scale,
     )
+
+
+def response(
+    shape: VehicleShape, modes: SlowModes, inputs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What inputs (inputs,) do in straight running: to z' (k,), and at once to psi', U and V (3,).
+
+    Fast motion follows them without delay.
+    """
+    linear, b = shape.linearised, shape.linearised.b @ inputs
+    slow = modes.right @ (modes.left @ b) + modes.speed_right * (modes.speed_left @ b)
+    fast = -np.linalg.lstsq(linear.a, b - slow, rcond=1e-10)[0]
+    return modes.left @ b, linear.velocity_b @ inputs + linear.velocity_a @ fast
 
 
 def eigenmodes(a: np.ndarray) -> tuple[Any, Any, Any]:
