@@ -23,13 +23,12 @@ from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
-# Times in s between nodes: of a first look, which is enough where it finds so small an error in
-# bounds; and of the estimate, a tenth of the period of wheel hop.
-FIRST_LOOK, SMALL, SPACING = 0.04, 0.5, 0.01
-# Changes of the shape that settle a window, in ranges of its coordinates.
-FIRST_SETTLED, SETTLED = 1e-3, 1e-4
+# Of a first look and of a second one, where the first finds an error in bounds that is not small:
+# time in s between nodes, at last a tenth of the period of wheel hop, and how far corrections are
+# settled.
+LOOKS, SMALL = ((0.04, 1e-3), (0.01, 1e-4)), 0.5
 FEWEST_NODES = 8
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
@@ -116,64 +115,54 @@ def judged_run(
 ) -> Trajectory:
     """A run of a reduced model, judged by its estimated error in bounds, those of the model.
 
-    Where its output times are too far apart for an estimate, it is run with more of them.  Full
-    orders have no error, and a model with a fallback judges its runs itself.
+    Full orders have no error, and a model with a fallback judges its runs itself; so does a run
+    that comes with a complaint.  Where output times are too far apart for an estimate, it is made
+    of the same run with more of them.
     """
+    run = simulate(maneuver, start)
     known = model.definition.error_bounds if bounds is None else bounds
-    if not (known and estimates(model)) or getattr(reduced, "judges", False):
-        return simulate(maneuver, start)
-    parts = math.ceil(maneuver.duration / (maneuver.samples - 1) / SPACING - 1e-6)
-    if parts <= 1:
-        return judged(simulate(maneuver, start), start, known)
-    finer = judged(simulate(maneuver.subdivided(parts), start), start, known)
-    return finer.chosen(times=maneuver.times)
-
-
-def judged(run: Trajectory, start: Start, bounds: Mapping[str, ErrorBound]) -> Trajectory:
-    """A run with its error estimate, and the trust that follows from it."""
-    began = time.thread_time()
-    estimate = error_estimate(run, run.model.start(start), bounds) if run.finished else None
-    if estimate is None:
+    judges = getattr(reduced, "judges", False) or run.status not in WITHOUT_COMPLAINT
+    if judges or not (known and estimates(model)):
         return run
-    seconds = run.seconds + time.thread_time() - began
+    began, loops, estimate = time.thread_time(), run.seconds, None
+    for spacing, settled in LOOKS:
+        apart = maneuver.duration / (maneuver.samples - 1)
+        parts = math.ceil(apart / spacing - 1e-6)
+        finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
+        nodes = slice(0, finer.samples_to_stop, max(int(parts * spacing / apart + 1e-6), 1))
+        if len(finer.times[nodes]) < FEWEST_NODES:
+            return run
+        estimate = error_estimate(finer, nodes, model.start(start), known, settled)
+        if estimate.in_bounds < SMALL:
+            break
+    assert estimate is not None
     judged = run.judged(estimate.trust())
+    seconds = loops + time.thread_time() - began
     return Trajectory.of(**judged.__dict__ | {"error_estimate": estimate, "seconds": seconds})
 
 
 def error_estimate(
-    run: Trajectory, start: np.ndarray, bounds: Mapping[str, ErrorBound]
-) -> ErrorEstimate | None:
-    """Estimated errors of a run that has states, from a state (n,) of the full model.
-
-    None where the model is no vehicle on a plane road, or the run ends at once.
-    """
-    first = _estimate(run, start, bounds, (FIRST_LOOK, FIRST_SETTLED))
-    if first is None or first.in_bounds < SMALL:
-        return first
-    return _estimate(run, start, bounds, (SPACING, SETTLED))
-
-
-def _estimate(
     run: Trajectory,
+    nodes: slice,
     start: np.ndarray,
     bounds: Mapping[str, ErrorBound],
-    accuracy: tuple[float, float],
-) -> ErrorEstimate | None:
-    """The estimate with nodes so far apart (s), and with corrections that are settled so far."""
+    settled: float,
+) -> ErrorEstimate:
+    """Errors of a run that has states, at some of its output times, equidistant ones.
+
+    The start (n,) is that of the full model; corrections are settled so far, see `error_model`.
+    """
     from vehiclemor.reduction.error_model import error_model
 
-    (spacing, settled), model = accuracy, run.model
-    rows = slice(0, run.samples_to_stop, nodes_apart(run.times, spacing))
-    if not estimates(model) or len(run.times[rows]) < FEWEST_NODES:
-        return None
-    times = run.times[rows]
-    states, inputs = (np.ascontiguousarray(part[rows]) for part in (run.states, run.inputs))
-    own = model.outputs_at(states, inputs)
-    step = float(times[1] - times[0])
-    corrected, is_settled = error_model(model).corrected(step, states, inputs, start, settled)
-    errors = np.full(own.shape, np.inf)
-    if corrected is not None:
-        errors = own - model.outputs_at(corrected, inputs)
+    model, times = run.model, run.times[nodes]
+    states, inputs = (np.ascontiguousarray(part[nodes]) for part in (run.states, run.inputs))
+    errors, is_settled = np.full((len(times), len(model.outputs)), np.inf), False
+    if np.isfinite(states).all():
+        step = float(times[1] - times[0])
+        corrected, is_settled = error_model(model).corrected(step, states, inputs, start, settled)
+        if corrected is not None:
+            own = model.outputs_at(states, inputs)
+            errors = own - model.outputs_at(corrected, inputs)
     units = tuple(q.unit for q in model.definition.outputs)
     return ErrorEstimate(times, errors, model.outputs, units, bounds, is_settled)
 
@@ -181,8 +170,3 @@ def _estimate(
 def estimates(model: object) -> bool:
     """Whether errors of runs of a model can be estimated: it is a vehicle with a heading."""
     return isinstance(model, DynamicModel) and len(model.planar) == 3
-
-
-def nodes_apart(times: np.ndarray, spacing: float) -> int:
-    """How many output times (s) lie between nodes that are so far apart (s) at most."""
-    return max(int(spacing / (times[1] - times[0]) + 1e-6), 1)
