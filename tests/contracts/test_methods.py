@@ -389,6 +389,8 @@ def test_jacobians_are_the_slopes_of_rates_and_outputs(pair, by, monkeypatch):
 
 
 def test_a_saved_model_is_the_same_to_the_bit(pair, tmp_path):
+    if pair.name in LEARNED:
+        pytest.skip("what a library has fitted isn't saved: that is said in one line")
     settings = validated(pair.method, pair.model.kind, SETTINGS.get(pair.name, {})).model_dump()
     training = (Scenario(pair.maneuver, pair.model.starts[0]),)
     known = input_range(pair.model, [(pair.maneuver, own_speed(pair.model) or 0.0)])
