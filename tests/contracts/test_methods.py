@@ -42,7 +42,7 @@ PAIRS = [(m, method) for m in names("model") for method in METHODS if _declares(
 LINEAR = ("linear_single_track", "modal_truncation", "balanced_truncation", "irka")
 LEARNED = (
     *("operator_inference", "sparse_identification", "dynamic_mode_decomposition"),
-    *("gaussian_process", "neural_network"),
+    *("gaussian_process", "neural_network", "single_track"),
 )
 ROUGH = ("fixed_basis", "deim", *LINEAR, *LEARNED)
 # One run doesn't determine what these fit: (frequency, amplitude) factors of their training.
@@ -60,6 +60,7 @@ SETTINGS: dict[str, dict[str, object]] = {
     # With four it has a mode of 550 1/s, which takes long at tight tolerances.
     "irka": {"rank": 2},
     **{name: {"rank": 4, "steps": 1} for name in LEARNED},
+    "single_track": {"iterations": 2},
     # Squares that one run does not determine diverge.
     "operator_inference": {"rank": 4, "steps": 1, "form": "linear"},
     "sparse_identification": {"rank": 4, "steps": 1, "degree": 1},

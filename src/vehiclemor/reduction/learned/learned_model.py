@@ -44,7 +44,19 @@ Step = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Path = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-class LearnedSettings(Settings):
+class SampledSettings(Settings):
+    """How training runs are sampled and states are read from coordinates."""
+
+    readout: int = Field(
+        1, ge=1, le=4, description="degree of the polynomials that give states and outputs"
+    )
+    steps: int = Field(1, ge=1, le=100, description="samples in the time between output times")
+    skipped: float = Field(
+        0.0, ge=0.0, le=100.0, description="first seconds of a run that are not learned from"
+    )
+
+
+class LearnedSettings(SampledSettings):
     """What all general learners share."""
 
     coordinates: Literal["principal", "slow"] = Field(
@@ -53,13 +65,11 @@ class LearnedSettings(Settings):
     rank: int = Field(
         4, ge=1, le=100, description="principal components, at most; a mechanism has none"
     )
-    readout: int = Field(
-        1, ge=1, le=4, description="degree of the polynomials that give states and outputs"
-    )
-    steps: int = Field(1, ge=1, le=100, description="samples in the time between output times")
-    skipped: float = Field(
-        0.0, ge=0.0, le=100.0, description="first seconds of a run that are not learned from"
-    )
+
+    def of_samples(self, samples: Samples) -> Coordinates:
+        """The chosen coordinates, standardised."""
+        chosen = slow(samples) if self.coordinates == "slow" else principal(samples, self.rank)
+        return chosen.standardised(samples)
 
 
 def stepped(step: Step) -> Path:
@@ -99,7 +109,12 @@ class TrainingData:
 
     @classmethod
     def of(
-        cls, model: Any, training: Training, settings: LearnedSettings, library: str
+        cls,
+        model: Any,
+        training: Training,
+        settings: SampledSettings,
+        library: str,
+        coordinates: Callable[[Samples], Coordinates],
     ) -> "TrainingData":
         """From training runs; `InputError` if the package of the library is missing."""
         for needed in (library, "sklearn"):
@@ -108,9 +123,7 @@ class TrainingData:
         samples = gathered(model, training, settings.steps, settings.skipped)
         # Samples that another fit has gathered count as if this one had.
         began = time.process_time() - samples.seconds
-        slowly = settings.coordinates == "slow"
-        chosen = slow(samples) if slowly else principal(samples, settings.rank)
-        return cls(samples, chosen.standardised(samples), settings.readout, began)
+        return cls(samples, coordinates(samples), settings.readout, began)
 
     @property
     def static(self) -> bool:

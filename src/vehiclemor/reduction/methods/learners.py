@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned.learned_model import (
     LearnedModel,
@@ -34,6 +35,9 @@ SEED = 0
 FORMS = {"linear": "AB", "bilinear": "ABN", "quadratic": "AHBN"}
 # Among these the library selects what repeats the training runs best, all of them stable.
 RIDGES = tuple(10.0**power for power in range(-8, 3, 2))
+# How far a coordinate may leave its range in a run that is stable; of a nearly straight run that is
+# small, so that the library's own 5 refuses what repeats all others.
+STABLE = 100.0
 
 
 class OperatorInferenceSettings(LearnedSettings):
@@ -84,8 +88,12 @@ def operators(data: TrainingData, settings: OperatorInferenceSettings) -> Learne
     step: Any = opinf.models.DiscreteModel(form, solver=opinf.lstsq.L2Solver(RIDGES[0]))
     # The library wants inputs at the last sample too.
     inputs = [np.vstack([u, u[-1:]]).T for u in data.inputs]
-    paths = [z.T for z in data.paths]
-    opinf.ROM(step).fit_regselect_discrete([*RIDGES], paths, inputs, gridsearch_only=True)
+    chosen = {"stability_margin": STABLE, "gridsearch_only": True}
+    try:
+        paths = [z.T for z in data.paths]
+        opinf.ROM(step).fit_regselect_discrete([*RIDGES], paths, inputs, **chosen)
+    except RuntimeError as error:
+        raise InputError("opinf finds no ridge that keeps all training runs stable") from error
     return data.model(stepped(step.rhs))
 
 
@@ -161,7 +169,8 @@ def learner(
     """A method that learns a step from training runs by a package, imported by another name."""
 
     def fit(model: Any, training: Training, chosen: Any) -> LearnedModel:
-        return regression(TrainingData.of(model, training, chosen, package[1]), chosen)
+        data = TrainingData.of(model, training, chosen, package[1], chosen.of_samples)
+        return regression(data, chosen)
 
     # Of a mechanism coordinates follow from the inputs, which needs a regression without steps.
     static = ("ae",) * (settings in (GaussianProcessSettings, NeuralNetworkSettings))

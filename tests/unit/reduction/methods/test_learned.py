@@ -2,6 +2,9 @@
 
 import sys
 from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +16,13 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.learned.learned_model import TrainingData, stepped
 from vehiclemor.reduction.methods.learners import RIDGES
+from vehiclemor.reduction.methods.single_track import (
+    BODY,
+    TIRES,
+    driven,
+    fitted_constants,
+    rates,
+)
 from vehiclemor.reduction.vehicle.linear_modes import slow_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.registry import component
@@ -30,7 +40,8 @@ def learned(name, model, runs, **settings):
     """What a method fits to runs, and what it has seen."""
     method = component("method", name)
     chosen = method.settings[model.kind](**settings)
-    return method.fit(model, runs, chosen), TrainingData.of(model, runs, chosen, "numpy")
+    data = TrainingData.of(model, runs, chosen, "numpy", chosen.of_samples)
+    return method.fit(model, runs, chosen), data
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +133,36 @@ def test_a_learned_car_drives_straight_on_and_turns_with_its_heading(car, runs):
     ahead, aside = one["longitudinal_position"], one["lateral_position"]
     np.testing.assert_allclose(other["lateral_position"] + 2.0, ahead, atol=1e-6)
     np.testing.assert_allclose(3.0 - other["longitudinal_position"], aside, atol=1e-6)
+
+
+def test_a_single_track_finds_the_constants_of_its_own_runs():
+    step, speed, first = 0.02, 20.0, np.array([1.0, *TIRES, *BODY])
+    true = first * np.random.default_rng(1).uniform(0.9, 1.1, len(first)) + 1e-2
+    # Runs of several lengths, of which the tires saturate.
+    times = [step * np.arange(count + 1) for count in (200, 150, 250)]
+    steer = [0.05 * a * np.sin(a * t) for a, t in zip((1.0, 1.6, 2.2), times, strict=True)]
+    inputs = [np.column_stack([s[:-1], s[1:]]) for s in steer]
+    paths = [driven(partial(rates, true, speed), np.zeros(5), u, step)[:, :5] for u in inputs]
+    spacing = SimpleNamespace(spacing=step)
+    data: Any = SimpleNamespace(samples=spacing, inputs=inputs, input_scale=[1.0], paths=paths)
+    found = fitted_constants(data, first, speed, 30)
+    again = driven(partial(rates, found, speed), np.zeros(5), inputs[2], step)[:, :5]
+    size = np.abs(paths[2]).max(axis=0)
+    np.testing.assert_allclose(again / size, paths[2] / size, atol=1e-3)
+    # The mirror image of steering drives the mirror image.
+    mirrored = driven(partial(rates, found, speed), np.zeros(5), -inputs[2], step)[:, :5]
+    np.testing.assert_allclose(mirrored * [-1, -1, -1, -1, 1], again, atol=1e-9)
+
+
+def test_a_fitted_single_track_is_nearer_than_the_linear_one(car, runs):
+    method = component("method", "single_track")
+    more = training_runs(car, lane_change, "set", ((0.8, 1.2), (1.1, -1.6)))
+    fitted = method.fit(car, [*runs, *more], method.settings["ode"](iterations=12))
+    unseen, linear = lane_change.perturbed(0.9, 1.4), vm.reduce(car, "linear_single_track")
+    full = car.simulate(unseen)["lateral_position"]
+    both = fitted.simulate(unseen, "equilibrium"), linear.simulate(unseen)
+    near, far = (np.abs(run["lateral_position"] - full).max() for run in both)
+    assert near < 0.8 * far
 
 
 def test_a_diverged_run_is_recorded_up_to_where_it_left(car, runs):
