@@ -42,7 +42,7 @@ PAIRS = [(m, method) for m in names("model") for method in METHODS if _declares(
 LINEAR = ("linear_single_track", "modal_truncation", "balanced_truncation", "irka")
 LEARNED = (
     *("operator_inference", "sparse_identification", "dynamic_mode_decomposition"),
-    *("gaussian_process", "neural_network", "single_track"),
+    *("gaussian_process", "neural_network", "single_track", "trajectory_network"),
 )
 ROUGH = ("fixed_basis", "deim", *LINEAR, *LEARNED)
 # One run doesn't determine what these fit: (frequency, amplitude) factors of their training.
@@ -61,6 +61,7 @@ SETTINGS: dict[str, dict[str, object]] = {
     "irka": {"rank": 2},
     **{name: {"rank": 4, "steps": 1} for name in LEARNED},
     "single_track": {"iterations": 2},
+    "trajectory_network": {"rank": 4, "adam": 2, "epochs": 2},
     # Squares that one run does not determine diverge.
     "operator_inference": {"rank": 4, "steps": 1, "form": "linear"},
     "sparse_identification": {"rank": 4, "steps": 1, "degree": 1},
@@ -85,6 +86,8 @@ class Pair:
 
     def fresh_fit(self, preset="recommended"):
         chosen = SETTINGS.get(self.name, {})
+        if self.name == "trajectory_network":
+            pytest.importorskip("jax_sysid")
         settings = validated(self.method, self.model.kind, chosen, preset)
         self.method.check(self.model, settings)
         before = copy.deepcopy(settings)

@@ -9,8 +9,7 @@ roll phi and its rate p, forward speed U; axle forces F_i are per mass, i = f, r
     p' = h (F_f + F_r) - k phi - d p,   V' = -U r + F_f + F_r + g p'
     r' = b_f F_f - b_r F_r,   U' = a V r - w_f alpha_f F_f - w_r alpha_r F_r
 
-Least squares over whole runs find the 20 constants.  All other states, heave and pitch among them,
-are read from these five by polynomials.
+Least squares over whole runs find the 20 constants.  Polynomials give all other states.
 """
 
 from functools import partial
@@ -116,12 +115,10 @@ def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: 
         return (found[:, 1:] - found[:, :1]) / changes
 
     scale = np.maximum(np.abs(first), LEAST)
+    solve = partial(least_squares, x_scale=scale, max_nfev=most)
     # Steps too long for the tires are tried and given up.
     with np.errstate(all="ignore"):
-        found = least_squares(
-            lambda c: residuals(c[:, None])[:, 0], first, slopes, x_scale=scale, max_nfev=most
-        )
-    return found.x
+        return solve(lambda c: residuals(c[:, None])[:, 0], first, slopes).x
 
 
 def steering(data: TrainingData, inputs: np.ndarray) -> np.ndarray:
@@ -135,8 +132,8 @@ def fit(model: Any, training: Training, settings: SingleTrackSettings) -> Learne
         TrainingData.of(model, training, settings, "sklearn", physical),
         VehicleShape(model),
     )
-    linear = shape.linearised
     # Of a car that turns as its wheels point.
+    linear = shape.linearised
     steady = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=RANK)[0]
     kappa = (TIRES[1] + TIRES[6]) * (linear.velocity_a[0] @ steady) / shape.speed
     first = np.array([kappa, *TIRES, *BODY])

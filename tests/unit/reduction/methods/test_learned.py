@@ -238,3 +238,15 @@ def test_what_cannot_be_learned_is_said_in_one_line(car, runs, monkeypatch, tmp_
         vm.reduce("double_wishbone", "sparse_identification")
     with pytest.raises(InputError, match="rows is 3; it must be from rank 4 to 28"):
         vm.reduce(car, "deim", training="lane_change", rank=4, rows=3)
+
+
+def test_a_network_trained_on_whole_runs_repeats_them_better_than_its_linear_step(car, runs):
+    pytest.importorskip("jax_sysid")
+    off, given = {}, {"coordinates": "slow", "width": 4}
+    for adam, epochs in ((0, 0), (20, 60)):
+        reduced, data = learned(
+            "trajectory_network", car, runs, **given | {"adam": adam, "epochs": epochs}
+        )
+        found = [reduced.path(z[0], u) for z, u in zip(data.paths, data.inputs, strict=True)]
+        off[epochs] = np.concatenate(found) - np.concatenate(data.paths)
+    assert np.linalg.norm(off[60]) < 0.5 * np.linalg.norm(off[0])

@@ -1,0 +1,104 @@
+"""A network trained on whole trajectories, by jax-sysid: its errors add up as those of a run do.
+
+    z_(k+1) = z_k + A v_k + C (tanh(W v_k + b) - tanh(b)),   v_k = (z_k, u_k, u_(k+1))
+
+A. Bemporad, Linear and nonlinear system identification under l1- and group-Lasso regularization via
+L-BFGS-B, arXiv 2403.03827 (2024).
+"""
+
+import contextlib
+import io
+import warnings
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.learned.learned_model import (
+    LearnedModel,
+    LearnedSettings,
+    TrainingData,
+    stepped,
+)
+from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
+
+# By which weights begin, and their size.
+SEED, SMALL = 0, 0.1
+# Standardised coordinates are cut there while the network is trained.
+CUT = 20.0
+
+
+class TrajectoryNetworkSettings(LearnedSettings):
+    """Settings for a vehicle."""
+
+    width: int = Field(16, ge=1, le=512, description="neurons of the hidden layer, with tanh")
+    adam: int = Field(50, ge=0, le=10_000, description="steps of Adam over all runs")
+    epochs: int = Field(300, ge=0, le=10_000, description="steps of L-BFGS after them, at most")
+    penalty: float = Field(1e-6, ge=0.0, description="weight of the squared weights in the fit")
+
+
+def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> LearnedModel:
+    """The network of jax-sysid, begun from a linear step."""
+    with installed("jax-sysid", "trajectories"):
+        import jax
+        import jax.numpy as jnp
+        from jax_sysid.models import Model
+
+    data = TrainingData.of(model, training, settings, "sklearn", settings.of_samples)
+    now, inputs, _ = data.steps
+    r, m, runs = now.shape[1], inputs.shape[1], len(data.paths)
+
+    def step(x: Any, u: Any, parameters: Any) -> Any:
+        """Coordinates of one run or of all, one behind the other, after a step."""
+        a, w, b, c = parameters
+        z = x.reshape(-1, r)
+        v = jnp.hstack([z, u.reshape(-1, m)])
+        return (z + v @ a + (jnp.tanh(v @ w + b) - jnp.tanh(b)) @ c).reshape(-1)
+
+    # All runs are one experiment: the library would compile a loop for each.
+    longest = max(map(len, data.inputs))
+    wanted, driven = np.full((longest, runs * r), np.nan), np.zeros((longest, runs * m))
+    for run, (z, u) in enumerate(zip(data.paths, data.inputs, strict=True)):
+        wanted[: len(u), run * r : (run + 1) * r] = z[:-1]
+        driven[: len(u), run * m : (run + 1) * m] = u
+    known = np.isfinite(wanted)
+    wanted[~known] = 0.0
+    random, width = np.random.default_rng(SEED), settings.width
+    linear = data.polynomial(*data.regression, 1)[-1].coef_.T
+    first = [
+        linear,
+        random.normal(size=(r + m, width)) / np.sqrt(r + m),
+        random.normal(size=width) * SMALL,
+        np.zeros((width, r)),
+    ]
+    network = Model(runs * r, runs * r, runs * m, state_fcn=step, output_fcn=lambda x, *_: x)
+    network.init(params=first, x0=wanted[0])
+    # Runs are of different lengths.
+    network.loss(
+        lambda found, true: jnp.sum(jnp.where(known, found - true, 0.0) ** 2) / known.sum(),
+        rho_th=settings.penalty,
+        train_x0=False,
+        xsat=CUT,
+    )
+    network.optimization(
+        adam_eta=1e-3, adam_epochs=settings.adam, lbfgs_epochs=settings.epochs, iprint=-1
+    )
+    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        # It builds on a package that is no longer maintained.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        network.fit(wanted, driven)
+    parameters, compiled = network.params, jax.jit(step)
+    return data.model(stepped(lambda z, u: np.asarray(compiled(z, u, parameters))))
+
+
+METHOD = Method(
+    name="trajectory_network",
+    summary="a linear step and a network, trained on whole trajectories by jax-sysid",
+    settings=dict.fromkeys(("ode", "dae"), TrajectoryNetworkSettings),
+    refusal=no_steered_vehicle,
+    fit=fit,
+    reference="10.48550/arXiv.2403.03827",
+    packages=("jax-sysid",),
+)
