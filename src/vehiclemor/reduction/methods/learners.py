@@ -175,7 +175,7 @@ def learner(
     # Of a mechanism coordinates follow from the inputs, which needs a regression without steps.
     static = ("ae",) * (settings in (GaussianProcessSettings, NeuralNetworkSettings))
     kinds = (*static, "ode", "dae", "structural")
-    declared = dict.fromkeys(kinds, settings)
+    declared: Any = dict.fromkeys(kinds, settings)
     return Method(name, summary, declared, fit, reference, packages=package[:1])
 
 

@@ -115,7 +115,7 @@ def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: 
         return (found[:, 1:] - found[:, :1]) / changes
 
     scale = np.maximum(np.abs(first), LEAST)
-    solve = partial(least_squares, x_scale=scale, max_nfev=most)
+    solve: Any = partial(least_squares, x_scale=scale, max_nfev=most)
     # Steps too long for the tires are tried and given up.
     with np.errstate(all="ignore"):
         return solve(lambda c: residuals(c[:, None])[:, 0], first, slopes).x

@@ -24,8 +24,8 @@ from vehiclemor.reduction.learned.learned_model import (
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
 
-# By which weights begin, and their size.
-SEED, SMALL = 0, 0.1
+# By which weights begin.
+SEED = 0
 # Standardised coordinates are cut there while the network is trained.
 CUT = 20.0
 
@@ -45,6 +45,7 @@ def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> 
         import jax
         import jax.numpy as jnp
         from jax_sysid.models import Model
+        from sklearn.neural_network import MLPRegressor
 
     data = TrainingData.of(model, training, settings, "sklearn", settings.of_samples)
     now, inputs, _ = data.steps
@@ -65,23 +66,22 @@ def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> 
         driven[: len(u), run * m : (run + 1) * m] = u
     known = np.isfinite(wanted)
     wanted[~known] = 0.0
-    random, width = np.random.default_rng(SEED), settings.width
-    linear = data.polynomial(*data.regression, 1)[-1].coef_.T
-    first = [
-        linear,
-        random.normal(size=(r + m, width)) / np.sqrt(r + m),
-        random.normal(size=width) * SMALL,
-        np.zeros((width, r)),
-    ]
+    # Whole runs are no start for small random weights: one step is fitted first.
+    arguments, changes = data.regression
+    linear = data.polynomial(arguments, changes, 1)
+    left = changes - linear.predict(arguments)
+    size = left.std(axis=0)
+    begun: Any = MLPRegressor((settings.width,), activation="tanh", max_iter=60, random_state=SEED)
+    begun.fit(arguments, left / size)
+    first = [linear[-1].coef_.T, begun.coefs_[0], begun.intercepts_[0], begun.coefs_[1] * size]
     network = Model(runs * r, runs * r, runs * m, state_fcn=step, output_fcn=lambda x, *_: x)
     network.init(params=first, x0=wanted[0])
+
     # Runs are of different lengths.
-    network.loss(
-        lambda found, true: jnp.sum(jnp.where(known, found - true, 0.0) ** 2) / known.sum(),
-        rho_th=settings.penalty,
-        train_x0=False,
-        xsat=CUT,
-    )
+    def loss(found: Any, true: Any) -> Any:
+        return (jnp.where(known, found - true, 0.0) ** 2).sum() / known.sum()  # type: ignore[operator]
+
+    network.loss(loss, rho_th=settings.penalty, train_x0=False, xsat=CUT)
     network.optimization(
         adam_eta=1e-3, adam_epochs=settings.adam, lbfgs_epochs=settings.epochs, iprint=-1
     )
