@@ -24,8 +24,8 @@ from vehiclemor.reduction.learned.learned_model import (
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
 
-# By which weights begin.
-SEED = 0
+# By which weights begin, and passes over all steps before runs are fitted.
+SEED, STEPS = 0, 60
 # Standardised coordinates are cut there while the network is trained.
 CUT = 20.0
 
@@ -40,7 +40,7 @@ class TrajectoryNetworkSettings(LearnedSettings):
 
 
 def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> LearnedModel:
-    """The network of jax-sysid, begun from a linear step."""
+    """The network of jax-sysid, begun from one step that scikit-learn has fitted."""
     with installed("jax-sysid", "trajectories"):
         import jax
         import jax.numpy as jnp
@@ -71,7 +71,8 @@ def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> 
     linear = data.polynomial(arguments, changes, 1)
     left = changes - linear.predict(arguments)
     size = left.std(axis=0)
-    begun: Any = MLPRegressor((settings.width,), activation="tanh", max_iter=60, random_state=SEED)
+    shape: Any = {"hidden_layer_sizes": (settings.width,), "activation": "tanh"}
+    begun: Any = MLPRegressor(**shape, max_iter=STEPS, random_state=SEED)
     begun.fit(arguments, left / size)
     first = [linear[-1].coef_.T, begun.coefs_[0], begun.intercepts_[0], begun.coefs_[1] * size]
     network = Model(runs * r, runs * r, runs * m, state_fcn=step, output_fcn=lambda x, *_: x)
