@@ -61,7 +61,7 @@ SETTINGS: dict[str, dict[str, object]] = {
     "irka": {"rank": 2},
     **{name: {"rank": 4, "steps": 1} for name in LEARNED},
     "single_track": {"iterations": 2},
-    "trajectory_network": {"rank": 4, "adam": 2, "epochs": 2},
+    "trajectory_network": {"rank": 4, "epochs": 2},
     # Squares that one run does not determine diverge.
     "operator_inference": {"rank": 4, "steps": 1, "form": "linear"},
     "sparse_identification": {"rank": 4, "steps": 1, "degree": 1},

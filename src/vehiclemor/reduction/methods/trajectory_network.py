@@ -33,9 +33,8 @@ CUT = 20.0
 class TrajectoryNetworkSettings(LearnedSettings):
     """Settings for a vehicle."""
 
-    width: int = Field(16, ge=1, le=512, description="neurons of the hidden layer, with tanh")
-    adam: int = Field(50, ge=0, le=10_000, description="steps of Adam over all runs")
-    epochs: int = Field(300, ge=0, le=10_000, description="steps of L-BFGS after them, at most")
+    width: int = Field(32, ge=1, le=512, description="neurons of the hidden layer, with tanh")
+    epochs: int = Field(300, ge=0, le=10_000, description="steps of L-BFGS over all runs, at most")
     penalty: float = Field(1e-6, ge=0.0, description="weight of the squared weights in the fit")
 
 
@@ -83,9 +82,7 @@ def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> 
         return (jnp.where(known, found - true, 0.0) ** 2).sum() / known.sum()  # type: ignore[operator]
 
     network.loss(loss, rho_th=settings.penalty, train_x0=False, xsat=CUT)
-    network.optimization(
-        adam_eta=1e-3, adam_epochs=settings.adam, lbfgs_epochs=settings.epochs, iprint=-1
-    )
+    network.optimization(adam_epochs=0, lbfgs_epochs=settings.epochs, iprint=-1)
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
         # It builds on a package that is no longer maintained.
         warnings.simplefilter("ignore", DeprecationWarning)
