@@ -40,6 +40,13 @@ class TrajectoryNetworkSettings(LearnedSettings):
 
 def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> LearnedModel:
     """The network of jax-sysid, begun from one step that scikit-learn has fitted."""
+    # The library prints, and builds on a package that warns.
+    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return _fitted(model, training, settings)
+
+
+def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> LearnedModel:
     with installed("jax-sysid", "trajectories"):
         import jax
         import jax.numpy as jnp
@@ -83,10 +90,7 @@ def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> 
 
     network.loss(loss, rho_th=settings.penalty, train_x0=False, xsat=CUT)
     network.optimization(adam_epochs=0, lbfgs_epochs=settings.epochs, iprint=-1)
-    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
-        # It builds on a package that is no longer maintained.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        network.fit(wanted, driven)
+    network.fit(wanted, driven)
     parameters, compiled = network.params, jax.jit(step)
     return data.model(stepped(lambda z, u: np.asarray(compiled(z, u, parameters))))
 
