@@ -88,12 +88,12 @@ def stepped(step: Step) -> Path:
     return path
 
 
-def predicted(*regressors: Any) -> Path:
-    """A path whose changes in a step are the sum of what regressors of scikit-learn predict."""
+def predicted(*regressors: tuple[Any, Any]) -> Path:
+    """A path whose changes in a step are what regressors of scikit-learn predict, times scales."""
 
     def step(z: np.ndarray, u: np.ndarray) -> np.ndarray:
-        arguments = np.concatenate([z, u])[None]
-        return z + sum(regressor.predict(arguments)[0] for regressor in regressors)
+        v = np.concatenate([z, u])[None]
+        return z + sum(scale * regressor.predict(v)[0] for regressor, scale in regressors)
 
     return stepped(step)
 
@@ -169,38 +169,34 @@ class TrainingData:
         now, inputs, following = self.steps
         return np.hstack([now, inputs]), following - now
 
-    def polynomial(self, arguments: np.ndarray, values: np.ndarray, degree: int) -> Any:
-        """Least squares of values (samples, m) by polynomials of arguments (samples, v)."""
+    def with_residual(self, regressor: Any, samples: slice | np.ndarray) -> "LearnedModel":
+        """The model of a linear regression, and a regressor of what it leaves at some samples."""
+        from sklearn.linear_model import LinearRegression
+
+        arguments, results = self.regression
+        linear: Any = LinearRegression(fit_intercept=self.constant).fit(arguments, results)
+        left = results - linear.predict(arguments)
+        size = left.std(axis=0)
+        size[size == 0.0] = 1.0
+        regressor.fit(arguments[samples], left[samples] / size)
+        if self.static:
+            return self.model(lambda _, u: linear.predict(u) + size * regressor.predict(u))
+        return self.model(predicted((linear, 1.0), (regressor, size)))
+
+    def model(self, path: Path) -> "LearnedModel":
+        """The model of learned paths, with what follows from its coordinates."""
         from sklearn.linear_model import LinearRegression
         from sklearn.pipeline import make_pipeline
         from sklearn.preprocessing import PolynomialFeatures
 
-        features = PolynomialFeatures(degree, include_bias=False)
-        linear = LinearRegression(fit_intercept=self.constant)
-        return make_pipeline(features, linear).fit(arguments, values)
-
-    def with_residual(self, regressor: Any, samples: slice | np.ndarray) -> "LearnedModel":
-        """The model of a linear regression, and a regressor of what it leaves at some samples."""
-        from sklearn.compose import TransformedTargetRegressor
-        from sklearn.preprocessing import StandardScaler
-
-        arguments, results = self.regression
-        linear = self.polynomial(arguments, results, 1)
-        left = results - linear.predict(arguments)
-        more = TransformedTargetRegressor(regressor, transformer=StandardScaler())
-        more.fit(arguments[samples], left[samples])
-        if self.static:
-            return self.model(lambda _, inputs: linear.predict(inputs) + more.predict(inputs))
-        return self.model(predicted(linear, more))
-
-    def model(self, path: Path) -> "LearnedModel":
-        """The model of learned paths, with what follows from its coordinates."""
         samples, readout, z = self.samples, None, thinned(self.paths)
         inputs = thinned([run.inputs for run in samples.runs])
         if not self.static:
             arguments = np.hstack([z, inputs / self.input_scale])
             values = thinned([run.values for run in samples.runs])
-            readout = self.polynomial(arguments, values, self.readout)
+            features = PolynomialFeatures(self.readout, include_bias=False)
+            linear = LinearRegression(fit_intercept=self.constant)
+            readout = make_pipeline(features, linear).fit(arguments, values)
         largest = np.abs(z).max(axis=0)
         online = inputs[:, len(samples.states.model.inputs) :]
         low, high = np.append(-largest, online.min(axis=0)), np.append(largest, online.max(axis=0))

@@ -106,23 +106,24 @@ def sparse_terms(data: TrainingData, settings: SparseIdentificationSettings) -> 
 
     features = PolynomialFeatures(settings.degree, include_bias=data.constant)
     sparse: Any = STLSQ(threshold=settings.threshold, alpha=settings.ridge)
-    return data.model(predicted(make_pipeline(features, sparse).fit(*data.regression)))
+    return data.model(predicted((make_pipeline(features, sparse).fit(*data.regression), 1.0)))
 
 
 def linear_step(data: TrainingData, settings: DynamicModeSettings) -> LearnedModel:
     """One linear step of all observables by scikit-learn."""
     from sklearn.linear_model import Ridge
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+    from sklearn.preprocessing import PolynomialFeatures
 
     observables: Any = PolynomialFeatures(settings.degree, include_bias=False)
     now, inputs, following = data.steps
     values, following = observables.fit_transform(now), observables.transform(following)
+    arguments, r = np.hstack([values, inputs]), now.shape[1]
     # Monomials are rare where they are large: each counts alike.
-    scaled = StandardScaler(with_mean=False)
-    ridge = Ridge(settings.ridge * len(values), fit_intercept=data.constant)
-    linear = make_pipeline(scaled, ridge).fit(np.hstack([values, inputs]), following - values)
-    path, r = predicted(linear), now.shape[1]
+    size = arguments.std(axis=0)
+    size[size == 0.0] = 1.0
+    ridge: Any = Ridge(settings.ridge * len(values), fit_intercept=data.constant)
+    ridge.fit(arguments / size, following - values)
+    path = stepped(lambda z, u: z + ridge.predict((np.concatenate([z, u]) / size)[None])[0])
     # The first observables are the coordinates.
     return data.model(lambda z, u: path(observables.transform(z[None])[0], u)[:, :r])
 

@@ -1,15 +1,14 @@
 """A grey box: the single-track car with roll and saturating tires, fitted to training runs.
 
-What a vehicle engineer would take (M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge,
-Springer; tires: H. B. Pacejka, Tire and Vehicle Dynamics).  States are lateral speed V, yaw rate r,
-roll phi and its rate p, forward speed U; axle forces F_i are per mass, i = f, r:
+What an engineer would take (M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge, Springer).
+States are lateral speed V, yaw rate r, roll phi, its rate p, speed U; axle forces F_i are per mass:
 
     alpha_f = kappa s + e_f phi - (V + l_f r) / U,   alpha_r = e_r phi - (V - l_r r) / U
     F_i = D_i sin(S_i atan(c_i alpha_i / (S_i D_i)))
     p' = h (F_f + F_r) - k phi - d p,   V' = -U r + F_f + F_r + g p'
     r' = b_f F_f - b_r F_r,   U' = a V r - w_f alpha_f F_f - w_r alpha_r F_r
 
-Least squares over whole runs find the 20 constants.  Polynomials give all other states.
+Least squares over runs find the 20 constants.  Polynomials give all other states.
 """
 
 from functools import partial
@@ -114,8 +113,7 @@ def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: 
         found = residuals(np.column_stack([constants, constants[:, None] + np.diag(changes)]))
         return (found[:, 1:] - found[:, :1]) / changes
 
-    scale = np.maximum(np.abs(first), LEAST)
-    solve: Any = partial(least_squares, x_scale=scale, max_nfev=most)
+    solve: Any = partial(least_squares, x_scale=np.maximum(np.abs(first), LEAST), max_nfev=most)
     # Steps too long for the tires are tried and given up.
     with np.errstate(all="ignore"):
         return solve(lambda c: residuals(c[:, None])[:, 0], first, slopes).x
