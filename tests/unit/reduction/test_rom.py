@@ -111,9 +111,9 @@ def test_a_loop_may_go_on_for_ever(linear):
 
 def test_runs_of_all_methods_are_judged_by_their_error(full, linear):
     wider = component("maneuver", "lane_change").perturbed(1.0, 1.3)
-    basis = vm.reduce(full.model, "fixed_basis", training="lane_change")
-    assert basis.simulate("lane_change").status == "ok"
-    run = basis.simulate(wider)
+    pod = vm.reduce(full.model, "pod", training="lane_change")
+    assert pod.simulate("lane_change").status == "ok"
+    run = pod.simulate(wider)
     assert run.status == "untrusted"
     assert "the estimated error of" in run.message
     assert linear.simulate(wider).status == "untrusted"
