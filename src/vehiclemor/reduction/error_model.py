@@ -33,12 +33,9 @@ from vehiclemor.simulation.evaluation import address_of, at_samples
 FASTEST_START = 100.0
 # Nodes in a window, and the most passes that it takes; least range of a coordinate of the shape, in
 # which changes are measured (m, rad, m/s, rad/s).
-WINDOW, MOST_PASSES, LEAST_RANGE = 17, 12, 1e-3
+WINDOW, MOST_PASSES, LEAST_RANGE = 9, 12, 1e-3
 # Step of differences; magnitude of a mode's rate times the step below which weights are series.
 DIFFERENCE, SERIES = 1e-6, 1e-3
-# Derivatives on equidistant nodes of order 4, times 12 steps: inside, and at the first two nodes.
-CENTRAL = np.array([1.0, -8.0, 0.0, 8.0, -1.0])
-FIRST = np.array([[-25.0, 48.0, -36.0, 16.0, -3.0], [-3.0, -10.0, 18.0, -6.0, 1.0]])
 
 
 @lru_cache(maxsize=64)
@@ -67,43 +64,29 @@ class ErrorModel:
         and the start (n,) of the full model.  The truth value tells whether all changes were small
         enough in the end to be settled.
         """
-        shape, nodes, modes = self.shape, len(states), self._modes
-        path = np.ascontiguousarray(shape.of(states) - shape.reference)
-        # A method may record the start itself, through which its own motion does not pass.
-        path[0] = 4.0 * path[1] - 6.0 * path[2] + 4.0 * path[3] - path[4]
-        path_rates = slopes(path, step) @ modes.coordinates
-        first = (shape.of(start[None]) - shape.reference - path[:1]) @ modes.coordinates
-        first[:, np.tile(np.abs(modes.rates) > FASTEST_START, 2)] = 0.0
-        errors = np.zeros_like(path_rates)
-        errors[0] = first
-        scale = np.maximum(np.ptp(path, axis=0), LEAST_RANGE)
+        nodes, modes = len(states), self._modes
+        n, count = modes.coordinates.shape
+        rooms = states.shape[1], states.shape[1], len(self._free.correction), n, 3
         scratch = Scratch(
-            np.zeros_like(states),
-            np.empty_like(states),
-            np.empty((nodes, len(self._free.correction))),
-            np.empty_like(errors),
-            errors,
-            np.empty(errors.shape[1]),
-            np.empty(path.shape[1]),
+            *(np.empty((nodes, columns)) for columns in (*rooms, count, count, count)),
+            np.empty(count),
+            np.empty(n),
+            np.empty(n),
         )
-        bundles = (
-            *self._bundles,
-            ModesOfErrors(
-                modes.coordinates,
-                modes.shapes,
-                self._weights(step),
-                self._free.correction,
-                np.ascontiguousarray(shape.linearised.velocity_a),
-            ),
-            Passes(WINDOW, MOST_PASSES, settled, scale),
-            scratch,
+        of_errors = ModesOfErrors(
+            modes.coordinates,
+            modes.shapes,
+            self._weights(step),
+            np.tile(np.abs(modes.rates) <= FASTEST_START, 2).astype(float),
+            self._free.correction,
+            np.ascontiguousarray(self.shape.linearised.velocity_a),
         )
-        motion = np.empty((nodes, 3))
+        passes, result = Passes(WINDOW, MOST_PASSES, settled, LEAST_RANGE), np.empty_like(states)
         loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
-        unsettled = loop(inputs, path_rates, *bundles, path, motion)
-        if unsettled < 0:
-            return None, False
-        return self._states(path, motion, start, step), unsettled == 0
+        unsettled = loop(
+            step, states, inputs, start, *self._bundles, of_errors, passes, scratch, result
+        )
+        return (None if unsettled < 0 else result), unsettled == 0
 
     @cached_property
     def _bundles(self) -> tuple[Shape, FullEquations]:
@@ -119,17 +102,6 @@ class ErrorModel:
             Shape(shape.indices, np.array([heading, x, y]), pairs, shape.reference),
             FullEquations(np.array(addresses), model.constants),
         )
-
-    def _states(
-        self, corrected: np.ndarray, motion: np.ndarray, start: np.ndarray, step: float
-    ) -> np.ndarray:
-        """States (nodes, n) of corrected shapes, with the integrals of psi', U, V (nodes, 3)."""
-        x, y, heading = self.shape.model.planar
-        yaw = start[heading] + integrals(motion[:, :1], step)
-        velocity = np.exp(1j * yaw[:, 0]) * (motion[:, 1] + 1j * motion[:, 2])
-        moved = integrals(np.column_stack([velocity.real, velocity.imag]), step)
-        planar = np.hstack([moved + start[[x, y]], yaw])
-        return self.shape.states(corrected + self.shape.reference, planar)
 
     def _violations(self, deviations: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Violations of the constraints and their rates (samples, 2 c)."""
@@ -199,18 +171,3 @@ class Modes(NamedTuple):
     rates: np.ndarray
     coordinates: np.ndarray
     shapes: np.ndarray
-
-
-def slopes(values: np.ndarray, step: float) -> np.ndarray:
-    """Derivatives (nodes, columns) at nodes that are a step apart, of order 4."""
-    result = np.empty_like(values)
-    result[2:-2] = sum(w * values[i : len(values) - 4 + i] for i, w in enumerate(CENTRAL) if w)
-    result[:2], result[-2:] = FIRST @ values[:5], -(FIRST @ values[:-6:-1])[::-1]
-    return result / (12.0 * step)
-
-
-def integrals(values: np.ndarray, step: float) -> np.ndarray:
-    """Integrals (nodes, columns) from the first node on, of order 4: trapezoids, corrected."""
-    areas = 0.5 * step * np.cumsum(values[1:] + values[:-1], axis=0)
-    change = slopes(values, step)
-    return np.vstack([0.0 * areas[:1], areas]) - step**2 / 12.0 * (change - change[:1])
