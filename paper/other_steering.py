@@ -139,7 +139,7 @@ def alone(reduced: ReducedOrderModel) -> ReducedOrderModel:
 
 
 def score_of(protocol: Protocol, reduced: Any, driven: Any, state: Any) -> dict[str, Any] | None:
-    """Largest error in multiples of its bound, and what the model tells; none if full order fails.
+    """Largest error in bounds, and what the model tells of it; none if full order fails.
 
     The acceleration is the largest sideways in the full-order run, in m/s^2.
     """
@@ -152,6 +152,7 @@ def score_of(protocol: Protocol, reduced: Any, driven: Any, state: Any) -> dict[
     run = reduced.simulate(driven, state)
     return {
         "score": in_bounds(protocol, run, exact) if run.finished else np.inf,
+        "estimate": run.error_estimate.in_bounds if run.error_estimate else np.inf,
         "warned": run.status != "ok",
         "acceleration": np.abs(exact["longitudinal_speed"] * exact["yaw_rate"]).max(),
     }
@@ -182,6 +183,15 @@ def counted(runs: pd.DataFrame) -> Iterator[tuple[str, float]]:
         yield from ((f"{name} {kind} {what}, 1", float(number)) for what, number in counts.items())
 
 
+def estimated(runs: pd.DataFrame) -> Iterator[tuple[str, float]]:
+    """Estimated over true error of each vehicle: median, and what 90 % of the runs are between."""
+    for name in VEHICLES:
+        part = runs[(runs["model"] == name) & np.isfinite(runs["score"] + runs["estimate"])]
+        ratios = np.asarray(part["estimate"]) / np.asarray(part["score"])
+        for level in (5, 50, 95):
+            yield f"{name} estimate over error {level} %, 1", float(np.percentile(ratios, level))
+
+
 def main() -> None:
     """Draw, simulate, and write."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -190,7 +200,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=7)
     wanted = parser.parse_args()
     runs = pd.DataFrame(row for name in VEHICLES for row in judged(name, wanted.runs, wanted.seed))
-    values: Values = dict(counted(runs))
+    values: Values = dict(counted(runs)) | dict(estimated(runs))
     title = "Other steering than that of the test sets"
     store(values, title, wanted.results / "other_steering.nc", runs)
 

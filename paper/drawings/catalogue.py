@@ -47,5 +47,6 @@ FIGURES: Mapping[str, Entry] = {
     "pareto": Entry(fields.figure_pareto, PROTOCOLS),
     "size": Entry(fields.figure_size, ["size"]),
     "coverage": Entry(coverage.figure_coverage, ["other_steering"]),
+    "estimate": Entry(coverage.figure_estimate, ["other_steering"]),
     "peers": Entry(fields.figure_peers, ["peers"]),
 }

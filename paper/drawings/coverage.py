@@ -19,6 +19,13 @@ ERRORS = 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0
 COLORS = "RdYlBu_r"
 MARK: dict[str, Any] = {"color": "black", "markerfacecolor": "none", "linestyle": "none"}
 MARK |= {"markeredgewidth": 0.6}
+# Errors in bounds, and what an estimate tells, rightly or not.
+SHOWN = 1e-2, 1e3
+TOLD: dict[str, dict[str, Any]] = {
+    "told rightly": {"marker": ".", "markersize": 1.5},
+    "warned of, but right": {"marker": "o", "markersize": 3.5},
+    "missed without a warning": {"marker": "x", "markersize": 5},
+}
 MARKS: dict[str, dict[str, Any]] = {
     "right": {"marker": ".", "markersize": 1.5},
     "warned of": {"marker": "o", "markersize": 3.5},
@@ -49,6 +56,29 @@ def figure_coverage(results: Mapping[str, xr.Dataset]) -> Figure:
         axes[0].images[0], ax=axes, label="largest error / bound", pad=0.01, format="%g"
     )
     look.legend(figure, axes, 3)
+    return figure
+
+
+def figure_estimate(results: Mapping[str, xr.Dataset]) -> Figure:
+    """Estimated over true largest error of every fifth run, of all kinds."""
+    texts = [MODELS[name] for name in VEHICLES]
+    figure, ((*axes,),) = look.lettered(1, 2, look.TWO, 2.9, texts, sharey=True)
+    for axis, name in zip(axes, VEHICLES, strict=True):
+        part = runs_of(results, name).isel(run=slice(None, None, 5))
+        missed, warned = ~(part["score"].values <= 1.0), part["warned"].values
+        alike = warned == missed
+        for chosen, text in zip((alike, warned & ~alike, ~warned & ~alike), TOLD, strict=True):
+            run = part.isel(run=chosen)
+            axis.plot(run["score"], run["estimate"], label=text, **MARK | TOLD[text])
+        axis.plot(SHOWN, SHOWN, label="estimate = error", **look.BOUND)
+        axis.axhline(1.0, **look.THIN)
+        axis.axvline(1.0, **look.THIN)
+        axis.set(xscale="log", yscale="log", xlim=SHOWN, ylim=SHOWN)
+        look.decades(axis.xaxis, 1)
+        look.decades(axis.yaxis, 1)
+        axis.set_xlabel("largest error / bound")
+    axes[0].set_ylabel("estimated error / bound")
+    look.legend(figure, axes, 4)
     return figure
 
 

@@ -108,6 +108,18 @@ def test_coverage_shows_the_largest_error_of_each_cell_and_marks_what_is_undetec
         assert (right, warned, undetected) == ([[18.0, 4.4]], [[32.5, 1.5]], [[19.0, 4.6]])
 
 
+def test_an_estimate_stands_over_its_error_and_what_it_tells_wrongly_is_marked(other_steering):
+    runs = other_steering["other_steering"].isel(run=[1, 0, 0, 0, 0] * 2)
+    runs["model"] = "run", np.repeat(coverage.VEHICLES, 5)
+    runs["estimate"] = 0.5 * runs["score"]
+    with styled(STYLE):
+        figure = coverage.figure_estimate({"other_steering": runs})
+        checked(figure)
+    for axis in figure.axes:
+        rightly, warned, undetected, *_ = (line.get_xydata().tolist() for line in axis.lines)
+        assert (rightly, warned, undetected) == ([], [], [[3.0, 1.5]])
+
+
 def test_every_picture_of_the_text_is_there():
     text = (PAPER / "paper.typ").read_text(encoding="utf-8")
     pictures = set(re.findall(r'#picture\("([^"]+)"', text))
