@@ -9,8 +9,9 @@ which lie on it, and the lag of the fast modes is learnt with them:
     z' = C phi(z, speed, u)
 
 Features phi are z, the inputs, the tire forces of the axles, and products that are chosen one after
-the other.  Heave and pitch, as slow as the lateral modes, are coordinates too.  The coefficients
-are improved on complete runs, since a heading that is off is a lateral position that is off.
+the other.  Heave and pitch, as slow as the lateral modes, are coordinates too.  What is linear for
+small steering at the model's speed is exact.  The other coefficients are improved on complete runs,
+since a heading that is off is a lateral position that is off.
 """
 
 import time
@@ -42,6 +43,7 @@ from vehiclemor.reduction.vehicle.shape import (
     shape_samples,
 )
 from vehiclemor.reduction.vehicle.slow_features import (
+    HULL,
     Names,
     SlowFeatures,
     even_candidates,
@@ -64,9 +66,9 @@ class SlowManifoldSettings(FallbackSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
-    terms: int = Field(24, ge=0, description="chosen products in the lateral equations")
+    terms: int = Field(36, ge=0, description="chosen products in the lateral equations")
     even_terms: int = Field(
-        16, ge=0, description="chosen products in those of speed, heave and pitch"
+        24, ge=0, description="chosen products in those of speed, heave and pitch"
     )
     ridge: float = Field(1e-12, ge=0.0, description="weight of the coefficients' size in the fit")
     steps: int = Field(8, ge=0, description="Gauss-Newton steps on whole training runs")
@@ -117,14 +119,18 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     if settings.steps:
         targets = targets_of(reduced, training, runs, settings.heading_error)
         (odd, lateral), (even, symmetric) = reduced.features.groups
-        # What heave and pitch do in straight running is exact, and speed is constant there.
+        # What small steering does is exact.
+        odd = odd[listing.lateral + len(model.inputs) :]
+        # So is what heave and pitch do in straight running, and speed is constant there.
         even = even[2 + listing.symmetric :]
         free = [(odd, i) for i in lateral]
         free += [(even, i) for i in symmetric]
         reduced = improved(reduced, targets, free, settings.steps)
-    reduced = _with_decoding(reduced, training, runs, samples, settings.ridge)
+    linear = listing.lateral + len(model.inputs)
+    reduced = _with_decoding(reduced, training, runs, samples, linear, settings.ridge)
     return replace(
         reduced,
+        settling=modes.settling,
         offline=offline_cost(began, model, runs, len(samples.inputs)),
         solver=settings.solver,
         tolerance=settings.tolerance,
@@ -165,7 +171,12 @@ def _fitted_on_rates(
     columns, scale = listing.columns(terms, z, u), largest(z[:, :n])
     first, last = len(odd), len(odd) + len(straight)
     c = np.zeros((len(terms), n + 1 + PLANAR))
-    c[:first, listing.odd_columns] = ridge_fit(columns[:, :first], lateral, settings.ridge)
+    small, shapes = _small_motion(shape, modes, scale[:k], largest(u))
+    known, others = columns[:, : len(small)], columns[:, len(small) : first]
+    c[: len(small), listing.odd_columns] = small
+    c[len(small) : first, listing.odd_columns] = ridge_fit(
+        others, lateral - known @ small, settings.ridge
+    )
     # Straight running at any speed is an equilibrium: the terms 1 and speed make up U.
     forward_speed = n + 2
     c[[first, first + 1], forward_speed] = shape.speed, 1.0
@@ -175,13 +186,15 @@ def _fitted_on_rates(
     every_term = [*terms, *even_others]
     decoded = chosen([*linear, *straight], every_term, samples.deviations, DECODED)
     decoded.sort(key=lambda term: term not in odd)
+    decoding = np.zeros((len(decoded), len(shape.names)))
+    decoding[: len(shapes)] = shapes
     return ReducedVehicle(
         shape.model,
         shape,
         features=listing.of_terms(terms, first),
         parameters=np.array(listing.values),
         coefficients=c,
-        decoding=np.zeros((len(decoded), len(shape.names))),
+        decoding=decoding,
         encoding=modes.encoding,
         feedthrough=modes.input_shift,
         error_scale=np.concatenate([3.0 * scale, ABSOLUTE]),
@@ -189,17 +202,35 @@ def _fitted_on_rates(
     )
 
 
+def _small_motion(
+    shape: VehicleShape, modes: SlowModes, coordinates: np.ndarray, inputs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What small steering does at the model's speed: rates (terms, lateral + 2), shapes (terms, n).
+
+    Terms are the lateral coordinates and the inputs, as parts of ranges.
+    """
+    k, linear, sideways = len(coordinates), shape.linearised, [0, 2]
+    scale = np.concatenate([coordinates, HULL * inputs])[:, None]
+    shapes = np.vstack([modes.right[:, :k].T, modes.slaved.T])
+    rates = np.zeros((len(shapes), k + len(sideways)))
+    rates[: k + 1, :k] = np.vstack([modes.rates[:k, :k].T, modes.input_matrix[:k]])
+    rates[:, k:] = shapes @ linear.velocity_a[sideways].T
+    rates[k:, k:] += linear.velocity_b[sideways].T
+    return scale * rates, scale * shapes
+
+
 def _with_decoding(
     reduced: ReducedVehicle,
     training: Training,
     runs: Sequence[Trajectory],
     samples: ShapeSamples,
+    linear: int,
     ridge: float,
 ) -> ReducedVehicle:
     """The reduced vehicle whose shapes are fitted along its own runs.
 
     Where one of these fails they are fitted along the training run.  Antisymmetric shapes use odd
-    terms, symmetric ones even terms.
+    terms, of which the first are linear and stay, symmetric ones even terms.
     """
     features, states = reduced.decoded_features, reduced.features.states
     assert features is not None
@@ -211,9 +242,11 @@ def _with_decoding(
     z = np.ascontiguousarray(np.concatenate(parts)[:, :states])
     columns = feature_columns(features, z, samples.inputs, reduced.parameters)
     decoding, image = reduced.decoding.copy(), samples.deviations @ reduced.shape.mirror.T
-    for (terms, _), sign in zip(features.groups, (-1, 1), strict=True):
-        values = 0.5 * (samples.deviations + sign * image)
-        decoding[list(terms)] = ridge_fit(columns[:, list(terms)], values, ridge)
+    odd, even = (list(terms) for terms, _ in features.groups)
+    known, odd = odd[:linear], odd[linear:]
+    antisymmetric = 0.5 * (samples.deviations - image) - columns[:, known] @ decoding[known]
+    decoding[odd] = ridge_fit(columns[:, odd], antisymmetric, ridge)
+    decoding[even] = ridge_fit(columns[:, even], 0.5 * (samples.deviations + image), ridge)
     return replace(reduced, decoding=decoding)
 
 

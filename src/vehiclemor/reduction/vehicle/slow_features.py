@@ -33,7 +33,7 @@ from vehiclemor.simulation.dynamic import DynamicModel
 
 AXLES = (WHEELS[:2], WHEELS[2:])
 # Lines of an axle: sums of both wheels' lateral force, aligning moment and part of the contact that
-# sticks, and what the left one has more.
+# slides, and what the left one has more.
 FORCES = ("F", "M", "G", "FD", "MD", "GD")
 MEAN, HALF = np.array([0.5, 0.5]), np.array([0.5, -0.5])
 # Factors of a term, by the names of their lines.
@@ -208,13 +208,19 @@ def _add_axles(
     # Zero in straight running at any speed.
     of_turning = even[2:], columns[:, len(odd) + 2 :], 0
 
-    def fitted(values: np.ndarray, among: Table, more: int = WHEEL_TERMS) -> Value:
+    def parts(values: np.ndarray, among: Table, more: int = WHEEL_TERMS) -> list[Value]:
+        """The sum of the terms that a fit has in any case, and that of the chosen ones."""
         terms, table, given = among
         chosen = forward_selection(table, values[:, None], given, more)
         weights = ridge_fit(table[:, chosen], values, RIDGE)
-        return features.let(
-            features.weighted((product(features.term(terms[i])) for i in chosen), weights)
-        )
+        products = [product(features.term(terms[i])) for i in chosen]
+        halves = [slice(given), slice(given, None)]
+        return [
+            features.let(features.weighted(products[h], weights[h])) for h in halves if products[h]
+        ]
+
+    def fitted(values: np.ndarray, among: Table, more: int = WHEEL_TERMS) -> Value:
+        return features.let(reduce(add, parts(values, among, more)))
 
     def of_wheels(kind: str, wheels: Sequence[str]) -> np.ndarray:
         return samples.outputs[:, [model.outputs.index(f"{kind}_{wheel}") for wheel in wheels]]
@@ -228,10 +234,12 @@ def _add_axles(
             slip = features.let(clipped(fitted(mean / (HULL * largest(mean[:, None])), of_odd, 0)))
             size = features.line(f"G{axle}", abs(slip))
             force = features.line(f"F{axle}", slip * size)
-            features.line(f"M{axle}", force * size)
+            moment = features.line(f"M{axle}", force * size)
+            features.by_name |= {f"FC{axle}": force, f"MC{axle}": moment}
             continue
         loads = of_wheels("Fz", wheels)
-        slip, slip_half = fitted(slips @ MEAN, of_odd), fitted(slips @ HALF, of_turning)
+        small, curved = parts(slips @ MEAN, of_odd)
+        slip, slip_half = features.let(small + curved), fitted(slips @ HALF, of_turning)
         load, load_half = fitted(loads @ MEAN, of_even), fitted(loads @ HALF, of_odd)
         tire = {name: float(model.parameters[name]) for name in FIALA}, float(loads.mean())
         left = add_fiala(features, wheels[0], slip + slip_half, load + load_half, tire)
@@ -239,6 +247,10 @@ def _add_axles(
         for kind, one, other in zip(FORCES, left, right, strict=False):
             features.line(f"{kind}{axle}", one + other)
             features.line(f"{kind}D{axle}", one - other)
+        stiffness = 2.0 * tire[0]["cornering_stiffness"] / tire[1]
+        for kind, slope in (("F", -stiffness), ("M", stiffness / 3.0)):
+            proportional = features.parameter(slope) * small
+            features.line(f"{kind}C{axle}", features.by_name[f"{kind}{axle}"] - proportional)
 
 
 def add_fiala(
@@ -248,7 +260,7 @@ def add_fiala(
     load: Value,
     tire: tuple[Mapping[str, float], float],
 ) -> tuple[Value, Value, Value]:
-    """Lateral force and aligning moment of a wheel, and its part that still sticks.
+    """Lateral force and aligning moment of a wheel, and its part that slides.
 
     Forces as parts of the static load, moments as parts of it times the width, from the tangent of
     the slip angle and the load in N.  Of the tire: its parameters and the static load in N.
@@ -265,12 +277,12 @@ def add_fiala(
     sticking = let(left * left)
     share = let(parameter(1.0 / static) * limit * y)
     force = let(-share * (3.0 - 3.0 * abs(y) + y * y))
-    return force, let(share * sticking * left), sticking
+    return force, let(share * sticking * left), let(1.0 - sticking)
 
 
 def required_terms(features: SlowFeatures) -> tuple[list[Names], list[Names]]:
-    """Odd and even terms that the equations always have."""
-    k, forces = features.lateral, [(f"{kind}{axle}",) for kind in "FM" for axle in (0, 1)]
+    """Odd and even terms that the equations always have; the last four odd ones are not linear."""
+    k, forces = features.lateral, [(f"{kind}C{axle}",) for kind in "FM" for axle in (0, 1)]
     odd = [*features.coordinates[:k], LINEAR[-1], *features.derivatives, *forces]
     return odd, [ONE, (f"z{features.speed}",), *features.coordinates[k:]]
 
@@ -285,6 +297,8 @@ def odd_candidates(features: SlowFeatures) -> list[Names]:
         terms += [(f"{kind}{axle}", a) for kind in kinds for a in ARGUMENTS]
         terms += [(f"F{axle}", *pair) for pair in SQUARE]
     factors = (*ARGUMENTS, "F0", "F1")
+    others = [*SQUARE, *((f"G{axle}",) for axle in (0, 1))]
+    terms += [(*rate, *other) for rate in features.derivatives for other in others]
     symmetric = features.coordinates[features.lateral :]
     return [*terms, *((*coordinate, a) for coordinate in symmetric for a in factors)]
 

@@ -148,6 +148,16 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
         make = partial(_of_group, folder=path.parent)
         parts = [_checked(model, f"{key}, group {n}", make, group) for n, group in groups]
         sets[key] = tuple(itertools.chain(*parts))
+    draws = definition.draws
+    if more := definition.drawn_training:
+        draws = draws | {"drawn_training": more}
+    for key, draw in draws.items():
+        for number, box in enumerate(draw.boxes, start=1):
+            _checked(model, f"{key}, box {number}", _corners, box)
+    if more:
+        # An audit tests with another seed what has learned from the same runs.
+        seeds, known = (definition.seed, len(DRAWN)), [*itertools.chain(*sets.values())]
+        sets["training"] += sampled_runs(model, more, seeds, known)
     seen: dict[tuple, str] = {}
     run_labels: set[str] = set()
     for key, part in sets.items():
@@ -161,10 +171,6 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
             if scenario.label in run_labels:
                 raise InputError(f"{key}: ({scenario.label}) are two runs: give one log a name")
             run_labels.add(scenario.label)
-    draws = definition.draws
-    for key, draw in draws.items():
-        for number, box in enumerate(draw.boxes, start=1):
-            _checked(model, f"{key}, box {number}", _corners, box)
     entries = tuple(_entry(model, entry, sets["training"]) for entry in definition.methods)
     labels = [label for entry in entries for label in entry.row_labels]
     for label in labels:

@@ -258,6 +258,7 @@ class ProtocolFile(StudyOfModel):
 
     parameters: dict[str, float | list[float]] = PARAMETERS
     training: Parts = Field(description="runs that methods learn from")
+    drawn_training: Draw | None = Field(None, description="more of these runs, drawn from boxes")
     # A schema is frozen: no entry of another class can be put in.
     methods: list[ProtocolEntry] = Field(  # type: ignore[assignment]
         min_length=1, description="each is tested with the settings that validation chooses"
