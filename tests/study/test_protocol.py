@@ -183,6 +183,20 @@ def test_an_audit_draws_other_runs_and_stands_apart(protocol, tmp_path):
         vm.run_study("figure-12", seed=7, results=tmp_path)
 
 
+def test_runs_for_training_are_drawn_beside_the_listed_ones_whatever_the_audit(
+    tmp_path, protocol_text, protocol
+):
+    path = tmp_path / "drawn.toml"
+    boxes = 'boxes = [{ maneuver = "sine_travel", frequency = [0.7, 2.0] }]'
+    path.write_text(f"{protocol_text}\n[drawn_training]\nruns = 4\n{boxes}\n")
+    found = load_protocol(str(path))
+    training = found.sets["training"]
+    assert (len(training), training[:1]) == (5, protocol.sets["training"])
+    assert found.entries[-1].training == training
+    assert load_protocol(str(path), seed=7).sets["training"] == training
+    assert sampled_sets(found) == sampled_sets(protocol)
+
+
 def test_a_draw_fills_its_box_and_stays_inside(protocol):
     runs = sampled_runs(protocol.model, Draw(runs=400, boxes=[BOX]), (1, 1, 0))
     assert len({run.run_key for run in runs}) == 400

@@ -289,7 +289,7 @@ def required_terms(features: SlowFeatures) -> tuple[list[Names], list[Names]]:
 
 def odd_candidates(features: SlowFeatures) -> list[Names]:
     """Odd terms that the equations may need besides."""
-    terms = [*CUBIC, *FASTER]
+    terms = [*CUBIC, *FASTER, *(("m", *term) for term in FASTER)]
     for axle in (0, 1):
         terms += [("m", f"F{axle}"), ("m", f"M{axle}")]
         terms += [(f"GD{axle}",)] if "GD" in features.forces else []

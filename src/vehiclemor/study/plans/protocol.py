@@ -148,16 +148,10 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
         make = partial(_of_group, folder=path.parent)
         parts = [_checked(model, f"{key}, group {n}", make, group) for n, group in groups]
         sets[key] = tuple(itertools.chain(*parts))
-    draws = definition.draws
-    if more := definition.drawn_training:
-        draws = draws | {"drawn_training": more}
-    for key, draw in draws.items():
-        for number, box in enumerate(draw.boxes, start=1):
-            _checked(model, f"{key}, box {number}", _corners, box)
-    if more:
-        # An audit tests with another seed what has learned from the same runs.
-        seeds, known = (definition.seed, len(DRAWN)), [*itertools.chain(*sets.values())]
-        sets["training"] += sampled_runs(model, more, seeds, known)
+    if definition.drawn_training:
+        # An audit with another seed tests what has learnt the same.
+        seeds = definition.seed, definition.version, len(DRAWN)
+        sets["training"] += sampled_runs(model, definition.drawn_training, seeds)
     seen: dict[tuple, str] = {}
     run_labels: set[str] = set()
     for key, part in sets.items():
@@ -171,13 +165,19 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
             if scenario.label in run_labels:
                 raise InputError(f"{key}: ({scenario.label}) are two runs: give one log a name")
             run_labels.add(scenario.label)
+    draws = definition.draws
+    if definition.drawn_training:
+        draws |= {"drawn_training": definition.drawn_training}
+    for key, draw in draws.items():
+        for number, box in enumerate(draw.boxes, start=1):
+            _checked(model, f"{key}, box {number}", _corners, box)
     entries = tuple(_entry(model, entry, sets["training"]) for entry in definition.methods)
     labels = [label for entry in entries for label in entry.row_labels]
     for label in labels:
         if labels.count(label) > 1:
             raise InputError(f"label {label!r} is used twice (of full order with the tolerance)")
     if straight:
-        boxes = [box for draw in draws.values() for box in draw.boxes]
+        boxes = [box for draw in definition.draws.values() for box in draw.boxes]
         driven = {part.maneuver for part in (*definition.test, *definition.outside, *boxes)}
         choice("maneuver of a test, in straight", straight.maneuver, sorted(driven))
     for target in definition.targets:

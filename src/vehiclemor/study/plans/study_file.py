@@ -258,7 +258,6 @@ class ProtocolFile(StudyOfModel):
 
     parameters: dict[str, float | list[float]] = PARAMETERS
     training: Parts = Field(description="runs that methods learn from")
-    drawn_training: Draw | None = Field(None, description="more of these runs, drawn from boxes")
     # A schema is frozen: no entry of another class can be put in.
     methods: list[ProtocolEntry] = Field(  # type: ignore[assignment]
         min_length=1, description="each is tested with the settings that validation chooses"
@@ -276,6 +275,9 @@ class ProtocolFile(StudyOfModel):
     outside: list[Part] = list_of("beyond what was trained: reported, not judged")
     version: int = Field(1, ge=1, description="of the drawn test set, part of its name")
     seed: int = Field(SEED, ge=0, le=MOST_SEED, description="of the drawn runs")
+    drawn_training: Draw | None = Field(
+        None, description="further runs that methods learn from, drawn from boxes"
+    )
     drawn: Draw | None = Field(None, description="test set: drawn from boxes")
     drawn_outside: Draw | None = Field(
         None, description="the same beyond the boxes: whether models warn"
