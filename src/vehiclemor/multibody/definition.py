@@ -13,7 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import line_of_text
 from vehiclemor.exceptions import InputError, did_you_mean
-from vehiclemor.multibody.quantities import DEFAULTS, InputChoice, Quantity
+from vehiclemor.multibody.quantities import DEFAULTS, ErrorBound, InputChoice, Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.short_repr import ShortRepr
 
@@ -158,6 +158,8 @@ class ModelDefinition(ShortRepr):
         Outputs that are zero where a wheel has left the road.
     slips
         Outputs that are the slip ratios of the wheels.
+    error_bounds
+        Output -> bound by which reduced models judge their runs.
     wheelbase
         Parameters -> distance of the axles in m, of a vehicle.
     tabled_outputs
@@ -221,6 +223,7 @@ class ModelDefinition(ShortRepr):
     standstill: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
     slips: tuple[str, ...] = ()
+    error_bounds: Mapping[str, ErrorBound] = field(default_factory=dict)
     wheelbase: Callable[[Values], float] | None = None
     tabled_outputs: tuple[str, ...] = ()
     main_outputs: tuple[str, ...] = ()
@@ -286,6 +289,7 @@ class ModelDefinition(ShortRepr):
         self._known("standstill", self.standstill, outputs)
         self._known("loads", self.loads, outputs)
         self._known("slips", self.slips, outputs)
+        self._known("error_bounds", self.error_bounds, outputs)
         self._known("tabled_outputs", self.tabled_outputs, outputs)
         self._known("main_outputs", self.main_outputs, self.tabled_outputs or outputs)
 

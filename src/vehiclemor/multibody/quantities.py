@@ -29,6 +29,14 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class ErrorBound:
+    """Largest allowed error of an output: its largest magnitude (`max`) or its RMS (`rms`)."""
+
+    measure: str
+    bound: float  # In the unit of the output.
+
+
+@dataclass(frozen=True)
 class InputChoice:
     """Optional inputs of a run in declared order; those in neither tuple are their defaults.
 
@@ -66,6 +74,23 @@ STANDSTILL = ("longitudinal_speed", "lateral_speed")
 # Bounds beyond which the models mean nothing: of the longitudinal speed, and of the attitude.
 FORWARD = (0.5, math.inf)
 UPRIGHT = {"roll": (-1.2, 1.2), "pitch": (-1.2, 1.2)}
+
+
+def error_bounds(yaw: float) -> dict[str, ErrorBound]:
+    """Largest errors of a reduced vehicle, with that of its yaw angle in rad.
+
+    They are those of the vehicles' studies with bounds, which say where each comes from.
+    """
+    return {
+        "longitudinal_position": ErrorBound("max", 0.05),
+        "lateral_position": ErrorBound("max", 0.05),
+        "yaw": ErrorBound("rms", yaw),
+        "pitch": ErrorBound("rms", 5.18e-4),
+        "lateral_speed": ErrorBound("rms", 0.0198),
+        "vertical_speed": ErrorBound("rms", 0.0143),
+    }
+
+
 # Optional inputs at each wheel: name, unit, meaning, default, range of validity.  Slopes are up to
 # 0.1, which is 5 m/s at 50 m/s; torques beyond these ranges are in another unit.
 _AT_WHEEL = (

@@ -4,6 +4,7 @@ It repeats them from the beginning: the reduced model has mostly gone wrong befo
 indicator passes 1, and errors at a restart near the edge grow.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,7 +12,9 @@ import numpy as np
 
 from vehiclemor.arguments import require
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
+from vehiclemor.multibody.quantities import ErrorBound
+from vehiclemor.reduction.error_estimate import judged_run
+from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
 from vehiclemor.registry import component
@@ -28,6 +31,7 @@ class FallbackModel(ShortRepr):
 
     reduced: FittedModel
     full: ReducedSystem
+    judges = True
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if the first is no reduced model."""
@@ -54,10 +58,21 @@ class FallbackModel(ShortRepr):
         return self.reduced.best_approximation(states)
 
     def simulate(
-        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
+        self,
+        maneuver: Excitation,
+        start: Start,
+        outputs: tuple[str, ...] | None = None,
+        bounds: Mapping[str, ErrorBound] | None = None,
     ) -> Trajectory:
-        """The reduced run; where it can't be trusted, that of the full order."""
-        run = simulated(self.reduced, maneuver, start, outputs)
+        """The reduced run; where it can't be trusted, that of the full order.
+
+        It is judged by its estimated error in bounds, those of the model by default.
+        """
+        run = judged_run(
+            self.reduced.simulate, self.reduced, self.full.model, maneuver, start, bounds
+        )
+        if outputs is not None:
+            run = run.chosen(outputs)
         if run.status in WITHOUT_COMPLAINT and run.trust and np.isinf(run.trust.until):
             return run
         # A model without a trust indicator is trusted nowhere.

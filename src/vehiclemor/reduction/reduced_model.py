@@ -16,7 +16,10 @@ from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
+from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction import model_file
+from vehiclemor.reduction.error_estimate import checked_bounds, estimates, judged_run
+from vehiclemor.reduction.fallback import FallbackModel
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank, simulated
 from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.training import own_speed, training_summary
@@ -32,6 +35,8 @@ from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, ou
 
 if TYPE_CHECKING:
     import xarray as xr
+
+NOT_JUDGED = "its error was not estimated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +114,13 @@ class ReducedOrderModel(ShortRepr):
         *,
         outputs: Names = None,
         times: Any = None,
+        bounds: Mapping[str, Any] | None = None,
+        trust: str = "estimate",
     ) -> Trajectory:
         """A run at the maneuver's output times.
+
+        Of a vehicle the error of the run is estimated, see `ErrorEstimate`; the run is `untrusted`
+        where the estimate passes a bound.
 
         Parameters
         ----------
@@ -120,21 +130,48 @@ class ReducedOrderModel(ShortRepr):
             Initial condition of the full model, by name or as a state (n,); its first by default.
         outputs, times
             What of it is recorded, see `Trajectory.chosen`.
+        bounds
+            Output -> largest error in its unit, or its `measure` and that: the largest magnitude
+            (`max`, which is meant without one) or the RMS (`rms`).  By default those of the model.
+        trust
+            `estimate`, or `off`: then the run is not judged, and its remark says so.
         """
         chosen = self.model.definition.maneuver if maneuver is None else maneuver
         if isinstance(chosen, str):
             chosen = registered(chosen)
         first = self.model.starts[0] if start is None else start
+        off = choice("trust", trust, ("estimate", "off")) == "off"
+        own = None if bounds is None else checked_bounds(self.model, bounds)
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
-            run = simulated(self.reduced, chosen, first, names)
+            run = self._judged(chosen, first, names, own, off)
         # A copy would take a twentieth of a short run.
         run.__dict__.update(method=self.method, maneuver=chosen.name)
         if self._lower_rank:
             run.__dict__["remark"] = "; ".join(filter(None, (run.remark, self._lower_rank)))
-        if not run.trust and self._range is not None:
+        if off:
+            run.__dict__["remark"] = "; ".join(filter(None, (run.remark, NOT_JUDGED)))
+        elif not run.trust and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
         return run if times is None else run.chosen(times=times)
+
+    def _judged(
+        self,
+        maneuver: Excitation,
+        start: Start,
+        outputs: tuple[str, ...] | None,
+        bounds: Mapping[str, ErrorBound] | None,
+        off: bool,
+    ) -> Trajectory:
+        """A run with some outputs alone; its error is estimated unless that is off."""
+        reduced: Any = self.reduced
+        if isinstance(reduced, FallbackModel) and not off:
+            return reduced.simulate(maneuver, start, outputs, bounds)
+        if off or getattr(reduced, "judges", False) or not estimates(self.model):
+            fitted = reduced.reduced if isinstance(reduced, FallbackModel) else reduced
+            return simulated(fitted, maneuver, start, outputs)
+        run = judged_run(reduced.simulate, reduced, self.model, maneuver, start, bounds)
+        return run if outputs is None else run.chosen(outputs)
 
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The model with other parameters, reduced by a method that learns from no run.
@@ -285,8 +322,8 @@ class ReducedOrderModel(ShortRepr):
         if left := self._left_validity(states, u):
             return Trust(np.inf, 0.0, left)
         trust = self._stepped.trust(states, u)
-        if trust is None and self._range is not None:
-            trust = self._range.trust_of_inputs(self.inputs, u)
+        if trust is None and self.input_range is not None:
+            trust = self.input_range.trust_of_inputs(self.inputs, u)
         return trust or Trust(0.0)
 
     def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:

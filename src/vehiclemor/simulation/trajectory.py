@@ -111,6 +111,8 @@ class Trajectory(ShortRepr):
         By which it was reduced; empty for a run of the full model.
     maneuver
         Name of the input.
+    error_estimate
+        Of a reduced vehicle, see `reduction.error_estimate.ErrorEstimate`; none of other runs.
     """
 
     times: np.ndarray
@@ -129,6 +131,7 @@ class Trajectory(ShortRepr):
     method: str = ""
     maneuver: str = ""
     further_states: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    error_estimate: Any = None
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None

@@ -14,6 +14,7 @@ from vehiclemor.error_measures import rms
 from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, blamed
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.progress import first_use
+from vehiclemor.reduction.error_estimate import judged_run
 from vehiclemor.reduction.fallback import with_fallback
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.settings import Settings
@@ -246,7 +247,11 @@ def _tested(
     if not (many or fit.warm or reference is None):
         checked_run(tested, scenario.maneuver, start, reduced)
         fit.warm = True
-    run = checked_run(tested, scenario.maneuver, start, reduced)
+    simulate = partial(checked_run, tested, reduced=reduced)
+    if many:
+        run = judged_run(simulate, reduced, tested, scenario.maneuver, start)
+    else:
+        run = simulate(scenario.maneuver, start)
     if run.finished and not np.isfinite(run.outputs[: run.samples_to_stop]).all():
         run = replace(run, status="diverged", message="an output is not finite")
     if reference is not None and run.stops_early(reference):

@@ -180,7 +180,8 @@ def test_a_run_that_stops_where_the_full_order_drives_on_has_failed():
 @pytest.mark.parametrize(
     ("reduced", "words"),
     [
-        (lambda: vm.reduce(CAR, "slow_manifold", training="braking_in_turn"), "steer alone"),
+        (lambda: vm.reduce(CAR, "linear_single_track", training="braking_in_turn"), "steer alone"),
+        (lambda: vm.reduce(CAR, "slow_manifold", training="bump"), "on an even road"),
         (lambda: vm.reduce(car(5.0), "pod", training=braking(600.0)), "runs that go on until"),
         (
             lambda: vm.rom(CAR).simulate("straight_braking"),

@@ -28,6 +28,7 @@ from vehiclemor.multibody.quantities import (
     check_moments,
     declared,
     equations_of,
+    error_bounds,
 )
 
 COORDINATES = 26
@@ -227,6 +228,7 @@ DEFINITION = ModelDefinition(
     standstill=STANDSTILL,
     loads=TIRE_LOADS,
     slips=SLIP_RATIOS,
+    error_bounds=error_bounds(2.5e-4),
     wheelbase=wheelbase,
     tabled_outputs=(
         "lateral_speed",

@@ -26,6 +26,7 @@ from vehiclemor.multibody.quantities import (
     check_moments,
     declared,
     equations_of,
+    error_bounds,
 )
 
 
@@ -135,6 +136,7 @@ DEFINITION = ModelDefinition(
     standstill=STANDSTILL,
     loads=TIRE_LOADS,
     slips=SLIP_RATIOS,
+    error_bounds=error_bounds(7.59e-5),
     wheelbase=wheelbase,
     tabled_outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),
     main_outputs=("pitch", "yaw", "lateral_position"),

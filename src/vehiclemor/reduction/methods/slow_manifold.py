@@ -25,6 +25,12 @@ from pydantic import Field
 from vehiclemor.reduction.interface import Method, offline_cost
 from vehiclemor.reduction.settings import AnyIntegrator, FallbackSettings, Solver, Tolerance
 from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle.axle_forces import add_axles
+from vehiclemor.reduction.vehicle.candidates import (
+    even_candidates,
+    odd_candidates,
+    required_terms,
+)
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.fitting import (
     YAW_BOUND,
@@ -34,21 +40,19 @@ from vehiclemor.reduction.vehicle.fitting import (
     ridge_fit,
     targets_of,
 )
-from vehiclemor.reduction.vehicle.linear_modes import SlowModes, slow_modes
+from vehiclemor.reduction.vehicle.linear_modes import SlowModes, response, slow_modes
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import (
     ShapeSamples,
     VehicleShape,
-    no_steered_vehicle,
+    no_vehicle,
     shape_samples,
 )
 from vehiclemor.reduction.vehicle.slow_features import (
+    AXLES,
     HULL,
     Names,
     SlowFeatures,
-    even_candidates,
-    odd_candidates,
-    required_terms,
     slow_features,
 )
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -66,7 +70,7 @@ class SlowManifoldSettings(FallbackSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
-    terms: int = Field(36, ge=0, description="chosen products in the lateral equations")
+    terms: int = Field(48, ge=0, description="chosen products in the lateral equations")
     even_terms: int = Field(
         24, ge=0, description="chosen products in those of speed, heave and pitch"
     )
@@ -115,18 +119,20 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     modes = slow_modes(shape, settings.fastest, SYMMETRIC)
     samples = shape_samples(shape, runs)
     listing = slow_features(shape, modes, samples, settings.trusted, settings.reversal)
+    z = modes.coordinates(samples.deviations, samples.inputs)
+    add_axles(listing, model, samples, z)
     reduced = _fitted_on_rates(shape, modes, listing, samples, settings)
     if settings.steps:
         targets = targets_of(reduced, training, runs, settings.heading_error)
         (odd, lateral), (even, symmetric) = reduced.features.groups
-        # What small steering does is exact.
-        odd = odd[listing.lateral + len(model.inputs) :]
-        # So is what heave and pitch do in straight running, and speed is constant there.
-        even = even[2 + listing.symmetric :]
+        # What small steering does is exact, and what torques of left wheels, heave and pitch do in
+        # straight running; speed is constant there.
+        required = required_terms(listing)
+        odd, even = odd[len(required.small) :], even[len(required.straight) :]
         free = [(odd, i) for i in lateral]
         free += [(even, i) for i in symmetric]
         reduced = improved(reduced, targets, free, settings.steps)
-    linear = listing.lateral + len(model.inputs)
+    linear = listing.lateral + shape.inputs.steering
     reduced = _with_decoding(reduced, training, runs, samples, linear, settings.ridge)
     return replace(
         reduced,
@@ -147,8 +153,9 @@ def _fitted_on_rates(
     """Equations fitted on the rates of the training runs; nothing is decoded yet."""
     u, motion, k, n = samples.inputs, samples.planar_velocity, listing.lateral, listing.speed
     z = modes.coordinates(samples.deviations, u)
-    # Inputs are derivatives of the first one.
-    rates = samples.rates @ modes.encoding.T - u[:, 1:] @ modes.input_shift[:, :-1].T
+    # Of the steering the next input is the derivative.
+    moved = modes.input_shift[:, : shape.inputs.steering - 1]
+    rates = samples.rates @ modes.encoding.T - u[:, 1 : shape.inputs.steering] @ moved.T
     lateral = np.column_stack([rates[:, :k], motion[:, 0], motion[:, 2]])
     # Of heave and pitch in straight running: their rates, and the forward speed.
     heave, forward = modes.rates[k:, k:], shape.linearised.velocity_a[1] @ modes.right[:, k:]
@@ -163,19 +170,19 @@ def _fitted_on_rates(
         columns = listing.columns(terms, z, u)
         return [terms[i] for i in forward_selection(columns, values, len(fixed), more)]
 
-    linear, straight = required_terms(listing)
-    even_others = even_candidates(listing)
-    odd = chosen(linear, odd_candidates(listing), rates[:, :k], settings.terms)
-    even = [*straight, *chosen([], even_others, symmetric, settings.even_terms)]
-    terms = [*odd, *even]
-    columns, scale = listing.columns(terms, z, u), largest(z[:, :n])
-    first, last = len(odd), len(odd) + len(straight)
+    required, even_others = required_terms(listing), even_candidates(listing)
+    small, straight, scale = required.small, required.straight, largest(z[:, :n])
+    exact, shapes = _small_motion(shape, modes, scale[:k], largest(u[:, : shape.inputs.steering]))
+    if shape.inputs.torques:
+        exact = np.vstack([exact, left_torques(shape, modes, listing)])
+    odd = chosen([*small, *required.odd], odd_candidates(listing), rates[:, :k], settings.terms)
+    even = chosen(required.even, even_others, symmetric, settings.even_terms)
+    terms, known = [*odd, *straight, *even], len(small)
+    columns, first, last = listing.columns(terms, z, u), len(odd), len(odd) + len(straight)
     c = np.zeros((len(terms), n + 1 + PLANAR))
-    small, shapes = _small_motion(shape, modes, scale[:k], largest(u))
-    known, others = columns[:, : len(small)], columns[:, len(small) : first]
-    c[: len(small), listing.odd_columns] = small
-    c[len(small) : first, listing.odd_columns] = ridge_fit(
-        others, lateral - known @ small, settings.ridge
+    c[:known, listing.odd_columns] = exact
+    c[known:first, listing.odd_columns] = ridge_fit(
+        columns[:, known:first], lateral - columns[:, :known] @ exact, settings.ridge
     )
     # Straight running at any speed is an equilibrium: the terms 1 and speed make up U.
     forward_speed = n + 2
@@ -184,7 +191,8 @@ def _fitted_on_rates(
     c[first + 2 : last, forward_speed] = forward * scale[k:]
     c[last:, listing.even_columns] = ridge_fit(columns[:, last:], symmetric, settings.ridge)
     every_term = [*terms, *even_others]
-    decoded = chosen([*linear, *straight], every_term, samples.deviations, DECODED)
+    linear = [*small, *required.odd, *straight, *required.even]
+    decoded = chosen(linear, every_term, samples.deviations, DECODED)
     decoded.sort(key=lambda term: term not in odd)
     decoding = np.zeros((len(decoded), len(shape.names)))
     decoding[: len(shapes)] = shapes
@@ -203,20 +211,30 @@ def _fitted_on_rates(
 
 
 def _small_motion(
-    shape: VehicleShape, modes: SlowModes, coordinates: np.ndarray, inputs: np.ndarray
+    shape: VehicleShape, modes: SlowModes, coordinates: np.ndarray, steering: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """What small steering does at the model's speed: rates (terms, lateral + 2), shapes (terms, n).
 
-    Terms are the lateral coordinates and the inputs, as parts of ranges.
+    Terms are the lateral coordinates, the steering and its derivatives, as parts of ranges.
     """
     k, linear, sideways = len(coordinates), shape.linearised, [0, 2]
-    scale = np.concatenate([coordinates, HULL * inputs])[:, None]
+    scale = np.concatenate([coordinates, HULL * steering])[:, None]
     shapes = np.vstack([modes.right[:, :k].T, modes.slaved.T])
     rates = np.zeros((len(shapes), k + len(sideways)))
     rates[: k + 1, :k] = np.vstack([modes.rates[:k, :k].T, modes.input_matrix[:k]])
     rates[:, k:] = shapes @ linear.velocity_a[sideways].T
-    rates[k:, k:] += linear.velocity_b[sideways].T
+    rates[k:, k:] += linear.velocity_b[sideways, : len(steering)].T
     return scale * rates, scale * shapes
+
+
+def left_torques(shape: VehicleShape, modes: SlowModes, listing: SlowFeatures) -> np.ndarray:
+    """Coefficients (terms, odd columns) of what left wheels have more, linearised."""
+    rows = np.zeros((len(AXLES), len(listing.odd_columns)))
+    for axle in range(len(rows)):
+        change = shape.inputs.left_torque(*AXLES[axle]) * listing.reach[f"D{axle}"]
+        rates, velocity = response(shape, modes, change)
+        rows[axle] = [*rates[: listing.lateral], velocity[0], velocity[2]]
+    return rows
 
 
 def _with_decoding(
@@ -255,7 +273,7 @@ METHOD = Method(
     summary="slow modes with a right-hand side fitted on training runs, fast motion slaved",
     reference="10.1137/1.9781611971118",
     settings=dict.fromkeys(("ode", "dae"), SlowManifoldSettings),
-    refusal=no_steered_vehicle,
+    refusal=no_vehicle,
     fit=fit,
 )
 

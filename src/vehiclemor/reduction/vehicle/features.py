@@ -235,10 +235,11 @@ def feature_system(
     coefficients: np.ndarray,
     error_scale: np.ndarray,
     reference: np.ndarray,
+    reference_inputs: np.ndarray,
 ) -> System:
     """The reduced vehicle as the compiled loops take it, see `ReducedVehicle`.
 
-    The Jacobian is frozen at the reference (states,).
+    The Jacobian is frozen at the reference (states,) and its inputs (inputs,).
     """
     blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in features.blocks]
     for block, (terms, columns) in zip(blocks, features.blocks, strict=True):
@@ -253,4 +254,5 @@ def feature_system(
         error_scale,
         np.arange(dim - 2),
         np.zeros(0, dtype=np.int64),
+        reference_inputs=reference_inputs,
     )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.reduction.vehicle.shape import Linearisation, VehicleShape
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 # Modes that steering moves by less than this (relative) are symmetric: they don't steer.
 CONTROLLED = 1e-6
@@ -37,7 +37,7 @@ class SlowModes:
     input_shift: np.ndarray
     # Deviation (n,) of the shape that follows the steering without delay.
     static_response: np.ndarray
-    # Deviation (n, inputs) of the shape by which all faster motion follows the inputs.
+    # Deviation (n, inputs) of the shape by which faster motion follows steering and derivatives.
     slaved: np.ndarray
     # What fast motion in a deviation of the shape still adds to heading, X and Y (3, n).
     settling: np.ndarray
@@ -58,7 +58,8 @@ class SlowModes:
 def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowModes:
     """Slow modes with |lambda| up to `fastest` (1/s), and so many symmetric ones (or pairs).
 
-    The inputs are the steering and its derivatives, as many as the model has.
+    The derivatives of the steering are taken out of the coordinates.  Torques stay: left
+    eigenvectors hold the momentum of the wheels' spin, so that no coordinate needs their rates.
     """
     linear = shape.linearised
     values, left, right = eigenmodes(linear.a)
@@ -80,19 +81,20 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         more_w, more_v = real_modes(values, left, right, chosen)
         w, v = np.vstack([w, more_w]), np.hstack([v, more_v])
     rates = w @ linear.a @ v
-    b = w @ linear.b
-    shift, driven = without_derivatives(rates, b)
+    steering, b = shape.inputs.steering, w @ linear.b
+    shift = np.zeros((len(w) + 1, b.shape[1]))
+    shift[:-1, :steering], driven = without_derivatives(rates, b[:, :steering])
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.velocity_a[1] @ right[:, still].real
     slow = v @ w + np.outer(right[:, still].real, left[still].real)
-    slaved, settling = fast_motion(linear, slow, shape.speed)
+    slaved, settling = fast_motion(shape, slow)
     return SlowModes(
         count,
         rates,
         w,
         v,
         driven,
-        np.vstack([shift, np.zeros(shift.shape[1])]),
+        shift,
         static + v @ np.linalg.solve(rates, driven),
         slaved,
         settling,
@@ -101,15 +103,14 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
     )
 
 
-def fast_motion(
-    linear: Linearisation, slow: np.ndarray, speed: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """What follows the inputs (n, inputs), and what adds to heading, X and Y (3, n) as it decays.
+def fast_motion(shape: VehicleShape, slow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What follows the steering (n, inputs), and what adds to heading, X and Y (3, n) as it decays.
 
     `slow` is the projection (n, n) on slow motion.  The rest e' = A e + d s soon follows as
     e = -A^-1 d s - A^-2 d s' - A^-3 d s'' ...; free, it adds -A^-1 e to its integral.
     """
-    follow, drive = without_derivatives(linear.a, linear.b)
+    linear = shape.linearised
+    follow, drive = without_derivatives(linear.a, linear.b[:, : shape.inputs.steering])
     fast = np.eye(len(slow)) - slow
     inverse = np.linalg.solve(linear.a @ fast + slow, fast)
     column = -inverse @ drive
@@ -118,8 +119,21 @@ def fast_motion(
         column = inverse @ column
     integral = -linear.velocity_a @ inverse
     # Where the heading is still to change, the vehicle goes sideways.
-    integral[2] += speed * integral[0] @ inverse
+    integral[2] += shape.speed * integral[0] @ inverse
     return follow, integral
+
+
+def response(
+    shape: VehicleShape, modes: SlowModes, inputs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What inputs (inputs,) do in straight running: to z' (k,), and at once to psi', U and V (3,).
+
+    Fast motion follows them without delay.
+    """
+    linear, b = shape.linearised, shape.linearised.b @ inputs
+    slow = modes.right @ (modes.left @ b) + modes.speed_right * (modes.speed_left @ b)
+    fast = -np.linalg.lstsq(linear.a, b - slow, rcond=1e-10)[0]
+    return modes.left @ b, linear.velocity_b @ inputs + linear.velocity_a @ fast
 
 
 def eigenmodes(a: np.ndarray) -> tuple[Any, Any, Any]:

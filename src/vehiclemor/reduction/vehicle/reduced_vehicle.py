@@ -84,7 +84,7 @@ class ReducedVehicle(ReducedSystem):
         """Largest real part (1/s) of the shape's eigenvalues at straight running."""
         k = self.features.states
         steps = DIFFERENCE * np.vstack([np.eye(k), -np.eye(k)])
-        no_input = np.zeros((2 * k, self.features.inputs))
+        no_input = np.tile(self.model.inputs_at_rest, (2 * k, 1))
         columns = feature_columns(self.features, steps, no_input, self.parameters)
         rates = columns @ self.coefficients[:, :k]
         jacobian = (rates[:k] - rates[k:]).T / (2.0 * DIFFERENCE)
@@ -94,7 +94,8 @@ class ReducedVehicle(ReducedSystem):
     def system(self) -> System:
         """The compiled equations."""
         arrays = self.parameters, self.coefficients, self.error_scale
-        return feature_system(self.features, *arrays, np.zeros(self.features.states))
+        reference = np.zeros(self.features.states), self.model.inputs_at_rest
+        return feature_system(self.features, *arrays, *reference)
 
     @property
     def spaces(self) -> ControlPeriods:

@@ -18,13 +18,13 @@ import numpy as np
 
 from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.vehicle.features import Layout
+from vehiclemor.reduction.vehicle.vehicle_inputs import VehicleInputs, unknown_input
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators.step_kernels import partners
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import Trajectory
 
 STEP = 6e-6
-INPUT_STEP = 1e-5
 # States that move less than this part of their range count as not moved; how often steering is
 # followed through the equations; relative singular values that are rounding.
 STILL, POWERS, RANK = 1e-6, 4, 1e-10
@@ -32,19 +32,21 @@ STILL, POWERS, RANK = 1e-6, 4, 1e-10
 SLIP_OUTPUTS = ("roll", *(f"slip_angle_{wheel}" for wheel in WHEELS))
 
 
-def no_steered_vehicle(model: Model) -> str:
-    """Why a model is no vehicle whose inputs are the steering and its derivatives."""
+def no_vehicle(model: Model) -> str:
+    """Why a model is no vehicle that is steered, driven and braked; else empty."""
     if len(getattr(model, "planar", ())) != 3:
         return f"{model.name} is no vehicle with a place and a heading on the road"
     missing = [name for name in SLIP_OUTPUTS if name not in model.outputs]
     if missing:
         return f"{model.name} has no output {', '.join(missing)}"
+    return unknown_input(model)
+
+
+def no_steered_vehicle(model: Model) -> str:
+    """Why a model is no vehicle whose inputs are the steering and its derivatives; else empty."""
     if driven := model.definition.choice.driven if hasattr(model, "definition") else ():
         return f"it reduces vehicles that steer alone; this one is driven by {driven[0]} too"
-    first, *others = model.inputs
-    if others != [f"{first}_dot", f"{first}_ddot"][: len(others)]:
-        return f"the inputs of {model.name} are not a steering and its derivatives"
-    return ""
+    return no_vehicle(model)
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,11 @@ class VehicleShape:
         return np.array([i for i in self.model.active if i not in left_out])
 
     @cached_property
+    def inputs(self) -> VehicleInputs:
+        """What the inputs do."""
+        return VehicleInputs(self.model.inputs)
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the shape's states."""
         return tuple(self.model.definition.states[i] for i in self.indices)
@@ -97,7 +104,7 @@ class VehicleShape:
     @property
     def speed(self) -> float:
         """Speed of straight running in m/s."""
-        return float(self.rates(self.reference[None], self._no_input(1))[1][0, 1])
+        return float(self.rates(self.reference[None], self.model.inputs_at_rest[None])[1][0, 1])
 
     @property
     def layout(self) -> Layout:
@@ -130,15 +137,15 @@ class VehicleShape:
 
     @cached_property
     def linearised(self) -> Linearisation:
-        """Derivatives at straight running without steering, by central differences."""
+        """Derivatives at straight running, by central differences."""
         n, inputs = len(self.indices), len(self.model.inputs)
         steps = STEP * np.maximum(1.0, np.abs(self.reference))
         shapes = np.tile(self.reference, (2 * (n + inputs), 1))
-        values = self._no_input(len(shapes))
+        values = np.tile(self.model.inputs_at_rest, (len(shapes), 1))
         for side, sign in enumerate((1.0, -1.0)):
             shapes[side : 2 * n : 2] += sign * np.diag(steps)
-            values[2 * n + side :: 2] += sign * INPUT_STEP * np.eye(inputs)
-        widths = 2.0 * np.concatenate([steps, np.full(inputs, INPUT_STEP)])
+            values[2 * n + side :: 2] += sign * np.diag(self.inputs.steps)
+        widths = 2.0 * np.concatenate([steps, self.inputs.steps])
         outputs = self.model.outputs_at(
             self.states(shapes, np.zeros((len(shapes), 3))), np.ascontiguousarray(values)
         )
@@ -156,8 +163,8 @@ class VehicleShape:
         the mirror: of a state without a partner, and against its partner's of any other.
         """
         # Not its modes: a symmetric one of the same frequency would be mixed with a lateral one.
-        linear = self.linearised
-        parts = [np.linalg.lstsq(linear.a, linear.b[:, :1], rcond=RANK)[0], linear.b]
+        linear, steering = self.linearised, self.linearised.b[:, : self.inputs.steering]
+        parts = [np.linalg.lstsq(linear.a, steering[:, :1], rcond=RANK)[0], steering]
         for _ in range(POWERS):
             parts.append(linear.a @ parts[-1])
         moved = np.hstack(parts)
@@ -169,9 +176,6 @@ class VehicleShape:
             turned_alike = i != j and moved[i] @ moved[j] <= 0.0
             matrix[i, j] = 1.0 if still or turned_alike else -1.0
         return matrix
-
-    def _no_input(self, samples: int) -> np.ndarray:
-        return np.zeros((samples, len(self.model.inputs)))
 
 
 def turned(states: np.ndarray, pairs: list[tuple[int, int]], angles: np.ndarray) -> np.ndarray:

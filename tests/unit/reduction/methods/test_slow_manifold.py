@@ -12,11 +12,13 @@ from vehiclemor.multibody.quantities import FIALA, WHEELS
 from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
+from vehiclemor.reduction.vehicle.axle_forces import Tire, WheelState, add_fiala
 from vehiclemor.reduction.vehicle.features import feature_columns
 from vehiclemor.reduction.vehicle.fitting import _sensitivities, improved, targets_of
 from vehiclemor.reduction.vehicle.linear_modes import slow_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.reduction.vehicle.slow_features import SlowFeatures, add_fiala
+from vehiclemor.reduction.vehicle.slow_features import SlowFeatures
+from vehiclemor.reduction.vehicle.vehicle_inputs import VehicleInputs
 from vehiclemor.simulation.build import build
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.scenario import Scenario, start_of, training_run
@@ -285,8 +287,9 @@ def test_the_tires_are_those_of_the_vehicle():
     run = car.simulate(case.maneuver, start_of(car, case))
     parameters = {name: float(car.parameters[name]) for name in FIALA}
     for wheel in WHEELS:
-        made = SlowFeatures(1, 0, 0)
-        force, turning, _ = add_fiala(made, wheel, made.z[0], made.z[1], (parameters, 1000.0))
+        made = SlowFeatures(1, 0, VehicleInputs(()))
+        state = WheelState(made.z[0], made.z[1], None, None)
+        force, turning, _ = add_fiala(made, wheel, state, Tire(parameters, 1000.0))
         made.line("force", 1000.0 * force)
         made.line("turning", 1000.0 * turning)
         terms = [("force",), ("turning",)]

@@ -28,7 +28,7 @@ def reduced_vehicle() -> System:
     c[2, 2] = -9.0
     c[4:6, 3:] = [[1.0, 0.5, -0.4], [1.0, 0.3, 0.7]]
     c[3, 0], c[4, 0], c[5, 1], c[5, 2] = 0.6, 0.9, -0.8, 0.7
-    return feature_system(features, np.zeros(0), c, np.ones(6), np.zeros(3))
+    return feature_system(features, np.zeros(0), c, np.ones(6), np.zeros(3), np.zeros(1))
 
 
 def in_frame(system: System, y: np.ndarray, matrix: np.ndarray) -> np.ndarray:
