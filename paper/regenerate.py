@@ -31,9 +31,11 @@ CLAIMS = PAPER / "claims.json"
 
 
 def stored(results: Path, name: str) -> Any:
-    """A dataset of the results folder, or the times of other tools."""
+    """A dataset of the results folder, or what a script of the paper has written there."""
     if name == "peers":
         return json.loads((results / "peers.json").read_text(encoding="utf-8"))
+    if name == "other_steering":
+        return xr.load_dataset(results / "other_steering.nc")
     return xr.load_dataset(results / "studies" / f"{name}.nc")
 
 

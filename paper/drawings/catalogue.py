@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from matplotlib.figure import Figure
 
-from drawings import fields, schematics, suspension, vehicles
+from drawings import coverage, fields, schematics, suspension, vehicles
 
 PROTOCOLS = [f"{kind}-{model}" for kind in ("contenders", "predictive") for model in fields.MODELS]
 
@@ -46,5 +46,6 @@ FIGURES: Mapping[str, Entry] = {
     "unseen-inputs": Entry(vehicles.figure_unseen, ["unseen-inputs", "unseen-inputs-ranks"]),
     "pareto": Entry(fields.figure_pareto, PROTOCOLS),
     "size": Entry(fields.figure_size, ["size"]),
+    "coverage": Entry(coverage.figure_coverage, ["other_steering"]),
     "peers": Entry(fields.figure_peers, ["peers"]),
 }

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import regenerate
+from drawings import coverage
 from drawings.catalogue import FIGURES
 from numbers_by_name import load
 from regenerate import PAPER, STYLE
@@ -76,6 +77,35 @@ def test_what_the_folder_lacks_stays_as_it_is(tmp_path, capsys, monkeypatch):
     assert regenerate.main() == 0
     assert "size.svg stays as it is" in capsys.readouterr().err
     assert (PAPER / "figures" / "size.svg").read_bytes() == before
+
+
+@pytest.fixture
+def other_steering():
+    """Runs of both vehicles, three at about 20 m/s and 4.5 m/s^2, one of which has failed."""
+    columns = {
+        "kind": ["speeds", "speeds", "speeds", "pulses"],
+        "speed": [18.0, 19.0, 32.5, 19.0],
+        "acceleration": [4.4, 4.6, 1.5, 4.5],
+        "score": [0.4, 3.0, np.inf, 50.0],
+        "warned": [False, False, True, False],
+    }
+    tables = [pd.DataFrame({"model": name, **columns}) for name in coverage.VEHICLES]
+    runs = pd.concat(tables, ignore_index=True).rename_axis("run").to_xarray()
+    return {"other_steering": runs.assign_coords(name=["searched"])}
+
+
+def test_coverage_shows_the_largest_error_of_each_cell_and_marks_what_is_undetected(other_steering):
+    with styled(STYLE):
+        figure = coverage.figure_coverage(other_steering)
+        checked(figure)
+    for axis in figure.axes[:2]:
+        cells = np.ma.filled(axis.images[0].get_array(), np.nan)
+        # Speeds from 17 to 20 m/s, and beyond 32 m/s what has failed, in the colour of the largest.
+        assert cells[4, 3] == 3.0
+        assert cells[1, 8] > 10.0
+        assert np.isfinite(cells).sum() == 2
+        right, warned, undetected = (line.get_xydata().tolist() for line in axis.lines)
+        assert (right, warned, undetected) == ([[18.0, 4.4]], [[32.5, 1.5]], [[19.0, 4.6]])
 
 
 def test_every_picture_of_the_text_is_there():

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -23,14 +23,15 @@ from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
+from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
-# Longest time in s between nodes: a fifth of the period of wheel hop.
-SPACING = 0.02
+# Of a first look and of a second one, where the first finds an error in bounds that is not small:
+# time in s between nodes, at last a tenth of the period of wheel hop, and how far corrections are
+# settled.
+LOOKS, SMALL = ((0.04, 1e-3), (0.01, 1e-4)), 0.5
 FEWEST_NODES = 8
-# Passes that are made in any case, and at most; what they find in bounds is settled where it is
-# small, or changes by no more than this part.
-FIRST_PASSES, MOST_PASSES, SMALL, SETTLED = 3, 10, 0.3, 0.1
+# What the estimate is multiplied by for its own error before a run is judged.
+RESERVE = 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,8 @@ class ErrorEstimate:
         Of the outputs.
     bounds
         Output -> measure and bound, by which the run is judged.
+    settled
+        Whether all corrections were small in the end.
     """
 
     times: np.ndarray
@@ -54,6 +57,7 @@ class ErrorEstimate:
     names: tuple[str, ...]
     units: tuple[str, ...]
     bounds: Mapping[str, ErrorBound]
+    settled: bool
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Estimated error (nodes,) of an output."""
@@ -76,14 +80,15 @@ class ErrorEstimate:
         return max((float(used[-1]) for used in self.used.values()), default=0.0)
 
     def trust(self) -> Trust:
-        """Trust of the run: its indicator is the estimated error in bounds."""
-        if not self.in_bounds > 1.0:
-            return Trust(self.in_bounds)
-        since = {name: used.searchsorted(1.0, "right") for name, used in self.used.items()}
+        """Trust of the run: its indicator is the estimated error in bounds, with a reserve."""
+        indicator = RESERVE * self.in_bounds
+        if not indicator > 1.0:
+            return Trust(indicator)
+        since = {n: used.searchsorted(1.0 / RESERVE, "right") for n, used in self.used.items()}
         first = min(since, key=lambda name: since[name])
         until, share = float(self.times[since[first]]), self.used[first][-1]
         size = "too large to be known" if np.isinf(share) else f"{share:.3g} times its bound"
-        return Trust(self.in_bounds, until, f"the estimated error of {first} is {size}")
+        return Trust(indicator, until, f"the estimated error of {first} is {size}")
 
 
 def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBound]:
@@ -110,64 +115,58 @@ def judged_run(
 ) -> Trajectory:
     """A run of a reduced model, judged by its estimated error in bounds, those of the model.
 
-    Where its output times are too far apart for an estimate, it is run with more of them.  Full
-    orders have no error, and a model with a fallback judges its runs itself.
+    Full orders have no error, and a model with a fallback judges its runs itself; so does a run
+    that comes with a complaint.  Where output times are too far apart for an estimate, it is made
+    of the same run with more of them.
     """
+    run = simulate(maneuver, start)
     known = model.definition.error_bounds if bounds is None else bounds
-    if not (known and estimates(model)) or getattr(reduced, "judges", False):
-        return simulate(maneuver, start)
-    parts = math.ceil(maneuver.duration / (maneuver.samples - 1) / SPACING - 1e-6)
-    if parts <= 1:
-        return judged(simulate(maneuver, start), start, known)
-    finer = judged(simulate(maneuver.subdivided(parts), start), start, known)
-    return finer.chosen(times=maneuver.times)
-
-
-def judged(run: Trajectory, start: Start, bounds: Mapping[str, ErrorBound]) -> Trajectory:
-    """A run with its error estimate, and the trust that follows from it."""
-    began = time.thread_time()
-    estimate = error_estimate(run, run.model.start(start), bounds) if run.finished else None
-    if estimate is None:
+    judges = getattr(reduced, "judges", False) or run.status not in WITHOUT_COMPLAINT
+    if judges or not (known and estimates(model)):
         return run
-    seconds = run.seconds + time.thread_time() - began
+    began, loops, estimate = time.thread_time(), run.seconds, None
+    for spacing, settled in LOOKS:
+        apart = maneuver.duration / (maneuver.samples - 1)
+        parts = math.ceil(apart / spacing - 1e-6)
+        finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
+        nodes = slice(0, finer.samples_to_stop, max(int(parts * spacing / apart + 1e-6), 1))
+        if len(finer.times[nodes]) < FEWEST_NODES:
+            return run
+        estimate = error_estimate(finer, nodes, model.start(start), known, settled)
+        if estimate.in_bounds < SMALL:
+            break
+    assert estimate is not None
     judged = run.judged(estimate.trust())
+    seconds = loops + time.thread_time() - began
     return Trajectory.of(**judged.__dict__ | {"error_estimate": estimate, "seconds": seconds})
 
 
 def error_estimate(
-    run: Trajectory, start: np.ndarray, bounds: Mapping[str, ErrorBound]
-) -> ErrorEstimate | None:
-    """Estimated errors of a run that has states, from a state (n,) of the full model.
+    run: Trajectory,
+    nodes: slice,
+    start: np.ndarray,
+    bounds: Mapping[str, ErrorBound],
+    settled: float,
+) -> ErrorEstimate:
+    """Errors of a run that has states, at some of its output times, equidistant ones.
 
-    None where the model is no vehicle on a plane road, or the run ends at once.
+    The start (n,) is that of the full model; corrections are settled so far, see `error_model`.
     """
     from vehiclemor.reduction.error_model import error_model
 
-    model, rows = run.model, slice(0, run.samples_to_stop, nodes_apart(run.times))
-    if not estimates(model) or len(run.times[rows]) < FEWEST_NODES:
-        return None
-    times = run.times[rows]
-    states, inputs = (np.ascontiguousarray(part[rows]) for part in (run.states, run.inputs))
-    own = model.outputs_at(states, inputs)
+    model, times = run.model, run.times[nodes]
+    states, inputs = (np.ascontiguousarray(part[nodes]) for part in (run.states, run.inputs))
+    errors, is_settled = np.full((len(times), len(model.outputs)), np.inf), False
+    if np.isfinite(states).all():
+        step = float(times[1] - times[0])
+        corrected, is_settled = error_model(model).corrected(step, states, inputs, start, settled)
+        if corrected is not None:
+            own = model.outputs_at(states, inputs)
+            errors = own - model.outputs_at(corrected, inputs)
     units = tuple(q.unit for q in model.definition.outputs)
-    found = ErrorEstimate(times, np.full(own.shape, np.inf), model.outputs, units, bounds)
-    step, last = float(times[1] - times[0]), np.inf
-    for number, corrected in enumerate(error_model(model).passes(step, states, inputs, start), 1):
-        if number < FIRST_PASSES:
-            continue
-        found = replace(found, errors=own - model.outputs_at(corrected, inputs))
-        size = found.in_bounds
-        if size < SMALL or abs(size - last) < SETTLED * size or number >= MOST_PASSES:
-            return found
-        last = size
-    return replace(found, errors=np.full(own.shape, np.inf))
+    return ErrorEstimate(times, errors, model.outputs, units, bounds, is_settled)
 
 
 def estimates(model: object) -> bool:
     """Whether errors of runs of a model can be estimated: it is a vehicle with a heading."""
     return isinstance(model, DynamicModel) and len(model.planar) == 3
-
-
-def nodes_apart(times: np.ndarray) -> int:
-    """How many output times (s) lie between nodes."""
-    return max(int(SPACING / (times[1] - times[0]) + 1e-6), 1)

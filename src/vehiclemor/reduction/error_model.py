@@ -6,15 +6,15 @@ drives an error e,
     e' = f(d + e, u) - d' = A e + (f(d + e, u) - d' - A e),
 
 in which A is their linearisation at straight running.  It is propagated exactly, mode by mode, and
-the bracket is taken from the pass before: deferred correction by an exponential integrator
-(A. Dutt, L. Greengard, V. Rokhlin, BIT 40, 2000, 241-266; M. Hochbruck, A. Ostermann, Acta
-Numerica 19, 2010, 209-286).  Constraints are met by Newton's method with a frozen Jacobian.
-Heading and position of the corrected shape are quadratures.
+the bracket is taken from the pass before, in windows of time one after another.  This is deferred
+correction by an exponential integrator (A. Dutt, L. Greengard, V. Rokhlin, BIT 40, 2000, 241-266;
+M. Hochbruck, A. Ostermann, Acta Numerica 19, 2010, 209-286).  Constraints are met by Newton's
+method with a frozen Jacobian.  Heading and position of the corrected shape
+are quadratures.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple
@@ -23,14 +23,17 @@ import numpy as np
 import scipy.linalg
 
 from vehiclemor.codegen.loops import loops
+from vehiclemor.codegen.operations import LANES
+from vehiclemor.reduction.error_loops import FullEquations, ModesOfErrors, Passes, Scratch, Shape
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.evaluation import at_samples
+from vehiclemor.simulation.evaluation import address_of, at_samples
 
 # Modes faster than this (1/s) start without an error: their start passes before it matters.
 FASTEST_START = 100.0
-# A corrected shape that is larger (m, rad) has gone to infinity.
-LARGEST = 1e6
+# Nodes in a window, and the most passes that it takes; least range of a coordinate of the shape, in
+# which changes are measured (m, rad, m/s, rad/s).
+WINDOW, MOST_PASSES, LEAST_RANGE = 17, 12, 1e-3
 # Step of differences; magnitude of a mode's rate times the step below which weights are series.
 DIFFERENCE, SERIES = 1e-6, 1e-3
 # Derivatives on equidistant nodes of order 4, times 12 steps: inside, and at the first two nodes.
@@ -50,36 +53,72 @@ class ErrorModel:
 
     shape: VehicleShape
 
-    def passes(
-        self, step: float, states: np.ndarray, inputs: np.ndarray, start: np.ndarray
-    ) -> Iterator[np.ndarray]:
-        """States (nodes, n) of the full model as each pass corrects them; none once they diverge.
+    def corrected(
+        self,
+        step: float,
+        states: np.ndarray,
+        inputs: np.ndarray,
+        start: np.ndarray,
+        settled: float,
+    ) -> tuple[np.ndarray | None, bool]:
+        """States (nodes, n) of the full model along a run, none if they can't be followed.
 
-        A path of states and inputs (nodes, inputs) at nodes that are a step in s apart; the start
-        (n,) is that of the full model.
+        Given are states of the run and inputs (nodes, inputs) at nodes that are a step in s apart,
+        and the start (n,) of the full model.  The truth value tells whether all changes were small
+        enough in the end to be settled.
         """
-        shape = self.shape
-        path = shape.of(states) - shape.reference
+        shape, nodes, modes = self.shape, len(states), self._modes
+        path = np.ascontiguousarray(shape.of(states) - shape.reference)
         # A method may record the start itself, through which its own motion does not pass.
         path[0] = 4.0 * path[1] - 6.0 * path[2] + 4.0 * path[3] - path[4]
-        path_rates, weights = self._modal(slopes(path, step)), self._weights(step)
-        first = self._modal(shape.of(start[None]) - shape.reference - path[:1])[0]
-        first[np.tile(np.abs(self._modes.rates) > FASTEST_START, 2)] = 0.0
-        corrected, errors = path.copy(), np.zeros_like(path_rates)
-        while True:
-            rates, motion = shape.rates(corrected + shape.reference, inputs)
-            found = np.empty_like(errors)
-            sources = self._modal(rates) - path_rates - self._times_rates(errors)
-            propagate = loops(("reduction.error_loops",), ("propagated",))["propagated"]
-            propagate(sources, weights, first, found)
-            change = (found - errors) @ self._modes.shapes
-            if self._free.correction.size:
-                change -= self._violations(corrected, inputs) @ self._free.correction
-            corrected, errors = corrected + change, found
-            if not np.abs(corrected).max() < LARGEST:
-                return
-            motion += change @ shape.linearised.velocity_a.T
-            yield self._states(corrected, motion, start, step)
+        path_rates = slopes(path, step) @ modes.coordinates
+        first = (shape.of(start[None]) - shape.reference - path[:1]) @ modes.coordinates
+        first[:, np.tile(np.abs(modes.rates) > FASTEST_START, 2)] = 0.0
+        errors = np.zeros_like(path_rates)
+        errors[0] = first
+        scale = np.maximum(np.ptp(path, axis=0), LEAST_RANGE)
+        scratch = Scratch(
+            np.zeros_like(states),
+            np.empty_like(states),
+            np.empty((nodes, len(self._free.correction))),
+            np.empty_like(errors),
+            errors,
+            np.empty(errors.shape[1]),
+            np.empty(path.shape[1]),
+        )
+        bundles = (
+            *self._bundles,
+            ModesOfErrors(
+                modes.coordinates,
+                modes.shapes,
+                self._weights(step),
+                self._free.correction,
+                np.ascontiguousarray(shape.linearised.velocity_a),
+            ),
+            Passes(WINDOW, MOST_PASSES, settled, scale),
+            scratch,
+        )
+        motion = np.empty((nodes, 3))
+        loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
+        unsettled = loop(inputs, path_rates, *bundles, path, motion)
+        if unsettled < 0:
+            return None, False
+        return self._states(path, motion, start, step), unsettled == 0
+
+    @cached_property
+    def _bundles(self) -> tuple[Shape, FullEquations]:
+        """The shape and the full equations, as the loop takes them."""
+        shape, model = self.shape, self.shape.model
+        x, y, heading = model.planar
+        pairs = np.array(shape.pairs, dtype=np.int64).reshape(-1, 2)
+        names = "derivative", "violations"
+        addresses = [
+            address_of(model.kernels, n, LANES) if n in model.kernels else 0 for n in names
+        ]
+        return (
+            Shape(shape.indices, np.array([heading, x, y]), pairs, shape.reference),
+            FullEquations(np.array(addresses), model.constants),
+        )
 
     def _states(
         self, corrected: np.ndarray, motion: np.ndarray, start: np.ndarray, step: float
@@ -112,7 +151,7 @@ class ErrorModel:
         *_, order = scipy.linalg.qr(kept.T, pivoting=True)
         free = np.sort(order[: kept.shape[1]])
         inverse = np.linalg.inv(np.vstack([np.eye(n)[free], jacobian]))
-        return Free(free, inverse[:, : len(free)], inverse[:, len(free) :].T)
+        return Free(free, inverse[:, : len(free)], np.ascontiguousarray(inverse[:, len(free) :].T))
 
     @cached_property
     def _modes(self) -> Modes:
@@ -125,20 +164,8 @@ class ErrorModel:
         left[free.indices] = inverse[upper].T
         return Modes(
             rates[upper],
-            np.hstack([left.real, left.imag]),
-            np.vstack([shapes.real.T, -shapes.imag.T]),
-        )
-
-    def _modal(self, deviations: np.ndarray) -> np.ndarray:
-        """Modal coordinates (samples, 2 modes) of deviations: real parts, then imaginary ones."""
-        return deviations @ self._modes.coordinates
-
-    def _times_rates(self, modal: np.ndarray) -> np.ndarray:
-        """Modal coordinates times the rates of their modes."""
-        real, imaginary = np.hsplit(modal, 2)
-        rates = self._modes.rates
-        return np.hstack(
-            [real * rates.real - imaginary * rates.imag, real * rates.imag + imaginary * rates.real]
+            np.ascontiguousarray(np.hstack([left.real, left.imag])),
+            np.ascontiguousarray(np.vstack([shapes.real.T, -shapes.imag.T])),
         )
 
     @lru_cache(maxsize=4)  # noqa: B019
@@ -151,6 +178,7 @@ class ErrorModel:
         mean = np.where(small, 1.0 + z / 2.0 + z**2 / 6.0, (decay - 1.0) / divisor)
         end = np.where(small, 0.5 + z / 6.0 + z**2 / 24.0, (mean - 1.0) / divisor)
         parts = decay, step * (mean - end), step * end
+        parts = (*parts, self._modes.rates)
         return np.array([half for part in parts for half in (part.real, part.imag)])
 
 

@@ -65,6 +65,7 @@ def simulate_many(
     outputs: Names = None,
     times: Any = None,
     jobs: int | None = None,
+    trust: str = "estimate",
 ) -> xr.Dataset:
     """Many runs in threads, each the same to the bit as if it were done alone.
 
@@ -91,6 +92,9 @@ def simulate_many(
         default.
     jobs
         Number of threads; by default as many as there are cores.
+    trust
+        Of a reduced vehicle `off` if its errors are not to be estimated, see
+        `ReducedOrderModel.simulate`.
 
     Returns
     -------
@@ -118,10 +122,13 @@ def simulate_many(
         size = 8e-9 * math.prod(shape)
         raise InputError(f"the result would take {size:.1f} GB of memory: choose outputs=, times=")
     values = np.empty(shape)
+    how: dict[str, Any] = {"outputs": names}
+    if choice("trust", trust, ("estimate", "off")) == "off" and given is not full:
+        how["trust"] = trust
 
     def written(run: int) -> tuple:
         """What else there is of a run, whose values are written."""
-        done = attempt(lambda: _whole_run(model_of(run), signals[run], begins[run], names))
+        done = attempt(lambda: _whole_run(model_of(run), signals[run], begins[run], how))
         values[run] = np.nan if isinstance(done, Failure) else done.outputs[rows[run]]
         return _report(done, full)
 
@@ -154,10 +161,10 @@ def _report(done: Trajectory | Failure, model: Model) -> tuple:
     return *own, *done.counts.values()
 
 
-def _whole_run(model: Any, signal: Excitation, start: Start, names: tuple[str, ...]) -> Trajectory:
+def _whole_run(model: Any, signal: Excitation, start: Start, how: Mapping[str, Any]) -> Trajectory:
     """A run with some outputs alone; it may have diverged."""
     try:
-        return model.simulate(signal, start, outputs=names)
+        return model.simulate(signal, start, **how)
     except ConvergenceError as error:
         if error.trajectory is None:
             raise

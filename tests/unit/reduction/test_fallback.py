@@ -112,8 +112,8 @@ def test_settings_reach_both_models():
     settings = {"tolerance": 1e-4, "fallback": "dopri5", "fallback_tolerance": TOLERANCE}
     reduced = fitted(method, vehicle, [], validated(method, "ode", settings))
     assert reduced.reduced.tolerance == 1e-4
-    # It has no trust indicator, so that the full order does all of its runs.
+    # A car that is linear lands otherwise.
     run = reduced.simulate(STEER, "dropped")
     np.testing.assert_array_equal(run.outputs, whole().outputs)
-    assert run.remark.startswith("full_order did the run: the reduced model does not judge itself")
+    assert run.remark.startswith("full_order did the run: the estimated error of ")
     assert fitted(method, vehicle, [], validated(method, "ode", {})).tolerance == 1e-3

@@ -104,11 +104,11 @@ def test_what_fails_is_a_result_beside_the_others(reduced, full):
     starts = ["equilibrium", thrown, *["equilibrium"] * 3]
     for model in (reduced, full, full.model):
         found = vm.simulate_many(model, signals, starts, **KEPT)
-        # A reduced car that comes to its end says that it leaves its ranges.
+        # A reduced car that comes to its end says that its error is large.
         failed = "untrusted" if model is reduced else "diverged"
         assert found.status.values.tolist() == ["ok", failed, "ok", "rejected", "ok"]
         assert "delta is" in found.message.item(3)
-        assert ("range" if model is reduced else "roll is") in found.message.item(1)
+        assert ("error" if model is reduced else "roll is") in found.message.item(1)
         assert np.isnan(found["values"][3]).all()
         assert np.isnan(found["values"][1]).all() == (model is not reduced)
         assert (found.rhs_calls.values > 0).tolist() == [True, True, True, False, True]

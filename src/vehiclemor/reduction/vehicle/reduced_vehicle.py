@@ -175,12 +175,11 @@ class ReducedVehicle(ReducedSystem):
         inputs = maneuver.recorded_inputs[1]
         state, encoded = self.known(start, inputs[0])
         run = self.run(maneuver, encoded, direct_until=0.0)
-        times, states = self.decoder.of_run(run, inputs)
-        trust = self._trust(times[: run.rows], states[: run.rows])
+        states = self.decoder.of_run(run, inputs)[1]
         if not len(run.point_of_sample) or run.point_of_sample[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(state)] = state
-        trajectory = self.model.recorded(maneuver, run, inputs, states, trust, outputs)
+        trajectory = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)
         run.give_back()
         return trajectory
 

@@ -49,35 +49,6 @@ def test_few_samples_are_lifted_alike(reduced):
     np.testing.assert_allclose(run.states[1:], states[1:], rtol=1e-9, atol=1e-12)
 
 
-def test_a_run_tells_how_far_it_has_gone(reduced):
-    maneuver, features = CARS[reduced.model.name], reduced.features
-    watched = replace(features, terms=tuple(name for name, _ in features.watched))
-
-    def indicator(run_of):
-        path = reduced.path(run_of, "equilibrium")[:, : features.states]
-        inputs = run_of.at(run_of.times)
-        return np.abs(feature_columns(watched, path, inputs, reduced.parameters))
-
-    within = reduced.simulate(maneuver.perturbed(1.0, 0.5), "equilibrium")
-    assert within.status == "ok"
-    assert within.trust.indicator < 1.0
-    assert within.trust.until == np.inf
-    beyond = maneuver.perturbed(1.2, 1.35)
-    run, expected = reduced.simulate(beyond, "equilibrium"), indicator(beyond)
-    assert run.status == "untrusted"
-    assert run.finished
-    assert run.trust.indicator == pytest.approx(expected.max(), rel=0.01)
-    first = beyond.times[(expected > 1.0).any(axis=1)][0]
-    assert run.trust.until == pytest.approx(first, abs=0.1)
-    named = {
-        text
-        for (_, text), column in zip(features.watched, expected.T, strict=True)
-        if column.max() > 1.0
-    }
-    assert any(run.trust.reason.startswith(text) for text in named)
-    assert run.message.endswith(f", from t = {run.trust.until:.4g} s on")
-
-
 def at_speed(reduced, start, speed):
     """State (2 n,) of a start at another speed."""
     return build(reduced.model.name, overrides={"initial_speed": speed}).start(start)

@@ -1,0 +1,104 @@
+"""Errors of reduced vehicles are estimated by the full equations, and judge their runs."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from reduced_models import in_bounds
+
+import vehiclemor as vm
+from tests.models import CAR
+from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.maneuver import registered
+from vehiclemor.study.plans.protocol import fixed_protocols, load_protocol
+
+# Random steering that no model is trained on.
+STEERING = {CAR: "random_steer:101", "high_fidelity_vehicle": "rack_random_steer:101"}
+
+
+@cache
+def shipped(name):
+    return vm.rom(name)
+
+
+def run_and_full(name, **how):
+    rom = shipped(name)
+    maneuver = replace(registered(STEERING[name]), **how)
+    return rom.simulate(maneuver), rom.model.simulate(maneuver)
+
+
+@pytest.mark.parametrize("name", STEERING)
+def test_it_is_the_error_of_a_run_that_was_not_trained_on(name):
+    run, full = run_and_full(name)
+    estimate, output = run.error_estimate, "lateral_position"
+    apart = (run[output] - full[output])[np.searchsorted(run.times, estimate.times - 1e-9)]
+    np.testing.assert_allclose(estimate[output], apart, atol=0.25 * np.abs(apart).max())
+    protocol = load_protocol(f"predictive-{name}")
+    assert estimate.in_bounds == pytest.approx(in_bounds(protocol, run, full), rel=0.25)
+
+
+@pytest.mark.parametrize("name", STEERING)
+def test_full_order_has_no_error(name):
+    rom = vm.reduce(name, "full_order")
+    run = rom.simulate(STEERING[name])
+    assert run.error_estimate is None
+    judged = replace(shipped(name), reduced=replace(rom.reduced, tolerance=1e-6))
+    object.__setattr__(judged.reduced, "judges", False)
+    assert judged.simulate(STEERING[name]).error_estimate.in_bounds < 0.2
+
+
+def test_a_run_with_few_output_times_has_the_same_estimate():
+    run, _ = run_and_full(CAR)
+    sparse, _ = run_and_full(CAR, samples=11)
+    assert len(sparse.times) == 11
+    assert sparse.error_estimate.in_bounds == pytest.approx(run.error_estimate.in_bounds, rel=0.3)
+
+
+def test_a_run_is_judged_by_the_bounds_that_are_given():
+    rom = shipped(CAR)
+    run = rom.simulate()
+    assert run.status == "ok"
+    assert run.trust.indicator == pytest.approx(1.25 * run.error_estimate.in_bounds)
+    largest = np.abs(run.error_estimate["yaw_rate"]).max()
+    strict = rom.simulate(bounds={"yaw_rate": 0.9 * largest})
+    assert strict.status == "untrusted"
+    assert "the estimated error of yaw_rate is 1.1" in strict.message
+    assert 0.0 < strict.trust.until < run.times[-1]
+    assert rom.simulate(bounds={"yaw_rate": ("rms", 0.9 * largest)}).status == "ok"
+    for wrong in ({"yow": 1.0}, {"yaw": 0.0}, {"yaw": ("mean", 1.0)}, 3.0):
+        with pytest.raises(InputError):
+            rom.simulate(bounds=wrong)
+
+
+def test_it_can_be_left_out():
+    rom = shipped(CAR)
+    run = rom.simulate(trust="off")
+    assert (run.status, run.trust, run.error_estimate) == ("ok", None, None)
+    assert run.remark == "its error was not estimated"
+    np.testing.assert_array_equal(run.outputs, rom.simulate().outputs)
+    times = np.linspace(0.0, 2.0, 101)
+    many = vm.simulate_many(rom, vm.many_signals(times, [0.01 * times]), trust="off")
+    assert many["remark"].item() == "its error was not estimated"
+    with pytest.raises(InputError, match="trust"):
+        rom.simulate(trust="none")
+
+
+def test_what_can_not_be_followed_is_not_trusted():
+    rom = shipped(CAR)
+    thrown = rom.model.start()
+    thrown[rom.model.definition.states.index("phi")] = 0.9
+    run = rom.simulate(start=thrown)
+    assert run.status == "untrusted"
+    assert run.trust.indicator > 10.0
+
+
+def test_bounds_are_those_of_the_studies():
+    for name in fixed_protocols():
+        protocol = load_protocol(name)
+        known = protocol.model.definition.error_bounds
+        if known:
+            bounds = protocol.definition.bounds.items()
+            assert {o: (b.measure, b.bound) for o, b in bounds} == {
+                o: (b.measure, b.bound) for o, b in known.items()
+            }
