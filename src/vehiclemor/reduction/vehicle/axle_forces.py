@@ -1,7 +1,7 @@
 """Forces of the axles as features, by the model's own tire law.
 
 Of tires with Fiala's law or the brush model, see `multibody/components/tires`, the forces are those
-of the law at slips, slip ratios and loads of all wheels that are sums of products of the arguments
+of the law at slips, thrusts and loads of all wheels that are sums of products of the arguments
 (two-track model with load transfer: M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge, 5th
 ed., Springer 2014).  Of any other tires they are powers of the mean slip of each axle.  Friction
 acts by similarity: what counts is a slip, or a torque, over the friction.
@@ -35,8 +35,9 @@ WHEEL_TERMS, DRIVEN_TERMS, RIDGE = 9, 15, 1e-12
 LEAST_LOAD = 0.02
 # Part of the slip at which all of a tire's contact slides that is trusted.
 SATURATION = 1.2
-# Least deflection of the contact, so that its direction is one.
-LEAST_DEFLECTION = 1e-9
+# Least deflection of the contact, so that its direction is one; Newton's steps to the deflection
+# that gives a tire its longitudinal force, and the largest part of the sliding one that they reach.
+LEAST_DEFLECTION, NEWTON, STEEPEST = 1e-9, 2, 0.9
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,14 @@ class Tire:
 
 @dataclass(frozen=True)
 class WheelState:
-    """Tangent of the slip angle, load in N and, with torques, slip ratio; friction, if not 1."""
+    """Tangent of the slip angle, load and, with torques, longitudinal force in N.
+
+    Friction where it is not 1.
+    """
 
     slip: Value
     load: Value
-    ratio: Value | None
+    thrust: Value | None
     friction: Value | None
 
 
@@ -77,15 +81,15 @@ class _WheelFit:
 
     def __init__(self, features: SlowFeatures, samples: ShapeSamples, z: np.ndarray) -> None:
         self.features, self.samples = features, samples
-        odd, even, ratios = wheel_terms(features)
-        columns = features.columns([*odd, *even, *ratios], z, samples.inputs)
+        odd, even, thrusts = wheel_terms(features)
+        columns = features.columns([*odd, *even, *thrusts], z, samples.inputs)
         first, last = len(odd), len(odd) + len(even)
         # Terms, their columns, and how many of the first ones every sum has.
         self.odd: Table = odd, columns[:, :first], len(LINEAR) + len(features.derivatives)
         self.even: Table = even, columns[:, first:last], 1
         # Zero in straight running at any speed, and zero without torques.
         self.turning: Table = even[2:], columns[:, first + 2 : last], 0
-        self.driven: Table = ratios, columns[:, last:], 0
+        self.driven: Table = thrusts, columns[:, last:], 0
 
     def __call__(self, values: np.ndarray, among: Table, more: int | None = None) -> Value:
         """The sum of terms that fits values (samples,), with so many terms more than needed."""
@@ -136,20 +140,16 @@ def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[
     slip, slip_half = features.let(small + curved), fit(slips @ HALF, fit.turning)
     load, load_half = fit(loads @ MEAN, fit.even), fit(loads @ HALF, fit.odd)
     tire = Tire({name: float(model.parameters[name]) for name in FIALA}, float(loads.mean()))
-    ratios: list[Value | None] = [None, None]
+    thrusts: list[Value | None] = [None, None]
     if features.inputs.torques:
-        grips = features.grips(axle, fit.samples.inputs)
-        values = fit.outputs(model, "slip_ratio", wheels) / grips[:, None]
-        ratio, ratio_half = fit(values @ MEAN, fit.driven), fit(values @ HALF, fit.odd)
-        grip = features.friction_of(axle)
-        ratios = [ratio + ratio_half, ratio - ratio_half]
-        if grip is not None:
-            ratios = [features.let(grip * each) for each in ratios]
+        values = fit.outputs(model, "Fx", wheels)
+        thrust, thrust_half = fit(values @ MEAN, fit.driven), fit(values @ HALF, fit.odd)
+        thrusts = [thrust + thrust_half, thrust - thrust_half]
     grips_of = [features.friction(wheel) for wheel in wheels]
     sides = (slip + slip_half, load + load_half), (slip - slip_half, load - load_half)
     states = [
-        WheelState(*side, ratio, grip)
-        for side, ratio, grip in zip(sides, ratios, grips_of, strict=True)
+        WheelState(*side, thrust, grip)
+        for side, thrust, grip in zip(sides, thrusts, grips_of, strict=True)
     ]
     left, right = (
         add_fiala(features, wheel, state, tire) for wheel, state in zip(wheels, states, strict=True)
@@ -168,23 +168,30 @@ def add_fiala(
 ) -> tuple[Value, Value, Value]:
     """Lateral force and aligning moment of a wheel, and its part that slides.
 
-    Forces as parts of the static load, moments as parts of it times the width.  Without slip ratio
-    it is Fiala's law at free rolling, else the brush model.
+    Forces as parts of the static load, moments as parts of it times the width.  Without torques it
+    is Fiala's law at free rolling, else the brush model, at the slip ratio that its longitudinal
+    force needs.
     """
     values, parameter, let = tire.values, features.parameter, features.let
     slip, load, least = let(state.slip), let(state.load), parameter(LEAST_LOAD * tire.static)
     load = let(0.5 * (load + least + abs(load - least)))
+    grip = load if state.friction is None else let(load * state.friction)
+    most = parameter(values["largest_friction"])
     fall = parameter(values["largest_friction"] - values["smallest_friction"])
-    ratio = None if state.ratio is None else let(state.ratio)
-    sliding = abs(slip) if ratio is None else let(np.sqrt(slip * slip + ratio * ratio))
-    limit = let(load * (parameter(values["largest_friction"]) - fall * sliding))
-    if state.friction is not None:
-        limit = let(limit * state.friction)
     across, deflection = let(parameter(values["cornering_stiffness"] / 3.0) * slip), None
-    if ratio is None:
+    if state.thrust is None:
+        limit = let(grip * (most - fall * abs(slip)))
         raw = let(across / limit)
     else:
-        along = let(parameter(values["longitudinal_slip_stiffness"] / 3.0) * ratio)
+        thrust, per_slip = let(state.thrust), values["longitudinal_slip_stiffness"] / 3.0
+
+        def friction_force(along: Value) -> Value:
+            ratio = let(parameter(1.0 / per_slip) * along)
+            return let(grip * (most - fall * np.sqrt(slip * slip + ratio * ratio)))
+
+        along = let(thrust * (1.0 / 3.0))
+        along = _deflected(features, along, across, (thrust, friction_force(along)))
+        limit = friction_force(along)
         nothing = parameter(LEAST_DEFLECTION * tire.static**2)
         deflection = let(np.sqrt(across * across + along * along + nothing))
         raw = let(deflection / limit)
@@ -197,3 +204,21 @@ def add_fiala(
         share = let(share * across / deflection)
     force = let(-share * (3.0 - 3.0 * abs(y) + y * y))
     return force, let(share * sticking * left), let(1.0 - sticking)
+
+
+def _deflected(
+    features: SlowFeatures, along: Value, across: Value, forces: tuple[Value, Value]
+) -> Value:
+    """Longitudinal deflection that gives a brush its thrust, by Newton steps from a first one.
+
+    Deflections times stiffness over 3, as the friction force and the thrust in N.
+    """
+    let, (thrust, limit) = features.let, forces
+    for _ in range(NEWTON):
+        part = let(np.sqrt(along * along + across * across + 1e-6 * limit * limit) / limit)
+        part = let(0.5 * (part + STEEPEST - abs(part - STEEPEST)))
+        force = let(3.0 - 3.0 * part + part * part)
+        steep = let(along / limit)
+        slope = let(force - (3.0 - 2.0 * part) * steep * steep / part)
+        along = let(along - (along * force - thrust) / slope)
+    return along

@@ -24,7 +24,7 @@ LEFT = (("D0",), ("D1",))
 
 
 def wheel_terms(features: SlowFeatures) -> tuple[list[Names], list[Names], list[Names]]:
-    """Odd and even terms of slips and loads of the wheels, and even ones of their slip ratios."""
+    """Odd and even terms of slips and loads of the wheels, and even ones of their thrust."""
     odd = [*LINEAR, *features.derivatives, *CUBIC, *FASTER]
     even = [ONE, FAST, *SQUARE, *FASTER_SQUARE]
     if not features.inputs.torques:
@@ -33,11 +33,11 @@ def wheel_terms(features: SlowFeatures) -> tuple[list[Names], list[Names], list[
     odd += LEFT
     even += [*((torque,) for torque in TORQUES), *product(TORQUES, FAST)]
     even += combinations_with_replacement(TORQUES, 2)
-    ratios = []
-    for use, size in zip(USES, ("g0", "g1"), strict=True):
-        ratios += [(use,), (use, size), (use, use, use), (use, "m"), (use, size, "m")]
-        ratios += [(use, *pair) for pair in SQUARE]
-    return odd, even, ratios
+    thrusts: list[Names] = []
+    for torque in TORQUES:
+        thrusts += [(torque,), (torque, "m"), *((torque, other) for other in TORQUES)]
+        thrusts += [(torque, *pair) for pair in SQUARE]
+    return odd, even, thrusts
 
 
 @dataclass(frozen=True)
@@ -95,6 +95,7 @@ def odd_candidates(features: SlowFeatures) -> list[Names]:
         for line in lines:
             terms += [(use, line), (size, line), (use, use, line), (use, size, line)]
             terms += [(use, line, "m"), (use, use, line, "m")]
+            terms += [(use, torque, line) for torque in TORQUES]
         terms += [(f"D{axle}", "m"), *product((f"D{axle}",), TORQUES)]
     return terms
 

@@ -123,15 +123,16 @@ def test_the_tire_is_the_brush_of_the_vehicle():
     short = ("c_long", "c_alpha", "mu_max", "mu_min", "width")
     of_oracle = {f"tyre.{key}": parameters[name] for key, name in zip(short, FIALA, strict=True)}
     made = SlowFeatures(3, 0, VehicleInputs(("friction_FL",)))
-    slip, load, ratio, _ = made.z
-    state = WheelState(slip, load, ratio, made.friction("FL"))
+    slip, load, thrust, _ = made.z
+    state = WheelState(slip, load, thrust, made.friction("FL"))
     force, moment, _ = add_fiala(made, "FL", state, Tire(parameters, 1000.0))
     made.line("force", 1000.0 * force)
     made.line("moment", 1000.0 * parameters["tire_width"] * moment)
     random = np.random.default_rng(5)
-    z = random.uniform([-0.2, 500.0, -0.2, 0.0], [0.2, 6000.0, 0.2, 0.0], (50, 4))
-    friction = random.uniform(0.3, 1.0, (50, 1))
-    columns = made.columns([("force",), ("moment",)], z, friction)
-    for (tan, vertical, kappa, _), (grip,), found in zip(z, friction, columns, strict=True):
-        _, lateral, aligning = brush(grip, vertical, kappa, tan, of_oracle)
-        np.testing.assert_allclose(found, [lateral, aligning], rtol=1e-6, atol=1e-3)
+    tan, kappa = random.uniform(-0.03, 0.03, 50), random.uniform(-0.015, 0.015, 50)
+    load, grip = random.uniform(2000.0, 6000.0, 50), random.uniform(0.7, 1.0, 50)
+    truth = np.array([brush(*row, of_oracle) for row in zip(grip, load, kappa, tan, strict=True)])
+    z = np.column_stack([tan, load, truth[:, 0], np.zeros(50)])
+    columns = made.columns([("force",), ("moment",)], z, grip[:, None])
+    for found, given in zip(columns.T, truth[:, 1:].T, strict=True):
+        np.testing.assert_allclose(found, given, rtol=0, atol=0.03 * np.abs(given).max())
