@@ -9,8 +9,9 @@ which lie on it, and the lag of the fast modes is learnt with them:
     z' = C phi(z, speed, u)
 
 Features phi are z, the inputs, the tire forces of the axles, and products that are chosen one after
-the other.  Heave and pitch, as slow as the lateral modes, are coordinates too.  The coefficients
-are improved on complete runs, since a heading that is off is a lateral position that is off.
+the other.  Heave and pitch, as slow as the lateral modes, are coordinates too.  What is linear for
+small steering at the model's speed is exact.  The other coefficients are improved on complete runs,
+since a heading that is off is a lateral position that is off.
 """
 
 import time
@@ -49,6 +50,7 @@ from vehiclemor.reduction.vehicle.shape import (
 )
 from vehiclemor.reduction.vehicle.slow_features import (
     AXLES,
+    HULL,
     Names,
     SlowFeatures,
     slow_features,
@@ -68,9 +70,9 @@ class SlowManifoldSettings(FallbackSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
-    terms: int = Field(24, ge=0, description="chosen products in the lateral equations")
+    terms: int = Field(48, ge=0, description="chosen products in the lateral equations")
     even_terms: int = Field(
-        16, ge=0, description="chosen products in those of speed, heave and pitch"
+        24, ge=0, description="chosen products in those of speed, heave and pitch"
     )
     ridge: float = Field(1e-12, ge=0.0, description="weight of the coefficients' size in the fit")
     steps: int = Field(8, ge=0, description="Gauss-Newton steps on whole training runs")
@@ -123,16 +125,18 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     if settings.steps:
         targets = targets_of(reduced, training, runs, settings.heading_error)
         (odd, lateral), (even, symmetric) = reduced.features.groups
-        # What torques of left wheels, heave and pitch do in straight running is exact, and speed is
-        # constant there.
+        # What small steering does is exact, and what torques of left wheels, heave and pitch do in
+        # straight running; speed is constant there.
         required = required_terms(listing)
-        odd, even = odd[len(required.left) :], even[len(required.straight) :]
+        odd, even = odd[len(required.small) :], even[len(required.straight) :]
         free = [(odd, i) for i in lateral]
         free += [(even, i) for i in symmetric]
         reduced = improved(reduced, targets, free, settings.steps)
-    reduced = _with_decoding(reduced, training, runs, samples, settings.ridge)
+    linear = listing.lateral + shape.inputs.steering
+    reduced = _with_decoding(reduced, training, runs, samples, linear, settings.ridge)
     return replace(
         reduced,
+        settling=modes.settling,
         offline=offline_cost(began, model, runs, len(samples.inputs)),
         solver=settings.solver,
         tolerance=settings.tolerance,
@@ -167,18 +171,18 @@ def _fitted_on_rates(
         return [terms[i] for i in forward_selection(columns, values, len(fixed), more)]
 
     required, even_others = required_terms(listing), even_candidates(listing)
-    left, straight = required.left, required.straight
-    turned = left_torques(shape, modes, listing)
-    lateral -= listing.columns(left, z, u) @ turned
-    odd = chosen(required.odd, odd_candidates(listing), lateral[:, :k], settings.terms)
+    small, straight, scale = required.small, required.straight, largest(z[:, :n])
+    exact, shapes = _small_motion(shape, modes, scale[:k], largest(u[:, : shape.inputs.steering]))
+    if shape.inputs.torques:
+        exact = np.vstack([exact, left_torques(shape, modes, listing)])
+    odd = chosen([*small, *required.odd], odd_candidates(listing), rates[:, :k], settings.terms)
     even = chosen(required.even, even_others, symmetric, settings.even_terms)
-    terms = [*left, *odd, *straight, *even]
-    columns, scale = listing.columns(terms, z, u), largest(z[:, :n])
-    first, last = len(left) + len(odd), len(terms) - len(even)
+    terms, known = [*odd, *straight, *even], len(small)
+    columns, first, last = listing.columns(terms, z, u), len(odd), len(odd) + len(straight)
     c = np.zeros((len(terms), n + 1 + PLANAR))
-    c[: len(left), listing.odd_columns] = turned
-    c[len(left) : first, listing.odd_columns] = ridge_fit(
-        columns[:, len(left) : first], lateral, settings.ridge
+    c[:known, listing.odd_columns] = exact
+    c[known:first, listing.odd_columns] = ridge_fit(
+        columns[:, known:first], lateral - columns[:, :known] @ exact, settings.ridge
     )
     # Straight running at any speed is an equilibrium: the terms 1 and speed make up U.
     forward_speed = n + 2
@@ -187,27 +191,45 @@ def _fitted_on_rates(
     c[first + 2 : last, forward_speed] = forward * scale[k:]
     c[last:, listing.even_columns] = ridge_fit(columns[:, last:], symmetric, settings.ridge)
     every_term = [*terms, *even_others]
-    linear = [*required.odd, *straight, *required.even]
+    linear = [*small, *required.odd, *straight, *required.even]
     decoded = chosen(linear, every_term, samples.deviations, DECODED)
-    lateral_terms = {*left, *odd}
-    decoded.sort(key=lambda term: term not in lateral_terms)
+    decoded.sort(key=lambda term: term not in odd)
+    decoding = np.zeros((len(decoded), len(shape.names)))
+    decoding[: len(shapes)] = shapes
     return ReducedVehicle(
         shape.model,
         shape,
         features=listing.of_terms(terms, first),
         parameters=np.array(listing.values),
         coefficients=c,
-        decoding=np.zeros((len(decoded), len(shape.names))),
+        decoding=decoding,
         encoding=modes.encoding,
         feedthrough=modes.input_shift,
         error_scale=np.concatenate([3.0 * scale, ABSOLUTE]),
-        decoded_features=listing.of_terms(decoded, sum(term in lateral_terms for term in decoded)),
+        decoded_features=listing.of_terms(decoded, sum(term in odd for term in decoded)),
     )
+
+
+def _small_motion(
+    shape: VehicleShape, modes: SlowModes, coordinates: np.ndarray, steering: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What small steering does at the model's speed: rates (terms, lateral + 2), shapes (terms, n).
+
+    Terms are the lateral coordinates, the steering and its derivatives, as parts of ranges.
+    """
+    k, linear, sideways = len(coordinates), shape.linearised, [0, 2]
+    scale = np.concatenate([coordinates, HULL * steering])[:, None]
+    shapes = np.vstack([modes.right[:, :k].T, modes.slaved.T])
+    rates = np.zeros((len(shapes), k + len(sideways)))
+    rates[: k + 1, :k] = np.vstack([modes.rates[:k, :k].T, modes.input_matrix[:k]])
+    rates[:, k:] = shapes @ linear.velocity_a[sideways].T
+    rates[k:, k:] += linear.velocity_b[sideways, : len(steering)].T
+    return scale * rates, scale * shapes
 
 
 def left_torques(shape: VehicleShape, modes: SlowModes, listing: SlowFeatures) -> np.ndarray:
     """Coefficients (terms, odd columns) of what left wheels have more, linearised."""
-    rows = np.zeros((len(required_terms(listing).left), len(listing.odd_columns)))
+    rows = np.zeros((len(AXLES), len(listing.odd_columns)))
     for axle in range(len(rows)):
         change = shape.inputs.left_torque(*AXLES[axle]) * listing.reach[f"D{axle}"]
         rates, velocity = response(shape, modes, change)
@@ -220,12 +242,13 @@ def _with_decoding(
     training: Training,
     runs: Sequence[Trajectory],
     samples: ShapeSamples,
+    linear: int,
     ridge: float,
 ) -> ReducedVehicle:
     """The reduced vehicle whose shapes are fitted along its own runs.
 
     Where one of these fails they are fitted along the training run.  Antisymmetric shapes use odd
-    terms, symmetric ones even terms.
+    terms, of which the first are linear and stay, symmetric ones even terms.
     """
     features, states = reduced.decoded_features, reduced.features.states
     assert features is not None
@@ -237,9 +260,11 @@ def _with_decoding(
     z = np.ascontiguousarray(np.concatenate(parts)[:, :states])
     columns = feature_columns(features, z, samples.inputs, reduced.parameters)
     decoding, image = reduced.decoding.copy(), samples.deviations @ reduced.shape.mirror.T
-    for (terms, _), sign in zip(features.groups, (-1, 1), strict=True):
-        values = 0.5 * (samples.deviations + sign * image)
-        decoding[list(terms)] = ridge_fit(columns[:, list(terms)], values, ridge)
+    odd, even = (list(terms) for terms, _ in features.groups)
+    known, odd = odd[:linear], odd[linear:]
+    antisymmetric = 0.5 * (samples.deviations - image) - columns[:, known] @ decoding[known]
+    decoding[odd] = ridge_fit(columns[:, odd], antisymmetric, ridge)
+    decoding[even] = ridge_fit(columns[:, even], 0.5 * (samples.deviations + image), ridge)
     return replace(reduced, decoding=decoding)
 
 

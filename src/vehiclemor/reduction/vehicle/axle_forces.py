@@ -9,6 +9,8 @@ acts by similarity: what counts is a slip, or a torque, over the friction.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from vehiclemor.reduction.vehicle.slow_features import AXLES, HULL, Names, SlowF
 from vehiclemor.simulation.dynamic import DynamicModel
 
 # Lines of an axle: sums of both wheels' lateral force, aligning moment and part of the contact that
-# sticks, and what the left one has more.
+# slides, and what the left one has more.
 FORCES = ("F", "M", "G", "FD", "MD", "GD")
 MEAN, HALF = np.array([0.5, 0.5]), np.array([0.5, -0.5])
 # Terms, their columns (samples, terms), and how many of the first ones a fit has in any case.
@@ -91,12 +93,18 @@ class _WheelFit:
 
     def __call__(self, values: np.ndarray, among: Table, more: int | None = None) -> Value:
         """The sum of terms that fits values (samples,), with so many terms more than needed."""
+        return self.features.let(reduce(add, self.parts(values, among, more)))
+
+    def parts(self, values: np.ndarray, among: Table, more: int | None = None) -> list[Value]:
+        """The sum of the terms that it has in any case, and that of the chosen ones."""
         terms, table, given = among
         most = DRIVEN_TERMS if self.features.inputs.torques else WHEEL_TERMS
         chosen = forward_selection(table, values[:, None], given, most if more is None else more)
         weights = ridge_fit(table[:, chosen], values, RIDGE)
-        factors = (product(self.features.term(terms[i])) for i in chosen)
-        return self.features.let(self.features.weighted(factors, weights))
+        products = [product(self.features.term(terms[i])) for i in chosen]
+        halves = [half for half in (slice(given), slice(given, None)) if products[half]]
+        sums = (self.features.weighted(products[half], weights[half]) for half in halves)
+        return [self.features.let(each) for each in sums]
 
     def outputs(self, model: DynamicModel, kind: str, wheels: Sequence[str]) -> np.ndarray:
         """An output of the training samples at wheels (samples, wheels)."""
@@ -117,7 +125,8 @@ def _add_powers(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence
         per_grip = features.let(clipped(features.let(slip / grip)))
         size = features.line(f"G{axle}", abs(per_grip))
         force = features.line(f"F{axle}", features.line(f"S{axle}", grip * per_grip) * size)
-    features.line(f"M{axle}", force * size)
+    moment = features.line(f"M{axle}", force * size)
+    features.by_name |= {f"FC{axle}": force, f"MC{axle}": moment}
 
 
 def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[str]) -> None:
@@ -127,7 +136,8 @@ def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[
         np.tan(fit.outputs(model, "slip_angle", wheels)),
         fit.outputs(model, "Fz", wheels),
     )
-    slip, slip_half = fit(slips @ MEAN, fit.odd), fit(slips @ HALF, fit.turning)
+    small, curved = fit.parts(slips @ MEAN, fit.odd)
+    slip, slip_half = features.let(small + curved), fit(slips @ HALF, fit.turning)
     load, load_half = fit(loads @ MEAN, fit.even), fit(loads @ HALF, fit.odd)
     tire = Tire({name: float(model.parameters[name]) for name in FIALA}, float(loads.mean()))
     thrusts: list[Value | None] = [None, None]
@@ -147,12 +157,16 @@ def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[
     for kind, one, other in zip(FORCES, left, right, strict=False):
         features.line(f"{kind}{axle}", one + other)
         features.line(f"{kind}D{axle}", one - other)
+    stiffness = 2.0 * tire.values["cornering_stiffness"] / tire.static
+    for kind, slope in (("F", -stiffness), ("M", stiffness / 3.0)):
+        proportional = features.parameter(slope) * small
+        features.line(f"{kind}C{axle}", features.by_name[f"{kind}{axle}"] - proportional)
 
 
 def add_fiala(
     features: SlowFeatures, wheel: str, state: WheelState, tire: Tire
 ) -> tuple[Value, Value, Value]:
-    """Lateral force and aligning moment of a wheel, and its part that still sticks.
+    """Lateral force and aligning moment of a wheel, and its part that slides.
 
     Forces as parts of the static load, moments as parts of it times the width.  Without torques it
     is Fiala's law at free rolling, else the brush model, at the slip ratio that its longitudinal
@@ -189,7 +203,7 @@ def add_fiala(
     if deflection is not None:
         share = let(share * across / deflection)
     force = let(-share * (3.0 - 3.0 * abs(y) + y * y))
-    return force, let(share * sticking * left), sticking
+    return force, let(share * sticking * left), let(1.0 - sticking)
 
 
 def _deflected(

@@ -46,14 +46,14 @@ class Required:
 
     Attributes
     ----------
-    left, straight
-        What left wheels have more, and straight running: odd and even ones whose coefficients are
-        those of the linearised vehicle.
+    small, straight
+        Small steering, with what left wheels have more of a torque, and straight running: odd and
+        even ones whose coefficients are those of the linearised vehicle.
     odd, even
         Others, whose coefficients are fitted.
     """
 
-    left: Sequence[Names]
+    small: Sequence[Names]
     straight: Sequence[Names]
     odd: Sequence[Names]
     even: Sequence[Names]
@@ -61,18 +61,19 @@ class Required:
 
 def required_terms(features: SlowFeatures) -> Required:
     """Terms that the equations always have."""
-    k, forces = features.lateral, [(f"{kind}{axle}",) for kind in "FM" for axle in (0, 1)]
-    odd = [*features.coordinates[:k], LINEAR[-1], *features.derivatives, *forces]
+    k, odd = features.lateral, [(f"{kind}C{axle}",) for kind in "FM" for axle in (0, 1)]
+    small = [*features.coordinates[:k], LINEAR[-1], *features.derivatives]
     straight = [ONE, (f"z{features.speed}",), *features.coordinates[k:]]
     if not features.inputs.torques:
-        return Required((), straight, odd, ())
-    odd += [*LINEAR[:-1], *(("m", *coordinate) for coordinate in features.coordinates[:k])]
-    return Required(LEFT, straight, odd, [(torque,) for torque in (*TORQUES, *USES)])
+        return Required(small, straight, odd, ())
+    changing = (*LINEAR[:-1], *features.coordinates[:k])
+    odd += [("m", *argument) for argument in changing]
+    return Required([*small, *LEFT], straight, odd, [(torque,) for torque in (*TORQUES, *USES)])
 
 
 def odd_candidates(features: SlowFeatures) -> list[Names]:
     """Odd terms that the equations may need besides."""
-    terms = [*CUBIC, *FASTER]
+    terms = [*CUBIC, *FASTER, *(("m", *term) for term in FASTER)]
     for axle in (0, 1):
         terms += [("m", f"F{axle}"), ("m", f"M{axle}")]
         terms += [(f"GD{axle}",)] if "GD" in features.forces else []
@@ -82,6 +83,8 @@ def odd_candidates(features: SlowFeatures) -> list[Names]:
     factors = (*ARGUMENTS, "F0", "F1")
     symmetric = features.coordinates[features.lateral :]
     terms += [(*coordinate, a) for coordinate in symmetric for a in factors]
+    others = [*SQUARE, *((f"G{axle}",) for axle in (0, 1))]
+    terms += [(*rate, *other) for rate in features.derivatives for other in others]
     if not features.inputs.torques:
         return terms
     terms += product(TORQUES, (*factors, "M0", "M1"))

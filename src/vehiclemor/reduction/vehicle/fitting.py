@@ -149,21 +149,20 @@ def free_entries(free: Free) -> tuple[np.ndarray, np.ndarray]:
 
 
 def improved(
-    reduced: ReducedVehicle, targets: Sequence[Target], free: Free, steps: int, power: float = 2.0
+    reduced: ReducedVehicle, targets: Sequence[Target], free: Free, steps: int
 ) -> ReducedVehicle:
     """The reduced vehicle after so many damped Gauss-Newton steps of its free coefficients.
 
-    The sum of so high a power of the runs' errors is minimised.  With 1 the worst runs
-    count no more than the others (iteratively reweighted least squares): of use from a first guess
-    on, where the errors of some are too large to say much.
+    The sum of the runs' errors is minimised, not that of their squares (iteratively reweighted
+    least squares): the worst runs, near a spin, count no more than the others.
     """
-    paths, error = _compared(reduced, targets, power)
+    paths, error = _compared(reduced, targets)
     terms, targeted = free_entries(free)
     change, moved, damping = np.zeros(len(terms)), reduced, DAMPING
     for _ in range(steps):
         if not np.isfinite(error):
             break
-        normal, gradient = normal_equations(moved, targets, paths, free, power)
+        normal, gradient = normal_equations(moved, targets, paths, free)
         scale = np.sqrt(np.diag(normal))
         # Of a feature that is zero in all samples.
         scale[scale == 0.0] = 1.0
@@ -173,7 +172,7 @@ def improved(
             coefficients = reduced.coefficients.copy()
             coefficients[terms, targeted] += change - step
             candidate = replace(reduced, coefficients=coefficients)
-            new, new_error = _compared(candidate, targets, power)
+            new, new_error = _compared(candidate, targets)
             if new_error < error:
                 change, moved, paths, error = change - step, candidate, new, new_error
                 damping *= 0.1
@@ -182,17 +181,15 @@ def improved(
     return moved
 
 
-def _compared(
-    reduced: ReducedVehicle, targets: Sequence[Target], power: float = 2.0
-) -> tuple[list[np.ndarray], float]:
-    """Reduced runs, and the sum of powers of their errors; infinite if one has failed."""
+def _compared(reduced: ReducedVehicle, targets: Sequence[Target]) -> tuple[list[np.ndarray], float]:
+    """Reduced runs, and the sum of their errors; infinite if one has failed."""
     paths, total = [], 0.0
     for target in targets:
         path = reduced.path(target.run.maneuver, target.run.start)
         if path is None:
             return [], np.inf
         paths.append(path)
-        total += float(np.sum(_errors(target, path) ** 2) ** (0.5 * power))
+        total += float(np.linalg.norm(_errors(target, path)))
     return paths, total
 
 
@@ -206,16 +203,15 @@ def normal_equations(
     targets: Sequence[Target],
     paths: Sequence[np.ndarray],
     free: Free,
-    power: float = 2.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Normal matrix and gradient of the sum of squares by the free coefficients."""
+    """Normal matrix and gradient of the sum of errors by the free coefficients."""
     size = sum(len(terms) for terms, _ in free)
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     for target, path in zip(targets, paths, strict=True):
         rows = _sensitivities(reduced, target, path, free, target.shares[:, None] * target.scale)
         rows = rows.reshape(-1, size)
         error = _errors(target, path).ravel()
-        weight = max(error @ error, NOTHING) ** (0.5 * power - 1.0)
+        weight = max(error @ error, NOTHING) ** -0.5
         normal += weight * (rows.T @ rows)
         gradient += weight * (rows.T @ error)
     return normal, gradient

@@ -37,6 +37,10 @@ class SlowModes:
     input_shift: np.ndarray
     # Deviation (n,) of the shape that follows the steering without delay.
     static_response: np.ndarray
+    # Deviation (n, inputs) of the shape by which faster motion follows steering and derivatives.
+    slaved: np.ndarray
+    # What fast motion in a deviation of the shape still adds to heading, X and Y (3, n).
+    settling: np.ndarray
     # Mode of the speed (n,), scaled so that U grows by one.
     speed_left: np.ndarray
     speed_right: np.ndarray
@@ -82,6 +86,8 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
     shift[:-1, :steering], driven = without_derivatives(rates, b[:, :steering])
     static = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=1e-10)[0]
     scale = linear.velocity_a[1] @ right[:, still].real
+    slow = v @ w + np.outer(right[:, still].real, left[still].real)
+    slaved, settling = fast_motion(shape, slow)
     return SlowModes(
         count,
         rates,
@@ -90,9 +96,31 @@ def slow_modes(shape: VehicleShape, fastest: float, symmetric: int = 0) -> SlowM
         driven,
         shift,
         static + v @ np.linalg.solve(rates, driven),
+        slaved,
+        settling,
         left[still].real * scale,
         right[:, still].real / scale,
     )
+
+
+def fast_motion(shape: VehicleShape, slow: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What follows the steering (n, inputs), and what adds to heading, X and Y (3, n) as it decays.
+
+    `slow` is the projection (n, n) on slow motion.  The rest e' = A e + d s soon follows as
+    e = -A^-1 d s - A^-2 d s' - A^-3 d s'' ...; free, it adds -A^-1 e to its integral.
+    """
+    linear = shape.linearised
+    follow, drive = without_derivatives(linear.a, linear.b[:, : shape.inputs.steering])
+    fast = np.eye(len(slow)) - slow
+    inverse = np.linalg.solve(linear.a @ fast + slow, fast)
+    column = -inverse @ drive
+    for j in range(follow.shape[1]):
+        follow[:, j] += column
+        column = inverse @ column
+    integral = -linear.velocity_a @ inverse
+    # Where the heading is still to change, the vehicle goes sideways.
+    integral[2] += shape.speed * integral[0] @ inverse
+    return follow, integral
 
 
 def response(

@@ -55,6 +55,8 @@ class ReducedVehicle(ReducedSystem):
     tolerance: float = 1e-6
     # Features of the decoding, with the same parameters, if not those of the equations.
     decoded_features: Features | None = None
+    # What of a start's deviation (n,) from the decoded shape goes to heading, X and Y (3, n).
+    settling: np.ndarray | None = None
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if kernels would read or write beyond these arrays."""
@@ -69,6 +71,8 @@ class ReducedVehicle(ReducedSystem):
         check_shapes("decoding", (self.decoding, len(decoded.terms), n))
         check_shapes("encoding", (self.encoding, k, n), (self.feedthrough, k, inputs))
         check_shapes("error_scale", (self.error_scale, k + PLANAR))
+        if self.settling is not None:
+            check_shapes("settling", (self.settling, PLANAR, n))
 
     @property
     def order(self) -> int:
@@ -123,8 +127,23 @@ class ReducedVehicle(ReducedSystem):
         return trust_of(times, decoded[:, self.decoder.layout.size :], names) if names else None
 
     def encode(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time."""
-        return self.encoded_path(state[None], inputs[None])[0]
+        """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time.
+
+        Fast motion that is about to decay is gone; where it leads the vehicle is not.
+        """
+        path = self.encoded_path(state[None], inputs[None])
+        if self.settling is None:
+            return path[0]
+        decoded = self.shape.of(self.decode(path, inputs[None]))
+        turn, forward, left = self.settling @ (self.shape.of(state[None]) - decoded)[0]
+        heading = path[0, -PLANAR]
+        cosine, sine = np.cos(heading), np.sin(heading)
+        path[0, -PLANAR:] += (
+            turn,
+            forward * cosine - left * sine,
+            forward * sine + left * cosine,
+        )
+        return path[0]
 
     def encoded_path(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced states (samples, states + 3) of full ones at inputs (samples, inputs)."""

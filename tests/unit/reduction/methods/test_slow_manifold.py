@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from vehiclemor.inputs.signal import Signal
 from vehiclemor.inputs.steering import lane_change, rack_lane_change, straight_ahead
 from vehiclemor.multibody.quantities import FIALA, WHEELS
 from vehiclemor.reduction.methods import slow_manifold
@@ -309,3 +310,29 @@ def test_states_in_which_its_tires_slide_are_beyond_its_training():
     assert reduced.trust(path, inputs).indicator > 1.0
     watched = [what for _, what in reduced.features.watched]
     assert all(any(wheel in what for what in watched) for wheel in WHEELS)
+
+
+def worst(run, full, name):
+    """Largest error of an output as part of its range."""
+    return np.abs(of(run, name) - of(full, name)).max() / np.abs(of(full, name)).max()
+
+
+def test_small_steering_is_exact_however_little_was_learnt():
+    steering = rack_lane_change.perturbed(1.0, 0.01)
+    full = high_fidelity().simulate(steering)
+    run = replace(with_tires(), tolerance=1e-6).simulate(steering, "equilibrium")
+    assert worst(run, full, "yaw") < 2e-4
+    assert worst(run, full, "yaw_rate") < 2e-4
+    assert worst(run, full, "lateral_speed") < 0.02
+
+
+def test_steering_may_move_already_when_a_run_begins():
+    times = np.linspace(0.0, 4.0, 201)
+    values = 1e-4 * np.sin(3.0 * times) * np.exp(-2.0 * times)
+    steering = Signal.from_samples(times, values, "cubic", inputs=["s"], name="begun")
+    full = high_fidelity().simulate(steering)
+    run = replace(with_tires(), tolerance=1e-6).simulate(steering, "equilibrium")
+    # Fast motion is over: where it has led to is known.
+    for name in ("yaw", "lateral_position"):
+        off = of(run, name)[-1] - of(full, name)[-1]
+        assert abs(off) < 5e-4 * np.abs(of(full, name)).max()
