@@ -97,7 +97,9 @@ def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBo
         raise InputError(f"bounds is {quoted(bounds)}, not bounds by output")
     checked = {}
     for name, value in bounds.items():
-        pair = value if isinstance(value, tuple | list) and len(value) == 2 else ("max", value)
+        pair: Any = value if isinstance(value, tuple | list) else ("max", value)
+        if len(pair) != 2:
+            raise InputError(f"bound of {name} is {quoted(value)}, not a measure and a number")
         choice("output of bounds", name, model.outputs)
         measure = choice(f"measure of {name}", pair[0], ("max", "rms"))
         check_positive(f"bound of {name}", pair[1])

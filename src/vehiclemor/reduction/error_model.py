@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -66,13 +66,9 @@ class ErrorModel:
         """
         nodes, modes = len(states), self._modes
         n, count = modes.coordinates.shape
-        rooms = states.shape[1], states.shape[1], len(self._free.correction), n, 3
-        scratch = Scratch(
-            *(np.empty((nodes, columns)) for columns in (*rooms, count, count, count)),
-            np.empty(count),
-            np.empty(n),
-            np.empty(n),
-        )
+        widths = 2 * [states.shape[1]] + [len(self._free.correction), n, 3] + 3 * [count]
+        rooms: list[Any] = [np.empty((nodes, columns)) for columns in widths]
+        scratch = Scratch(*rooms, *(np.empty(size) for size in (count, n, n)))
         of_errors = ModesOfErrors(
             modes.coordinates,
             modes.shapes,
@@ -129,10 +125,11 @@ class ErrorModel:
     def _modes(self) -> Modes:
         """Modes of the free coordinates; of a conjugate pair the upper one."""
         free = self._free
-        rates, vectors = np.linalg.eig(self.shape.linearised.a[free.indices] @ free.shapes)
+        found: Any = np.linalg.eig(self.shape.linearised.a[free.indices] @ free.shapes)
+        rates, vectors = found
         inverse, upper = np.linalg.inv(vectors), rates.imag >= 0.0
         shapes = (free.shapes @ vectors[:, upper]) * np.where(rates[upper].imag > 0.0, 2.0, 1.0)
-        left = np.zeros((len(self.shape.indices), upper.sum()), dtype=complex)
+        left: Any = np.zeros((len(self.shape.indices), upper.sum()), dtype=complex)
         left[free.indices] = inverse[upper].T
         return Modes(
             rates[upper],
@@ -143,7 +140,7 @@ class ErrorModel:
     @lru_cache(maxsize=4)  # noqa: B019
     def _weights(self, step: float) -> np.ndarray:
         """Weights of a step in s, see `error_loops`."""
-        z = self._modes.rates * step
+        z: Any = self._modes.rates * step
         small = np.abs(z) < SERIES
         divisor = np.where(small, 1.0, z)
         decay = np.exp(z)
@@ -168,6 +165,6 @@ class Free(NamedTuple):
 class Modes(NamedTuple):
     """Rates (modes,) in 1/s, coordinates of deviations (n, 2 modes), and back (2 modes, n)."""
 
-    rates: np.ndarray
+    rates: Any
     coordinates: np.ndarray
     shapes: np.ndarray

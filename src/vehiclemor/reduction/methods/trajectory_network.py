@@ -48,9 +48,9 @@ def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> 
 
 def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> LearnedModel:
     with installed("jax-sysid", "trajectories"):
-        import jax
-        import jax.numpy as jnp
-        from jax_sysid.models import Model
+        import jax  # pyright: ignore[reportMissingImports]
+        import jax.numpy as jnp  # pyright: ignore[reportMissingImports]
+        from jax_sysid.models import Model  # pyright: ignore[reportMissingImports]
         from sklearn.linear_model import LinearRegression
         from sklearn.neural_network import MLPRegressor
 
