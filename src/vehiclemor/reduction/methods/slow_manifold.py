@@ -82,18 +82,6 @@ class SlowManifoldSettings(FallbackSettings):
         description="error of heading in rad that the steps weigh like 0.03 m of place; by "
         "default the paper's bound on yaw, which also judges",
     )
-    trusted: float = Field(
-        1.0,
-        gt=0.0,
-        description="a run whose arguments leave this multiple of their training range isn't "
-        "trusted",
-    )
-    reversal: float = Field(
-        0.5,
-        gt=0.0,
-        description="largest part of the training's product of steering and its rate that is "
-        "trusted, where the rate is an input",
-    )
     solver: Solver = "etdrk4"
     tolerance: Tolerance = 1e-3
 
@@ -118,7 +106,7 @@ def fit(model: DynamicModel, training: Training, settings: SlowManifoldSettings)
     runs, shape = [run.recorded() for run in training], VehicleShape(model)
     modes = slow_modes(shape, settings.fastest, SYMMETRIC)
     samples = shape_samples(shape, runs)
-    listing = slow_features(shape, modes, samples, settings.trusted, settings.reversal)
+    listing = slow_features(shape, modes, samples)
     z = modes.coordinates(samples.deviations, samples.inputs)
     add_axles(listing, model, samples, z)
     reduced = _fitted_on_rates(shape, modes, listing, samples, settings)

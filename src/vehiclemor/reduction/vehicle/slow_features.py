@@ -143,20 +143,13 @@ class SlowFeatures(FeatureListing):
         return np.stack(columns, axis=1) if columns else np.zeros((len(z), 0))
 
 
-def slow_features(
-    shape: VehicleShape, modes: SlowModes, samples: ShapeSamples, trusted: float, reversal: float
-) -> SlowFeatures:
-    """Lines of arguments, with the ranges that they have in training samples.
-
-    A run isn't trusted whose arguments leave the multiple `trusted` of their training range, or the
-    product of steering and its rate the multiple `reversal`: where much steering is taken back
-    fast, loads lag behind.
-    """
+def slow_features(shape: VehicleShape, modes: SlowModes, samples: ShapeSamples) -> SlowFeatures:
+    """Lines of arguments, with the ranges that they have in training samples."""
     z = modes.coordinates(samples.deviations, samples.inputs)
     features = SlowFeatures(modes.lateral, len(modes.rates) - modes.lateral, shape.inputs)
-    _add_arguments(features, shape, modes, (z, samples.inputs), (HULL / trusted, reversal))
+    _add_arguments(features, shape, modes, (z, samples.inputs))
     if shape.inputs.torques:
-        _add_torques(features, shape, (z, samples.inputs), HULL / trusted)
+        _add_torques(features, shape, (z, samples.inputs))
     return features
 
 
@@ -165,7 +158,6 @@ def _add_arguments(
     shape: VehicleShape,
     modes: SlowModes,
     samples: tuple[np.ndarray, np.ndarray],
-    edges: tuple[float, float],
 ) -> None:
     """Lines of the arguments in [-1, 1], `raw` before they are clipped, and what is watched."""
     (z, u), k, speed, linear = samples, features.lateral, features.speed, shape.linearised
@@ -186,16 +178,12 @@ def _add_arguments(
     steered = features.u[: steering.shape[1]]
     others = steered[0], features.z[speed], *steered[1:]
     lines += [features.parameter(1.0 / most) * x for x, most in zip(others, reach[4:], strict=True)]
-    factor, names = features.parameter(edges[0]), (*NAMES, *DERIVATIVES[: len(steered) - 1])
+    factor, names = features.parameter(HULL), (*NAMES, *DERIVATIVES[: len(steered) - 1])
     for i, (line, name) in enumerate(zip(lines, names, strict=True)):
         raw = features.line(f"raw{i}", line)
         features.watched.append((factor * raw, name))
     for i, name in enumerate((*ARGUMENTS, "m")):
         features.line(name, clipped(features.by_name[f"raw{i}"]))
-    if len(steered) > 1:
-        most = edges[1] * largest(u[:, :1] * u[:, 1:2])
-        reversal = features.weighted([features.u[0] * features.u[1]], 1.0 / most)
-        features.watched.append((reversal, "reversal of the steering"))
     for (name,), coordinate, most in zip(features.coordinates, features.z, sizes, strict=False):
         features.line(name, features.parameter(1.0 / most) * coordinate)
 
@@ -204,7 +192,6 @@ def _add_torques(
     features: SlowFeatures,
     shape: VehicleShape,
     samples: tuple[np.ndarray, np.ndarray],
-    edge: float,
 ) -> None:
     """Lines of the torques of each axle, as parts of the training range.
 
@@ -228,6 +215,6 @@ def _add_torques(
         features.line(name, features.parameter(1.0 / most) * features.by_name[name])
     for axle in (0, 1):
         use, name = features.by_name[f"t{axle}"], f"torque of axle {axle + 1}"
-        features.watched.append((features.parameter(edge / HULL) * use, name))
+        features.watched.append((use, name))
         clip = features.line(f"t{axle}", clipped(use))
         features.line(f"g{axle}", abs(clip))
