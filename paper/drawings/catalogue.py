@@ -47,4 +47,5 @@ FIGURES: Mapping[str, Entry] = {
     "pareto": Entry(fields.figure_pareto, PROTOCOLS),
     "size": Entry(fields.figure_size, ["size"]),
     "peers": Entry(fields.figure_peers, ["peers"]),
+    "steps": Entry(fields.figure_steps, ["steps"]),
 }
