@@ -3,7 +3,8 @@ A thousand plans a tick
 =======================
 
 A path-integral controller needs no derivatives: it tries a thousand steering signals by
-``simulate_many`` and steers by their mean, weighted by cost. The full car drives around an obstacle.
+``simulate_many`` and steers by their mean, weighted by cost. The full car drives around an
+obstacle.
 """
 
 # %%

@@ -69,7 +69,7 @@ def sources(results: Path) -> Iterator[tuple[str, str, Callable[[], Iterator[Ent
     yield "data/published/masoudi2015.toml", "", published
     yield "src", "", operations
     yield "studies", "vehiclemor compare paper", partial(comparison, results)
-    for name in ("in_use", "other_steering"):
+    for name in ("in_use", "other_steering", "control"):
         file = f"{name}.nc"
         yield file, f"python paper/{name}.py", partial(of_file, partial(named_values, name), file)
     yield "peers.json", "tox -e peers", partial(of_file, peers, "peers.json")
