@@ -46,13 +46,13 @@ class OfflineCost:
 
 
 @contextmanager
-def installed(library: str) -> Iterator[None]:
+def installed(library: str, extra: str = "contenders") -> Iterator[None]:
     """Where a method imports its library; `InputError` that says how to install it."""
     try:
         yield
     except ImportError as error:
         raise InputError(
-            f'this method needs {library}; install it by: pip install "vehiclemor[contenders]"'
+            f'this method needs {library}; install it by: pip install "vehiclemor[{extra}]"'
         ) from error
 
 

@@ -1,34 +1,35 @@
-"""Samples of training runs, as general learners take them: states, rates, inputs, what follows.
+"""Samples of training runs, as general learners take them, and the coordinates they learn in.
 
 Of a vehicle the states are its shape, and heading and position follow by quadratures (see
 `vehicle.shape`); of a structure coordinates and rates about the static state; of a mechanism there
 are none, since its coordinates follow from the inputs.  States are taken relative to the model's
-first start, and turned into their principal components, each standardised.
+first start.
 """
 
 import time
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.training import Training, TrainingRun
+from vehiclemor.reduction.vehicle.linear_modes import slow_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
 from vehiclemor.simulation.model import Model
 
-# Most samples of a fit, equidistant.
+# Most samples of a regression, equidistant.
 MOST_SAMPLES = 30_000
 # Components below this part of the first one are rounding.
 ROUNDING = 1e-9
 # A first component below it, in SI units, is the error of full-order runs: nothing moves.
 RESTING = 1e-6
-# Rates of states in SI units below which the start is at rest.
-STILL = 1e-6
 # Fewer samples are refused.
 FEWEST = 10
+# Of the slow coordinates of a vehicle: fastest |lambda| (1/s), and heave and pitch.
+FASTEST, SYMMETRIC = 45.0, 2
 
 
 def online_inputs(model: Model, inputs: np.ndarray) -> np.ndarray:
@@ -51,64 +52,39 @@ class States:
         steered = model.kind in ("ode", "dae") and not no_steered_vehicle(model)
         return cls(model, VehicleShape(model) if steered else None)
 
-    def check_sizes(self) -> None:
-        """There are none."""
-
-    @property
-    def planar(self) -> int:
-        """Number of quadratures: heading and position of a vehicle."""
-        return 3 if self.shape else 0
-
     def of(self, states: np.ndarray) -> np.ndarray:
         """Deviations (samples, n) of full states from the first start."""
         if self.shape:
             return self.shape.of(states) - self.shape.reference
         return states - self.model.start()
 
-    def back(self, deviations: np.ndarray, planar: np.ndarray) -> np.ndarray:
-        """Full states of deviations, and of heading and position (samples, 3) of a vehicle."""
-        if self.shape:
-            return self.shape.states(deviations + self.shape.reference, planar[:, [1, 2, 0]])
-        return deviations + self.model.start()
 
-    def planar_of(self, state: np.ndarray) -> np.ndarray:
-        """Heading and position of a state, nothing if the model has neither."""
-        if not self.shape:
-            return np.zeros(0)
-        x, y, heading = self.model.planar
-        return state[[heading, x, y]]
+class RunSamples(NamedTuple):
+    """Equidistant samples of one training run."""
+
+    inputs: np.ndarray  # (samples, inputs)
+    deviations: np.ndarray  # (samples, n)
+    # What a run is made of (samples, m): the outputs of a structure, else deviations, and behind
+    # them psi', U, V of a vehicle less those of straight running.
+    values: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Equidistant samples of training runs, each with the one that follows it."""
+    """Samples of all training runs."""
 
-    states: States  # Meaning of the columns of `deviations`.
-    spacing: float  # Time in s to the sample that follows.
-    # (samples, inputs).
-    inputs: np.ndarray
-    next_inputs: np.ndarray
-    # (samples, n).
-    deviations: np.ndarray
-    next_deviations: np.ndarray
-    rates: np.ndarray
-    # psi', U, V (samples, 3) of a vehicle, less those of straight running; else (samples, 0).
-    motion: np.ndarray
-    outputs: np.ndarray  # (samples, outputs) of a structure, else (samples, 0).
+    states: States  # Meaning of the deviations.
+    spacing: float  # Time in s between samples.
+    runs: tuple[RunSamples, ...]
     # Of the full model's equations; CPU time of the process.
     evaluations: int
     seconds: float
 
-    @property
-    def constant(self) -> bool:
-        """Whether learnt equations need a constant: the first start is not at rest."""
-        model = self.states.model
-        if self.states.shape or model.kind == "structural":
-            return False
-        if model.kind == "ae":
-            return True
-        rest = model.rhs_at(model.start()[None], np.zeros((1, len(model.inputs))))[0]
-        return bool(np.abs(rest).max() > STILL)
+
+def thinned(histories: list[np.ndarray]) -> np.ndarray:
+    """Rows of all runs, at most about `MOST_SAMPLES`, equidistant."""
+    every = ceil(sum(map(len, histories)) / MOST_SAMPLES)
+    return np.concatenate([history[::every] for history in histories])
 
 
 def gathered(model: Any, training: Training, steps: int, skipped: float) -> Samples:
@@ -137,68 +113,71 @@ def _gathered(model: Any, runs: tuple[Any, ...], steps: int, skipped: float) -> 
     count = sum((maneuver.samples - 1) * steps for maneuver in maneuvers)
     if count < FEWEST:
         raise InputError(f"learned models need at least {FEWEST} samples of training, not {count}")
-    every = ceil(count / MOST_SAMPLES)
-    parts = [_of_run(states, run, steps, every, skipped) for run in training]
-    *histories, evaluations = zip(*parts, strict=True)
-    arrays = [np.concatenate(history) for history in histories]
+    found = [_of_run(states, run, steps, skipped) for run in training]
+    parts, evaluations = zip(*found, strict=True)
     seconds = time.process_time() - began
-    return Samples(states, spacings[0], *arrays, evaluations=sum(evaluations), seconds=seconds)
+    return Samples(states, spacings[0], parts, sum(evaluations), seconds)
 
 
-def _of_run(
-    states: States, run: TrainingRun, steps: int, every: int, skipped: float
-) -> tuple[Any, ...]:
-    """Histories of every so many samples of a run, as in `Samples`; evaluations of its equations.
-
-    Each sample is followed by another one of the same run, so that the last one is left out.
-    """
+def _of_run(states: States, run: TrainingRun, steps: int, skipped: float) -> tuple[RunSamples, int]:
+    """Samples of a run, and evaluations of its equations."""
     model: Any = run.model
     maneuver = run.maneuver.subdivided(steps)
-    last = maneuver.samples - 1
-    first = int(min(skipped / maneuver.duration, 0.5) * last)
-    rows = np.arange(first, last, every)
+    rows = slice(int(min(skipped / maneuver.duration, 0.5) * (maneuver.samples - 1)), None)
+    further = 0
     if model.kind == "structural":
         full = model.run(maneuver, recorded=True)
         # Runs record coordinates alone.
         speeds = np.gradient(full.coordinates, full.times, axis=0, edge_order=2)
-        deviations = np.hstack([full.coordinates, speeds])
-        rates = np.gradient(deviations, full.times, axis=0, edge_order=2)[rows]
-        motion, outputs = rates[:, :0], full.outputs[rows]
+        deviations, values = np.hstack([full.coordinates, speeds])[rows], full.outputs[rows]
     else:
         full = replace(run, maneuver=maneuver).recorded()
-        motion = outputs = full.states[rows, :0]
-        if model.kind == "ae":
-            deviations, rates = full.coordinates, np.zeros_like(full.states[rows])
-        elif states.shape:
-            shape, deviations = states.shape, states.of(full.states)
-            rates, motion = shape.rates(deviations[rows] + shape.reference, full.inputs[rows])
-            motion = motion - [0.0, shape.speed, 0.0]
-        else:
-            deviations = states.of(full.states)
-            rates = model.rhs_at(full.states[rows], full.inputs[rows])
-    inputs = online_inputs(model, full.inputs)
-    return (
-        inputs[rows],
-        inputs[rows + 1],
-        deviations[rows],
-        deviations[rows + 1],
-        rates,
-        motion,
-        outputs,
-        full.counts[model.evaluations] + len(rows),
-    )
+        static = model.kind == "ae"
+        values = deviations = (full.coordinates if static else states.of(full.states))[rows]
+        if shape := states.shape:
+            motion = shape.rates(deviations + shape.reference, full.inputs[rows])[1]
+            values = np.hstack([deviations, motion - [0.0, shape.speed, 0.0]])
+            further = len(motion)
+    samples = RunSamples(online_inputs(model, full.inputs)[rows], deviations, values)
+    return samples, full.counts[model.evaluations] + further
 
 
-def components(samples: Samples, rank: int) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """Coordinates in which a learner works: linear in deviations and inputs."""
+
+    forward: np.ndarray  # Per deviation (r, n).
+    shift: np.ndarray  # What is subtracted, per input (r, inputs).
+
+    def of(self, deviations: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Coordinates (samples, r) of deviations and inputs (samples, inputs)."""
+        return deviations @ self.forward.T - inputs @ self.shift.T
+
+    def standardised(self, samples: Samples) -> "Coordinates":
+        """The same coordinates with a mean square of 1 along the samples."""
+        z = thinned([self.of(run.deviations, run.inputs) for run in samples.runs])
+        size = np.sqrt((z**2).mean(axis=0))[:, None]
+        size[size == 0.0] = 1.0
+        return Coordinates(self.forward / size, self.shift / size)
+
+
+def principal(samples: Samples, rank: int) -> Coordinates:
     """The first principal components of the samples, at most as many as they span.
 
-    Components of mean square 1 per deviation (r, n), and deviations per component (n, r).
     States stand in SI units: scaled by their ranges, ringing of the wheels would come first, and
     learned models of it were unstable.  `InputError` if nothing moves.
     """
-    _, sizes, rows = np.linalg.svd(samples.deviations, full_matrices=False)
-    if sizes[0] < RESTING * np.sqrt(len(samples.deviations)):
+    deviations = thinned([run.deviations for run in samples.runs])
+    _, sizes, rows = np.linalg.svd(deviations, full_matrices=False)
+    if sizes[0] < RESTING * np.sqrt(len(deviations)):
         raise InputError("nothing moves in the training runs: there is nothing to learn")
-    sizes = sizes[:rank][sizes[:rank] > ROUNDING * sizes[0]] / np.sqrt(len(samples.deviations))
-    vectors = rows[: len(sizes)]
-    return vectors / sizes[:, None], vectors.T * sizes
+    chosen = rows[:rank][sizes[:rank] > ROUNDING * sizes[0]]
+    return Coordinates(chosen, np.zeros((len(chosen), samples.runs[0].inputs.shape[1])))
+
+
+def slow(samples: Samples) -> Coordinates:
+    """Coordinates of a vehicle's slow motion, heave, pitch and speed: those of `slow_manifold`."""
+    if not (shape := samples.states.shape):
+        raise InputError("coordinates are 'slow'; only vehicles that steer have slow coordinates")
+    modes = slow_modes(shape, FASTEST, SYMMETRIC)
+    return Coordinates(modes.encoding, modes.input_shift)

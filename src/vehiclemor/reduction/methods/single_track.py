@@ -1,0 +1,150 @@
+"""A grey box: the single-track car with roll and saturating tires, fitted to training runs.
+
+What an engineer would take (M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge, Springer).
+States are lateral speed V, yaw rate r, roll phi, its rate p, speed U; axle forces F_i are per mass:
+
+    alpha_f = kappa s + e_f phi - (V + l_f r) / U,   alpha_r = e_r phi - (V - l_r r) / U
+    F_i = D_i sin(S_i atan(c_i alpha_i / (S_i D_i)))
+    p' = h (F_f + F_r) - k phi - d p,   V' = -U r + F_f + F_r + g p'
+    r' = b_f F_f - b_r F_r,   U' = a V r - w_f alpha_f F_f - w_r alpha_r F_r
+
+Least squares over runs find the 20 constants.  Polynomials give all other states.
+"""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+from scipy.optimize import least_squares
+
+from vehiclemor.reduction.interface import Method
+from vehiclemor.reduction.learned.learned_model import LearnedModel, SampledSettings, TrainingData
+from vehiclemor.reduction.learned.samples import Coordinates, Samples
+from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle.shape import RANK, VehicleShape, no_steered_vehicle
+
+# Constants of a medium car, SI units, by which the fit begins; kappa is that of the model.
+TIRES = [*(0.0, 1.3, 60.0, 5.0, 1.3), *(0.0, 1.4, 60.0, 5.0, 1.3)]
+BODY = [*(0.8, 100.0, 8.0, 0.0), *(0.7, 0.8), *(1.0, 1.0, 1.0)]
+# Change of a constant by which slopes are found, relative to it or to the least size.
+STEP, LEAST = 1e-5, 0.1
+# The least forward speed in m/s by which slips are divided.
+SLOWEST = 1.0
+
+
+class SingleTrackSettings(SampledSettings):
+    """Settings for a vehicle."""
+
+    readout: int = Field(
+        3, ge=1, le=4, description="degree of the polynomials that give states and outputs"
+    )
+    iterations: int = Field(30, ge=0, le=500, description="of the least squares over whole runs")
+
+
+def physical(samples: Samples) -> Coordinates:
+    """V, r, roll and its rate, and the deviation of U."""
+    shape: Any = samples.states.shape
+    linear = shape.linearised
+    roll = linear.output_a[shape.model.outputs.index("roll")]
+    turn, forward, lateral = linear.velocity_a
+    rows = np.array([lateral, turn, roll, roll @ linear.a, forward])
+    return Coordinates(rows, np.zeros((len(rows), samples.runs[0].inputs.shape[1])))
+
+
+def axle_force(slip: np.ndarray, stiffness: Any, peak: Any, form: Any) -> np.ndarray:
+    """Force of an axle per mass of the car in m/s^2."""
+    return peak * np.sin(form * np.arctan(stiffness * slip / (form * peak)))
+
+
+def rates(constants: np.ndarray, speed: float, z: np.ndarray, steer: Any) -> np.ndarray:
+    """Rates of the states and of the heading (6, ...) at states (6, ...) and a steering input."""
+    kappa, e_f, l_f, *front, e_r, l_r, c_r, d_r, s_r = constants[:11]
+    h, k, d, g, b_f, b_r, a, w_f, w_r = constants[11:]
+    v, r, roll, p, slower, _ = z
+    u = np.maximum(speed + slower, SLOWEST)
+    slip_f = kappa * steer + e_f * roll - (v + l_f * r) / u
+    slip_r = e_r * roll - (v - l_r * r) / u
+    force_f, force_r = axle_force(slip_f, *front), axle_force(slip_r, c_r, d_r, s_r)
+    rolling = h * (force_f + force_r) - k * roll - d * p
+    sideward = -u * r + force_f + force_r + g * rolling
+    forward = a * v * r - w_f * slip_f * force_f - w_r * slip_r * force_r
+    return np.stack([sideward, b_f * force_f - b_r * force_r, p, rolling, forward, r])
+
+
+def driven(rate: Any, start: np.ndarray, steer: np.ndarray, step: float) -> np.ndarray:
+    """States and heading (steps + 1, 6, ...) by Runge and Kutta.
+
+    States at the start are (5, ...), the steering at both ends of each step is (steps, 2, ...).
+    """
+    path = np.zeros((len(steer) + 1, len(start) + 1, *start.shape[1:]))
+    path[0, :-1] = start
+    for row, (first, last) in enumerate(steer):
+        z, middle = path[row], 0.5 * (first + last)
+        k1 = rate(z, first)
+        k2 = rate(z + 0.5 * step * k1, middle)
+        k3 = rate(z + 0.5 * step * k2, middle)
+        k4 = rate(z + step * k3, last)
+        path[row + 1] = z + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+    return path
+
+
+def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: int) -> np.ndarray:
+    """Constants by least squares of states and heading over whole runs, each by its size."""
+    step, longest = data.samples.spacing, max(map(len, data.inputs))
+    steer, true = [], []
+    for z, u in zip(data.paths, data.inputs, strict=True):
+        more = longest - len(u)
+        heading = np.cumsum(np.append(0.0, 0.5 * step * (z[1:, 1] + z[:-1, 1])))
+        run = np.column_stack([z, heading])
+        steer.append(np.pad(steering(data, u), ((0, more), (0, 0)), "edge"))
+        true.append(np.pad(run, ((0, more), (0, 0)), constant_values=np.nan))
+    inputs, wanted = np.stack(steer, axis=-1)[..., None], np.stack(true, axis=-1)[..., None]
+    size, known = np.sqrt(np.nanmean(wanted**2, axis=(0, 2), keepdims=True)), np.isfinite(wanted)
+
+    def residuals(sets: np.ndarray) -> np.ndarray:
+        """Residuals (samples, sets) of sets of constants (constants, sets)."""
+        start = np.repeat(wanted[0, :-1], sets.shape[1], axis=-1)
+        path = driven(partial(rates, sets[:, None], speed), start, inputs, step)
+        return ((path - wanted) / size)[known[..., 0]]
+
+    def slopes(constants: np.ndarray) -> np.ndarray:
+        changes = STEP * np.maximum(np.abs(constants), LEAST)
+        found = residuals(np.column_stack([constants, constants[:, None] + np.diag(changes)]))
+        return (found[:, 1:] - found[:, :1]) / changes
+
+    solve: Any = partial(least_squares, x_scale=np.maximum(np.abs(first), LEAST), max_nfev=most)
+    # Steps too long for the tires are tried and given up.
+    with np.errstate(all="ignore"):
+        return solve(lambda c: residuals(c[:, None])[:, 0], first, slopes).x
+
+
+def steering(data: TrainingData, inputs: np.ndarray) -> np.ndarray:
+    """The first input (steps, 2) at both ends of steps of standardised ones."""
+    return data.input_scale[0] * inputs[:, :: len(data.input_scale)]
+
+
+def fit(model: Any, training: Training, settings: SingleTrackSettings) -> LearnedModel:
+    """The single track with the constants of least squares, and what is read from it."""
+    data, shape = (
+        TrainingData.of(model, training, settings, "sklearn", physical),
+        VehicleShape(model),
+    )
+    # Of a car that turns as its wheels point.
+    linear = shape.linearised
+    steady = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=RANK)[0]
+    kappa = (TIRES[1] + TIRES[6]) * (linear.velocity_a[0] @ steady) / shape.speed
+    first = np.array([kappa, *TIRES, *BODY])
+    constants = fitted_constants(data, first, shape.speed, settings.iterations + 1)
+    rate, step = partial(rates, constants, shape.speed), data.samples.spacing
+    return data.model(lambda z, u: driven(rate, z, steering(data, u), step)[:, :-1])
+
+
+METHOD = Method(
+    name="single_track",
+    summary="nonlinear single track with roll and saturating tires, fitted over whole runs",
+    settings=dict.fromkeys(("ode", "dae"), SingleTrackSettings),
+    refusal=no_steered_vehicle,
+    fit=fit,
+    packages=("scikit-learn",),
+)

@@ -1,0 +1,107 @@
+"""A network trained on whole trajectories, by jax-sysid: its errors add up as those of a run do.
+
+    z_(k+1) = z_k + A v_k + C (tanh(W v_k + b) - tanh(b)),   v_k = (z_k, u_k, u_(k+1))
+
+A. Bemporad, Linear and nonlinear system identification under l1- and group-Lasso regularization via
+L-BFGS-B, arXiv 2403.03827 (2024).
+"""
+
+import contextlib
+import io
+import warnings
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from vehiclemor.reduction.interface import Method, installed
+from vehiclemor.reduction.learned.learned_model import (
+    LearnedModel,
+    LearnedSettings,
+    TrainingData,
+    stepped,
+)
+from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.vehicle.shape import no_steered_vehicle
+
+# By which weights begin, and passes over all steps before runs are fitted.
+SEED, STEPS = 0, 60
+# Standardised coordinates are cut there while the network is trained.
+CUT = 20.0
+
+
+class TrajectoryNetworkSettings(LearnedSettings):
+    """Settings for a vehicle."""
+
+    width: int = Field(32, ge=1, le=512, description="neurons of the hidden layer, with tanh")
+    epochs: int = Field(300, ge=0, le=10_000, description="steps of L-BFGS over all runs, at most")
+    penalty: float = Field(1e-6, ge=0.0, description="weight of the squared weights in the fit")
+
+
+def fit(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> LearnedModel:
+    """The network of jax-sysid, begun from one step that scikit-learn has fitted."""
+    # The library prints, and builds on a package that warns.
+    with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return _fitted(model, training, settings)
+
+
+def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings) -> LearnedModel:
+    with installed("jax-sysid", "trajectories"):
+        import jax
+        import jax.numpy as jnp
+        from jax_sysid.models import Model
+        from sklearn.linear_model import LinearRegression
+        from sklearn.neural_network import MLPRegressor
+
+    data = TrainingData.of(model, training, settings, "sklearn", settings.of_samples)
+    now, inputs, _ = data.steps
+    r, m, runs = now.shape[1], inputs.shape[1], len(data.paths)
+
+    def step(x: Any, u: Any, parameters: Any) -> Any:
+        """Coordinates of one run or of all, one behind the other, after a step."""
+        a, w, b, c = parameters
+        z = x.reshape(-1, r)
+        v = jnp.hstack([z, u.reshape(-1, m)])
+        return (z + v @ a + (jnp.tanh(v @ w + b) - jnp.tanh(b)) @ c).reshape(-1)
+
+    # All runs are one experiment: the library would compile a loop for each.
+    longest = max(map(len, data.inputs))
+    wanted, driven = np.full((longest, runs * r), np.nan), np.zeros((longest, runs * m))
+    for run, (z, u) in enumerate(zip(data.paths, data.inputs, strict=True)):
+        wanted[: len(u), run * r : (run + 1) * r] = z[:-1]
+        driven[: len(u), run * m : (run + 1) * m] = u
+    known = np.isfinite(wanted)
+    wanted[~known] = 0.0
+    # Whole runs are no start for small random weights: one step is fitted first.
+    arguments, changes = data.regression
+    linear: Any = LinearRegression(fit_intercept=False).fit(arguments, changes)
+    left = changes - linear.predict(arguments)
+    size = left.std(axis=0)
+    shape: Any = {"hidden_layer_sizes": (settings.width,), "activation": "tanh"}
+    begun: Any = MLPRegressor(**shape, max_iter=STEPS, random_state=SEED)
+    begun.fit(arguments, left / size)
+    first = [linear.coef_.T, begun.coefs_[0], begun.intercepts_[0], begun.coefs_[1] * size]
+    network = Model(runs * r, runs * r, runs * m, state_fcn=step, output_fcn=lambda x, *_: x)
+    network.init(params=first, x0=wanted[0])
+
+    # Runs are of different lengths.
+    def loss(found: Any, true: Any) -> Any:
+        return (jnp.where(known, found - true, 0.0) ** 2).sum() / known.sum()  # type: ignore[operator]
+
+    network.loss(loss, rho_th=settings.penalty, train_x0=False, xsat=CUT)
+    network.optimization(adam_epochs=0, lbfgs_epochs=settings.epochs, iprint=-1)
+    network.fit(wanted, driven)
+    parameters, compiled = network.params, jax.jit(step)
+    return data.model(stepped(lambda z, u: np.asarray(compiled(z, u, parameters))))
+
+
+METHOD = Method(
+    name="trajectory_network",
+    summary="a linear step and a network, trained on whole trajectories by jax-sysid",
+    settings=dict.fromkeys(("ode", "dae"), TrajectoryNetworkSettings),
+    refusal=no_steered_vehicle,
+    fit=fit,
+    reference="10.48550/arXiv.2403.03827",
+    packages=("jax-sysid",),
+)
