@@ -21,7 +21,16 @@ from typing import Any
 import numpy as np
 import typst
 import xarray as xr
-from number_tables import Entry, comparison, named_values, operations, peers, published, studies
+from number_tables import (
+    Entry,
+    comparison,
+    named_values,
+    operations,
+    peers,
+    published,
+    steps,
+    studies,
+)
 from numbers_by_name import FILE, load, names_in, render
 
 from vehiclemor.files import write_text
@@ -60,10 +69,11 @@ def sources(results: Path) -> Iterator[tuple[str, str, Callable[[], Iterator[Ent
     yield "data/published/masoudi2015.toml", "", published
     yield "src", "", operations
     yield "studies", "vehiclemor compare paper", partial(comparison, results)
-    for name in ("in_use", "other_steering"):
+    for name in ("in_use", "other_steering", "control"):
         file = f"{name}.nc"
         yield file, f"python paper/{name}.py", partial(of_file, partial(named_values, name), file)
     yield "peers.json", "tox -e peers", partial(of_file, peers, "peers.json")
+    yield "steps.json", "python benchmarks/steps.py", partial(of_file, steps, "steps.json")
     for name, make in studies():
         command = "compare paper" if name in TIMING.values() else f"run {name}"
         # Its file is that of who has the logs.

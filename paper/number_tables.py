@@ -22,7 +22,8 @@ from vehiclemor.report.published import load_published, rms_numbers
 from vehiclemor.report.sizes import size_rows
 from vehiclemor.report.unseen import count_rows, protocol_rows
 
-PEERS = Path(__file__).parents[1] / "benchmarks" / "peers" / "report.py"
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+PEERS, STEPS = BENCHMARKS / "peers" / "report.py", BENCHMARKS / "steps.py"
 # Name, value, and a unit where the name does not give it away.
 Entry = tuple[Any, ...]
 # A table of pandas, whose stubs do not follow columns that are chosen by name.
@@ -246,6 +247,28 @@ def peers(cases: dict[str, Any]) -> Iterator[Entry]:
             nearest, package = (min(s, default=np.nan) for s in (others.values(), packages))
             yield slug(*head, "nearest", "over_ours"), nearest / fastest
             yield slug(*head, "nearest_package", "over_ours"), package / fastest
+
+
+def steps(vehicles: dict[str, Any]) -> Iterator[Entry]:
+    """Costs of a step of exported C, the longest one within bounds, its time; 0: there is none."""
+    study = SimpleNamespace(**runpy.run_path(str(STEPS)))
+    units = {"nanoseconds": "ns", "code": "B", "stack": "B"}
+    for vehicle, part in vehicles.items():
+        for row in part["costs"]:
+            head = "steps", vehicle, row["model"], row["integrator"], row["precision"]
+            yield from ((slug(*head, name), row[name], unit) for name, unit in units.items())
+        for row in study.reached(part):
+            at = f"v{row['speed']:g}", f"within{row['level']:g}"
+            head = "steps", vehicle, row["model"], row["integrator"], *at
+            yield slug(*head, "step"), row["step"], "s"
+            yield slug(*head, "least"), row["least"], "1"
+        for speed, level in product(study.SPEEDS, study.LEVELS):
+            head, times = ("steps", vehicle, f"v{speed:g}", f"within{level:g}"), {}
+            for model in dict.fromkeys(row["model"] for row in part["costs"]):
+                times[model] = study.fastest(part, model, speed, level).get("time", 0.0)
+                yield slug(*head, model), times[model], "us"
+            gained = times["reduced"] and times["full"] / times["reduced"]
+            yield slug(*head, "gain"), gained, "1"
 
 
 def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:

@@ -28,12 +28,13 @@ from vehiclemor.report.published import load_published
 PAPER = Path(__file__).parent
 STYLE = str(PAPER / "figures.mplstyle")
 CLAIMS = PAPER / "claims.json"
+BENCHMARKS = "peers", "steps"
 
 
 def stored(results: Path, name: str) -> Any:
-    """A dataset of the results folder, or what a script of the paper has written there."""
-    if name == "peers":
-        return json.loads((results / "peers.json").read_text(encoding="utf-8"))
+    """A dataset of the results folder, or what a script or benchmark has written there."""
+    if name in BENCHMARKS:
+        return json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
     if name == "other_steering":
         return xr.load_dataset(results / "other_steering.nc")
     return xr.load_dataset(results / "studies" / f"{name}.nc")

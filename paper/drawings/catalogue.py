@@ -49,4 +49,5 @@ FIGURES: Mapping[str, Entry] = {
     "coverage": Entry(coverage.figure_coverage, ["other_steering"]),
     "estimate": Entry(coverage.figure_estimate, ["other_steering"]),
     "peers": Entry(fields.figure_peers, ["peers"]),
+    "steps": Entry(fields.figure_steps, ["steps"]),
 }

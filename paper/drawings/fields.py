@@ -109,6 +109,38 @@ def figure_peers(results: Mapping[str, Any]) -> Figure:
     return figure
 
 
+# Model of the study of steps -> colour; integrator -> dashes, text.
+STEPPED = {
+    "full": "black",
+    "relaxed tires": look.ORANGE,
+    "reduced": look.GREEN,
+    "single track": look.PINK,
+}
+INTEGRATORS = {"rk4": ("-", "Runge-Kutta"), "ros2": ("--", "linearly implicit")}
+
+
+def figure_steps(results: Mapping[str, Any], speed: float = 20.0) -> Figure:
+    """CPU time of a simulated second in exported C over error, at fixed steps, of both vehicles."""
+    figure, grid = look.lettered(1, 2, look.TWO, 2.7, [MODELS[m] for m in results["steps"]])
+    for axis, part in zip(grid.flat, results["steps"].values(), strict=True):
+        for cost in (row for row in part["costs"] if row["precision"] == "double"):
+            model, integrator = cost["model"], cost["integrator"]
+            if model not in STEPPED:
+                continue
+            case = {"model": model, "integrator": integrator, "speed": speed}
+            rows = [row for row in part["scan"] if case.items() <= row.items()]
+            points = [(r["score"], 1e-3 * cost["nanoseconds"] / r["step"]) for r in rows]
+            dashes, text = INTEGRATORS[integrator]
+            style = {"color": STEPPED[model], "linestyle": dashes, "marker": ".", "markersize": 4}
+            axis.loglog(*np.array(points).T, label=f"{model}, {text}", **style)
+        axis.axvline(1.0, **look.THIN)
+        axis.set_xlim(1e3, 1e-4)
+        axis.set_xlabel("largest error / bound")
+    grid[0, 0].set_ylabel("CPU time of a simulated second (us)")
+    look.legend(figure, grid.flat, 4)
+    return figure
+
+
 def _front(
     case: Mapping[str, Any], beginning: str, shown: tuple[float, float]
 ) -> list[tuple[float, float]]:

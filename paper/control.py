@@ -1,0 +1,117 @@
+"""Measures models in control: optimal plans, a loop at 20 Hz, a thousand rollouts.
+
+Usage: python paper/control.py [--results DIR]
+
+Writes DIR/control.nc, named values with units, which `paper/measured_numbers.py` reads, in a few
+minutes.  Times are CPU times of one thread, CasADi's expressions interpreted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import runpy
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from in_use import Values, store
+
+import vehiclemor as vm
+from vehiclemor.simulation.run_timer import one_thread
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+MODEL = "independent_suspension_vehicle"
+# Periods that are tried as horizons in the loop until one is too long, and the loop's length in s.
+HORIZONS, LOOP = (5, 10, 15, 20, 30, 40, 60), 0.5
+
+
+def example(name: str) -> Any:
+    """Names of an example, which runs nothing."""
+    return SimpleNamespace(**runpy.run_path(str(EXAMPLES / f"{name}.py")))
+
+
+def models() -> dict[str, tuple[Any, int]]:
+    """Label -> model, and Runge-Kutta steps a period, none for collocation; first the full one."""
+    reduced = vm.rom(MODEL)
+    full = vm.reduce(reduced.model, "full_order")
+    track = vm.reduce(reduced.model, "linear_single_track")
+    return {"full": (full, 0), "reduced": (reduced, 1), "track": (track, 1)}
+
+
+def plans() -> Iterator[tuple[str, float]]:
+    """Optimal lane change of 60 periods: seconds, unknowns, distance to the full car's plan."""
+    planning, found = example("optimal_control"), {}
+    for label, (car, steps) in models().items():
+        planner = planning.Planner(car, steps=steps)
+        found[label], seconds = planner.plan(car.state())
+        yield f"{label} plan, s", seconds
+        yield f"{label} unknowns, 1", len(planner.guess)
+        yield f"{label} off, rad", float(np.abs(found[label] - found["full"]).max())
+    yield "largest steering, rad", float(np.abs(found["full"]).max())
+
+
+def shooting() -> Iterator[tuple[str, float]]:
+    """The full car's plan by five Runge-Kutta steps a period."""
+    planner = example("optimal_control").Planner(car := models()["full"][0], steps=5)
+    yield "full shooting, s", planner.plan(car.state())[1]
+
+
+def loops() -> Iterator[tuple[str, float]]:
+    """Longest horizon whose usual plan fits into a period, with the full car as plant; its times.
+
+    Of a model that has none the times are those of the shortest horizon.
+    """
+    planning, known = example("optimal_control"), models()
+    plant = known["full"][0]
+    for label, (car, steps) in known.items():
+        fits, best = 0, np.zeros(0)
+        for periods in HORIZONS:
+            _, seconds = planning.drive(planning.Planner(car, periods, steps), plant, LOOP)
+            if not best.size:
+                best = seconds
+            if np.median(seconds) > planning.PERIOD:
+                break
+            fits, best = periods, seconds
+        yield f"{label} fits, 1", fits
+        yield f"{label} usual, s", float(np.median(best))
+        yield f"{label} longest, s", float(best.max())
+
+
+def rollouts() -> Iterator[tuple[str, float]]:
+    """Rollouts of 2 s a second of one core, whole calls and in compiled loops alone."""
+    sampling = example("sampled_plans")
+    random = np.random.default_rng(1)
+    size = sampling.PLANS, sampling.KNOTS + 1
+    steering = sampling.SPREAD * random.normal(size=size).cumsum(axis=1)
+    steering -= steering[:, :1]
+    reduced = vm.rom(MODEL)
+    strongest = vm.reduce(reduced.model, "full_order", preset="strongest")
+    for label, car in (("reduced", reduced), ("full", strongest)):
+        whole, inside = [], []
+        for _ in range(4):
+            began = time.process_time()
+            signals = vm.many_signals(sampling.TIMES, steering, output_step=sampling.PERIOD)
+            runs = vm.simulate_many(car, signals, outputs=sampling.SEEN, jobs=1)
+            whole.append(time.process_time() - began)
+            inside.append(runs.seconds.sum().item())
+        yield f"{label} rollouts, 1/s", sampling.PLANS / min(whole)
+        yield f"{label} rollouts in loops, 1/s", sampling.PLANS / min(inside)
+
+
+def main() -> None:
+    """Measure and write."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
+    results = parser.parse_args().results
+    values: Values = {}
+    with one_thread():
+        for part in (plans, rollouts, loops, shooting):
+            values |= dict(part())
+            store(values, "Models in control", results / "control.nc")
+
+
+if __name__ == "__main__":
+    main()
