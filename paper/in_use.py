@@ -14,7 +14,6 @@ import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -123,11 +122,10 @@ def batches() -> Iterator[tuple[str, float]]:
     """CPU time of many runs with new signals that steer at once, in one batch, one output kept."""
     model, *_ = VEHICLES
     for part, contestant in enumerate(reduced_vehicles(model)):
-        many = SimpleNamespace(model=contestant.model.model, simulate=contestant.simulate)
         numbers = 0.5 * part + np.arange(MANY) / (0.01 * MANY)
         signals = [signal(model, "at_once", number) for number in numbers]
         began = time.process_time()
-        vm.simulate_many(many, signals, outputs=[ASIDE])
+        vm.simulate_many(contestant.model, signals, outputs=[ASIDE], trust=contestant.trust)
         yield f"{model} {contestant.who} many, s", time.process_time() - began
 
 
