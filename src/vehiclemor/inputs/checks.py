@@ -64,9 +64,9 @@ def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
         outside, since = np.flatnonzero(beyond.any(axis=0)), times[beyond.argmax(axis=0)]
     else:
         extent = maneuver.extent
-        rounding = ROUNDING * extent.largest[0]
+        rounding = ROUNDING * extent.largest
         outside = np.flatnonzero((extent.low < low - rounding) | (extent.high > high + rounding))
-        limits = np.vstack([low - rounding, high + rounding, *np.full((2, len(low)), np.inf)])
+        limits = np.vstack([low - rounding, high + rounding])
         since = maneuver.first_beyond(limits) if len(outside) else low
     if len(outside):
         j = outside[since[outside].argmin()]

@@ -22,6 +22,9 @@ FACTORS = {"frequency": (1e-3, 1e3), "amplitude": (-1e6, 1e6)}
 LONGEST_DURATION = 1e5
 MOST_SAMPLES = 10_000_000
 
+# Limits that no input passes.
+ANYTHING = np.array([[-np.inf], [np.inf]])
+
 Result = TypeVar("Result")
 
 
@@ -39,15 +42,15 @@ def cached(compute: Callable[..., Result]) -> Callable[..., Result]:
 
 
 class Extent(NamedTuple):
-    """Extremes of the inputs of a run, see `polynomial_loops.extent`.
-
-    `largest` (3, inputs) has three rows: the largest magnitude of each input, that of its part
-    above 2 Hz, and the root of the integral of the square of its part above 8 Hz.
-    """
+    """Smallest and largest values of the inputs of a run (inputs,)."""
 
     low: np.ndarray
     high: np.ndarray
-    largest: np.ndarray
+
+    @property
+    def largest(self) -> np.ndarray:
+        """Largest magnitudes (inputs,)."""
+        return np.maximum(-self.low, self.high)
 
 
 @lru_cache(maxsize=64)
@@ -131,20 +134,20 @@ class Excitation(ShortRepr):
     @cached
     def extent(self) -> Extent:
         """Extremes of the inputs, between output times too."""
-        low, high, *quick, _ = self._extent(np.inf)
-        return Extent(low, high, np.array([np.maximum(-low, high), *quick]))
+        low, high, _ = self._extent(ANYTHING)
+        return Extent(low, high)
 
     def first_beyond(self, limits: np.ndarray) -> np.ndarray:
-        """Times (inputs,) in s at which limits (4, inputs) of `polynomial_loops.extent` are passed.
+        """Times (inputs,) in s at which limits (2, inputs), low and high ones, are passed.
 
         Infinite of inputs that stay within their limits.
         """
-        return self._extent(limits)[4]
+        return self._extent(limits)[2]
 
-    def _extent(self, limits: np.ndarray | float) -> np.ndarray:
-        """Result (5, inputs) of `polynomial_loops.extent`."""
+    def _extent(self, limits: np.ndarray) -> np.ndarray:
+        """Result (3, inputs) of `polynomial_loops.extent`."""
         inputs = self.pieces.coefficients.shape[2]
-        bounds, result = np.empty((4, inputs)), np.empty((5, inputs))
+        bounds, result = np.empty((2, inputs)), np.empty((3, inputs))
         bounds[:] = limits
         polynomial_loops()["extent"](self.packed_pieces, bounds, result)
         return result

@@ -7,10 +7,8 @@ import numpy as np
 
 from vehiclemor.codegen.loop_types import Cube, Int, IntVector, Matrix, Vector
 
-INLINED = ("input_at", "signal_at", "passed")
-# Time constants (s) of two high passes, one after the other, that leave what is above 2 and 8 Hz.
-CORNER, HIGHER = 0.08, 0.02
-# Parts of a piece between evaluations, and the longest of them (s).
+INLINED = ("input_at", "signal_at")
+# Parts of a curved piece between evaluations, and the longest of them (s).
 PARTS, LONGEST = 4, 0.01
 # Inputs from which on they are evaluated side by side.
 MANY = 8
@@ -90,25 +88,21 @@ def sampled(signal: Pieces, times: Vector, inputs: Matrix) -> Int:
 
 
 def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
-    """Extremes of inputs over a run, between samples too, and of their quick parts.
+    """Smallest and largest values of inputs over a run, between samples too.
 
     Parameters
     ----------
     limits
-        By input (4, inputs): smallest and largest value, largest magnitude above 2 Hz, and the root
-        of the integral over time of the square of what is above 8 Hz.
+        By input (2, inputs): smallest and largest value.
     result
         The same of the inputs, and the time in s at which a limit is passed first; infinite if none
-        is (5, inputs).
+        is (3, inputs).
     """
     edges, first, starts, coefficients = signal
     degree, pieces, segments = coefficients.shape[1] - 1, len(coefficients), len(edges) - 1
     for j in range(coefficients.shape[2]):
-        low, high, most, since = math.inf, -math.inf, 0.0, math.inf
-        # Before it begins an input is zero.  Outputs of the first and second filter, by corner.
-        before, once, twice, high_once, high_twice, squares = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        segment, parts, length, span, share = 0, 1, -1.0, 1.0, 1.0
-        decay, high_decay, half_decay = 1.0, 1.0, 1.0
+        low, high, since = math.inf, -math.inf, math.inf
+        segment, parts, span, share = 0, 1, 1.0, 1.0
         even = (edges[1] - edges[0]) / (first[1] - first[0])
         for piece in range(pieces):
             if piece == first[segment + 1] and segment + 1 < segments:
@@ -118,42 +112,14 @@ def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
             if len(starts):
                 begin = starts[piece]
                 long = (starts[piece + 1] if piece + 1 < pieces else edges[segments]) - begin
-            if abs(long - length) > EQUIDISTANT * long:
-                parts = max(PARTS if degree > 1 else 1, math.ceil(long / LONGEST))
-                length, span, share = long, long / parts, 1.0 / parts
-                decay, high_decay = math.exp(-span / CORNER), math.exp(-span / HIGHER)
-                half_decay = math.sqrt(high_decay)
+            parts = max(PARTS, math.ceil(long / LONGEST)) if degree > 1 else 1
+            span, share = long / parts, 1.0 / parts
             for part in range(parts + 1):
                 value = coefficients[piece, degree, j]
                 for power in range(degree - 1, -1, -1):
                     value = coefficients[piece, power, j] + part * share * value
-                change, before = value - before, value
-                if part:
-                    left = high_once, high_twice
-                    once, twice = passed(once, twice, change, span / CORNER, decay)
-                    high_once, high_twice = passed(
-                        high_once, high_twice, change, span / HIGHER, high_decay
-                    )
-                    # By Simpson's rule, where half the change has passed.
-                    _, half = passed(*left, 0.5 * change, 0.5 * span / HIGHER, half_decay)
-                    sides = left[1] * left[1] + high_twice * high_twice
-                    squares += span / 6.0 * (sides + 4.0 * half * half)
-                else:
-                    once, twice = once + change, twice + change
-                    high_once, high_twice = high_once + change, high_twice + change
-                low, high, most = min(low, value), max(high, value), max(most, abs(twice))
-                inside = limits[0, j] <= value <= limits[1, j] and abs(twice) <= limits[2, j]
-                if not (inside and squares <= limits[3, j] * limits[3, j]):
+                low, high = min(low, value), max(high, value)
+                if not limits[0, j] <= value <= limits[1, j]:
                     since = min(since, begin + part * span)
-        result[0, j], result[1, j], result[2, j] = low, high, most
-        result[3, j], result[4, j] = math.sqrt(squares), since
+        result[0, j], result[1, j], result[2, j] = low, high, since
     return 0
-
-
-def passed(once, twice, change, time, decay):
-    """Outputs of a high pass and of two in series after a linear change.
-
-    Time is relative to their time constant.
-    """
-    steady = change / time
-    return steady + (once - steady) * decay, (twice + change - once * time) * decay

@@ -103,7 +103,7 @@ def read(path: Any) -> dict[str, Any]:
         reader = Parts(model, stored)
         fields = {name: reader.read(parts[name], name, of) for name, of in PARTS.items()}
         checked_fit(method, fields["reduced"])
-        kinds = {"ae": 1, "structural": len(BANDS)}.get(model.kind, 3)
+        kinds = len(BANDS) if model.kind == "structural" else 1
         require(fields["input_range"].largest.shape == (kinds, len(model.inputs)), "largest")
         if not _alike(stored["response"], response(model, fields["reduced"])):
             raise FileError(f"{method} makes something else of these numbers")

@@ -88,13 +88,10 @@ def training_summary(
         for name, value in run.get("parameters", ()):
             values.setdefault(name, []).append(value)
     covered = {name: _span(seen) for name, seen in values.items() if seen[0] is not None}
-    for quantity, (size, *quick) in zip(inputs, largest.T.tolist(), strict=True):
+    for quantity, size in zip(inputs, largest[0].tolist(), strict=True):
         text = f"up to {size if size > NOTHING else 0.0:.3g} {quantity.unit}"
         if quantity.unit == "rad":
             text += f" ({math.degrees(size):.3g} deg)"
-        # Of structures they are shares of the bands.
-        if len(quick) == 2:
-            text += f"; above 2 Hz up to {quick[0]:.3g} {quantity.unit}"
         covered[f"input {quantity.name}"] = text
     return {"training runs": str(len(runs))} | covered
 

@@ -1,6 +1,7 @@
 """What a reduced model knows: how far a run goes in its training ranges.
 
-All that can be exceeded is a range with a name: states or features along a run (`trust_of`), inputs
+Errors of vehicles are estimated, see `error_estimate`; of other models this tells what it can.  All
+that can be exceeded is a range with a name: states or features along a run (`trust_of`), inputs
 as signals, initial speeds and durations (`InputRange`).  Each range gives how much of it a run uses
 and since when it is beyond; `trust_in` combines them in one trust.
 """
@@ -75,20 +76,9 @@ def by_factor(reason: str, factor: float) -> str:
 
 
 def largest_samples(maneuvers: Sequence[Excitation]) -> np.ndarray:
-    """Largest magnitudes (1, inputs) of inputs of kinematic models, at output times."""
+    """Largest magnitudes (1, inputs) of inputs, at output times."""
     values = [np.abs(maneuver.at(maneuver.times)).max(axis=0) for maneuver in maneuvers]
     return EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
-
-
-def largest_inputs(maneuvers: Sequence[Excitation]) -> np.ndarray:
-    """Largest sizes (3, inputs) of inputs, see `Extent`."""
-    largest = [maneuver.extent.largest for maneuver in maneuvers]
-    return EDGE * np.maximum(np.max(largest, axis=0), NOTHING)
-
-
-def inputs_beyond(maneuver: Excitation, known: np.ndarray) -> np.ndarray:
-    """Times (inputs,) in s at which inputs pass what is known of them (3, inputs) first."""
-    return maneuver.first_beyond(np.array([-known[0], *known]))
 
 
 def largest_bands(maneuvers: Sequence[Excitation]) -> np.ndarray:
@@ -119,9 +109,8 @@ def bands_of(maneuver: Excitation) -> np.ndarray:
 class InputRange:
     """Inputs, initial speeds and durations of the training runs: a method's least claim."""
 
-    # Magnitudes of the inputs (1, inputs) of a kinematic model, at output times; of a structure
-    # these and shares of `BANDS` in their RMS values (6, inputs); of a dynamic model sizes of
-    # signals (3, inputs), see `Extent`.
+    # Magnitudes of the inputs (1, inputs) at output times; of a structure these and shares of
+    # `BANDS` in their RMS values (6, inputs).
     largest: np.ndarray
     # Middle of the initial speeds in m/s, and how far they lie from it.
     speed: float
@@ -148,12 +137,12 @@ class InputRange:
     def trust(self, model: Model, maneuver: Excitation, speed: float) -> Trust:
         """How far a run with an initial speed in m/s goes in the range."""
         maneuver = completed(maneuver, model.definition)
-        if model.kind == "ae":
+        if model.kind == "structural":
+            ranges = self._bands(model.inputs, maneuver)
+        else:
             times, inputs = maneuver.recorded_inputs
             ranges = self._samples(model.inputs, inputs, times)
-        else:
-            of_inputs = self._bands if model.kind == "structural" else self._extents
-            ranges = of_inputs(model.inputs, maneuver)
+        if model.kind != "ae":
             off = abs(speed - self.speed) / self.reach
             ranges["initial speed"] = off, 0.0 if off > 1.0 else np.inf
         lasts = maneuver.duration / self.longest
@@ -161,22 +150,6 @@ class InputRange:
         if self.histories is not None:
             ranges["history of the inputs"] = self._unlike(maneuver)
         return trust_in(ranges)
-
-    def _extents(
-        self, names: Sequence[str], maneuver: Excitation
-    ) -> dict[str, tuple[float, float]]:
-        """How far the inputs of a vehicle go, and since when (s) they are beyond."""
-        used = maneuver.extent.largest / self._sizes
-        since = np.full(len(names), np.inf)
-        if (used > 1.0).any():
-            since = inputs_beyond(maneuver, self.largest)
-        ranges = {}
-        for name, (further, *quicker), time in zip(names, used.T, since, strict=True):
-            what = f"input {name}"
-            if further <= 1.0 < max(quicker):
-                what += " above 2 Hz"
-            ranges[what] = float(max(further, *quicker)), float(time)
-        return ranges
 
     def _bands(self, names: Sequence[str], maneuver: Excitation) -> dict[str, tuple[float, float]]:
         """How far the inputs of a structure go, in magnitude and in each band."""
@@ -227,9 +200,7 @@ def input_range(
     if follows_time:
         times = np.linspace(0.0, longest, maneuvers[0].samples)
         histories = np.array([maneuver.at(times) for maneuver in maneuvers])
-    largest_of = {"ae": largest_samples, "structural": largest_bands}.get(
-        model.kind, largest_inputs
-    )
+    largest_of = largest_bands if model.kind == "structural" else largest_samples
     lasts = np.inf if model.kind == "ae" and not follows_time else EDGE * longest
     return InputRange(largest_of(maneuvers), middle, reach, lasts, histories)
 
