@@ -112,7 +112,7 @@ def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
             if len(starts):
                 begin = starts[piece]
                 long = (starts[piece + 1] if piece + 1 < pieces else edges[segments]) - begin
-            parts = max(PARTS, math.ceil(long / LONGEST)) if degree > 1 else 1
+            parts = max(PARTS if degree > 1 else 1, math.ceil(long / LONGEST))
             span, share = long / parts, 1.0 / parts
             for part in range(parts + 1):
                 value = coefficients[piece, degree, j]
