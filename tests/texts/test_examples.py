@@ -111,3 +111,24 @@ def test_the_car_goes_around_the_obstacle_and_comes_back(control, reduced):
     # The loop is closed over the full car, whose state the reduced one begins with.
     apart = np.abs(runs[0]["path"] - runs[1]["path"]).max(axis=0)
     assert (apart < [0.02, 0.02, 2e-3]).all()
+
+
+def test_full_and_reduced_car_have_one_optimal_lane_change(reduced):
+    planning = example("optimal_control")
+    full, track = (vm.reduce(reduced.model, m) for m in ("full_order", "linear_single_track"))
+    cars = ((reduced, 1), (full, 0), (track, 1))
+    planners = [planning.Planner(car, 20, steps) for car, steps in cars]
+    plan, expected, linear = (p.plan(p.car.state())[0] for p in planners)
+    # A model without roll and saturating tires plans another one.
+    assert np.abs(plan - expected).max() < 0.1 * np.abs(linear - expected).max()
+    # The loop is closed over the full car, which ends in the other lane.
+    aside, _ = planning.drive(planners[0], full, 3.0)
+    assert abs(aside[-1] - planning.LANE) < 0.3
+
+
+def test_a_mean_of_sampled_plans_leads_around_the_obstacle(control, reduced):
+    sampling = example("sampled_plans")
+    full = vm.reduce(reduced.model, "full_order")
+    places, _ = sampling.drive(sampling.Sampler(reduced), full, 3.2)
+    assert places[-1, 0] > sampling.OBSTACLE[0] + sampling.CLEARANCE[0]
+    assert control.clearance(places) > 0.98
