@@ -161,7 +161,8 @@ def error_estimate(
     errors, is_settled = np.full((len(times), len(model.outputs)), np.inf), False
     if np.isfinite(states).all():
         step = float(times[1] - times[0])
-        corrected, is_settled = error_model(model).corrected(step, states, inputs, start, settled)
+        errors_of = error_model(model, states, float(times[-1]))
+        corrected, is_settled = errors_of.corrected(step, states, inputs, start, settled)
         if corrected is not None:
             own = model.outputs_at(states, inputs)
             errors = own - model.outputs_at(corrected, inputs)

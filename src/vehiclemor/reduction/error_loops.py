@@ -53,14 +53,16 @@ class FullEquations(NamedTuple):
 class ModesOfErrors(NamedTuple):
     """Modes: coordinates of shapes (n, 2 modes), and back (2 modes, n); weights (8, modes).
 
-    Slow (2 modes,) is one for those that start with an error.  The correction (2 c, n) meets
-    violations of constraints; velocity (3, n) gives psi', U, V.
+    Slow (2 modes,) is one for those that start with an error; what the others add to heading and
+    place while they decay follows from the start's deviation by `settling` (n, 3).  The correction
+    (2 c, n) meets violations of constraints; velocity (3, n) gives psi', U, V.
     """
 
     coordinates: Matrix
     shapes: Matrix
     weights: Matrix
     slow: Vector
+    settling: Matrix
     correction: Matrix
     velocity: Matrix
 
@@ -80,7 +82,8 @@ class Passes(NamedTuple):
 class Scratch(NamedTuple):
     """Room for states, rates, violations, shapes, motions of all nodes; and for some in modes.
 
-    Further for a change in modes (2 modes,), a shape and the ranges of its coordinates (n,).
+    Further for a change in modes (2 modes,), a shape, the ranges of its coordinates (n,), and what
+    a start adds to heading and place (3,).
     """
 
     states: Matrix
@@ -94,6 +97,7 @@ class Scratch(NamedTuple):
     change: Vector
     moved: Vector
     scale: Vector
+    settled: Vector
 
 
 def corrected_run(
@@ -164,6 +168,7 @@ def begin_with(run, start, step, shape, modes, passes, scratch):
     for j in range(n):
         moved[j] -= shapes[0, j]
     in_modes(moved, modes.coordinates, scratch.errors[0])
+    in_modes(moved, modes.settling, scratch.settled)
     for k in range(len(modes.slow)):
         scratch.errors[0, k] *= modes.slow[k]
     scratch.states[:] = 0.0
@@ -229,14 +234,18 @@ def place(step, start, shape, scratch, result):
     """Write the states of corrected shapes, with heading and position by quadratures."""
     motion, states = scratch.motion, scratch.states
     heading, x, y = shape.planar[0], shape.planar[1], shape.planar[2]
-    integral(motion, 0, step, start[heading], states, heading)
+    turned, ahead, aside = scratch.settled[0], scratch.settled[1], scratch.settled[2]
+    cosine, sine = math.cos(start[heading]), math.sin(start[heading])
+    integral(motion, 0, step, start[heading] + turned, states, heading)
+    first_x = start[x] + cosine * ahead - sine * aside
+    first_y = start[y] + sine * ahead + cosine * aside
     for i in range(len(motion)):
         cosine, sine = math.cos(states[i, heading]), math.sin(states[i, heading])
         forward, sideward = motion[i, 1], motion[i, 2]
         motion[i, 1] = cosine * forward - sine * sideward
         motion[i, 2] = sine * forward + cosine * sideward
-    integral(motion, 1, step, start[x], states, x)
-    integral(motion, 2, step, start[y], states, y)
+    integral(motion, 1, step, first_x, states, x)
+    integral(motion, 2, step, first_y, states, y)
     for i in range(len(states)):
         state = states[i]
         for j in range(len(shape.indices)):

@@ -25,12 +25,15 @@ import scipy.linalg
 from vehiclemor.codegen.loops import loops
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.reduction.error_loops import FullEquations, ModesOfErrors, Passes, Scratch, Shape
-from vehiclemor.reduction.vehicle.shape import VehicleShape
+from vehiclemor.reduction.vehicle.shape import RANK, Linearisation, VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import address_of, at_samples
 
-# Modes faster than this (1/s) start without an error: their start passes before it matters.
-FASTEST_START = 100.0
+# Speeds (m/s) of linearisations are multiples of this one.
+SPEEDS = 2.5
+# Modes start with an error whose rate times the time between nodes is no larger; the others have
+# decayed before it matters.
+FOLLOWED = 8.0
 # Nodes in a window, and the most passes that it takes; least range of a coordinate of the shape, in
 # which changes are measured (m, rad, m/s, rad/s).
 WINDOW, MOST_PASSES, LEAST_RANGE = 9, 12, 1e-3
@@ -38,10 +41,15 @@ WINDOW, MOST_PASSES, LEAST_RANGE = 9, 12, 1e-3
 DIFFERENCE, SERIES = 1e-6, 1e-3
 
 
-@lru_cache(maxsize=64)
-def error_model(model: DynamicModel) -> ErrorModel:
-    """What corrects runs of a vehicle model."""
-    return ErrorModel(VehicleShape(model))
+def error_model(model: DynamicModel, states: np.ndarray, duration: float) -> ErrorModel:
+    """What corrects a run of a vehicle model, with states (nodes, n) over so many s."""
+    way = np.hypot(*np.diff(states[:, model.planar[:2]], axis=0).T).sum()
+    return _at_speed(model, SPEEDS * max(round(float(way) / duration / SPEEDS), 1))
+
+
+@lru_cache(maxsize=256)
+def _at_speed(model: DynamicModel, speed: float) -> ErrorModel:
+    return ErrorModel(VehicleShape(model), speed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +57,7 @@ class ErrorModel:
     """Modes of a vehicle's shape at straight running, in which errors are propagated."""
 
     shape: VehicleShape
+    speed: float  # Of straight running in m/s.
 
     def corrected(
         self,
@@ -68,14 +77,14 @@ class ErrorModel:
         n, count = modes.coordinates.shape
         widths = 2 * [states.shape[1]] + [len(self._free.correction), n, 3] + 3 * [count]
         rooms: list[Any] = [np.empty((nodes, columns)) for columns in widths]
-        scratch = Scratch(*rooms, *(np.empty(size) for size in (count, n, n)))
+        scratch = Scratch(*rooms, *(np.empty(size) for size in (count, n, n, 3)))
         of_errors = ModesOfErrors(
             modes.coordinates,
             modes.shapes,
             self._weights(step),
-            np.tile(np.abs(modes.rates) <= FASTEST_START, 2).astype(float),
+            *self._starts(step),
             self._free.correction,
-            np.ascontiguousarray(self.shape.linearised.velocity_a),
+            np.ascontiguousarray(self._linearised.velocity_a),
         )
         passes, result = Passes(WINDOW, MOST_PASSES, settled, LEAST_RANGE), np.empty_like(states)
         loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
@@ -83,6 +92,28 @@ class ErrorModel:
             step, states, inputs, start, *self._bundles, of_errors, passes, scratch, result
         )
         return (None if unsettled < 0 else result), unsettled == 0
+
+    @cached_property
+    def _linearised(self) -> Linearisation:
+        """Derivatives at straight running at the speed, which all states of that motion follow."""
+        linear = self.shape.linearised
+        found: Any = np.linalg.eig(linear.a)
+        rates, vectors = found
+        still = vectors[:, np.abs(rates).argmin()].real
+        faster = still / (linear.velocity_a[1] @ still)
+        return self.shape.linearised_at((self.speed - self.shape.speed) * faster)
+
+    @lru_cache(maxsize=4)  # noqa: B019
+    def _starts(self, step: float) -> tuple[np.ndarray, np.ndarray]:
+        """One (2 modes,) for modes that start with an error, which nodes so far apart follow.
+
+        And what of a start's deviation (n, 3) goes to heading and place while the others decay.
+        """
+        linear, modes = self._linearised, self._modes
+        slow = np.tile(np.abs(modes.rates) * step <= FOLLOWED, 2).astype(float)
+        kept = (modes.coordinates * slow) @ modes.shapes
+        decayed = -np.linalg.pinv(linear.a, rcond=RANK).T @ linear.velocity_a.T
+        return slow, np.ascontiguousarray((np.eye(len(kept)) - kept) @ decayed)
 
     @cached_property
     def _bundles(self) -> tuple[Shape, FullEquations]:
@@ -125,7 +156,7 @@ class ErrorModel:
     def _modes(self) -> Modes:
         """Modes of the free coordinates; of a conjugate pair the upper one."""
         free = self._free
-        found: Any = np.linalg.eig(self.shape.linearised.a[free.indices] @ free.shapes)
+        found: Any = np.linalg.eig(self._linearised.a[free.indices] @ free.shapes)
         rates, vectors = found
         inverse, upper = np.linalg.inv(vectors), rates.imag >= 0.0
         shapes = (free.shapes @ vectors[:, upper]) * np.where(rates[upper].imag > 0.0, 2.0, 1.0)

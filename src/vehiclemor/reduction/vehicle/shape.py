@@ -137,10 +137,15 @@ class VehicleShape:
 
     @cached_property
     def linearised(self) -> Linearisation:
-        """Derivatives at straight running, by central differences."""
+        """Derivatives at straight running."""
+        return self.linearised_at(np.zeros(len(self.indices)))
+
+    def linearised_at(self, deviation: np.ndarray) -> Linearisation:
+        """Derivatives at a deviation (n,) from straight running, by central differences."""
+        point = self.reference + deviation
         n, inputs = len(self.indices), len(self.model.inputs)
-        steps = STEP * np.maximum(1.0, np.abs(self.reference))
-        shapes = np.tile(self.reference, (2 * (n + inputs), 1))
+        steps = STEP * np.maximum(1.0, np.abs(point))
+        shapes = np.tile(point, (2 * (n + inputs), 1))
         values = np.tile(self.model.inputs_at_rest, (len(shapes), 1))
         for side, sign in enumerate((1.0, -1.0)):
             shapes[side : 2 * n : 2] += sign * np.diag(steps)
