@@ -31,7 +31,7 @@ class ShortRepr:
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # type: ignore[arg-type]
 
     def __repr__(self) -> str:
-        fields = self.repr_fields or [f.name for f in dataclasses.fields(self)]  # type: ignore[arg-type]
+        fields = self.repr_fields or [f.name for f in dataclasses.fields(self) if f.repr]  # type: ignore[arg-type]
         texts = (f"{name}={_short(getattr(self, name))}" for name in fields)
         return f"{type(self).__name__}({', '.join(texts)})"
 

@@ -121,10 +121,10 @@ def test_a_run_is_measured_the_same_way_in_grids_and_protocols(vehicle):
             if name not in ("seconds", "offline_seconds", "status", "message", "remark"):
                 np.testing.assert_array_equal(one[name], metrics[name], str(name))
         # A grid shows what a protocol would not trust.
-        assert bool(one["warned"]) == (number == 1)
-        assert one["status"].item() == ("untrusted" if number else "ok")
+        assert bool(one["warned"])
+        assert one["status"].item() == "untrusted"
         assert metrics["status"].item() == "ok"
-        assert bool(metrics["remark"].item()) == (number == 1)
+        assert "not to be trusted" in metrics["remark"].item()
 
 
 def test_of_a_run_that_has_failed_nothing_counts_in_a_protocol(model):
@@ -250,15 +250,13 @@ def test_a_run_is_trusted_exactly_within_the_range(model, frequency, amplitude, 
 @pytest.mark.parametrize(
     ("method", "amplitude", "status"),
     [
-        ("fixed_basis", 1.0, "ok"),
         ("fixed_basis", 1.5, "untrusted"),
-        # What reads nothing of the training is not judged by it.
-        ("linear_single_track", 1.5, "ok"),
+        ("linear_single_track", 1.5, "untrusted"),
         ("full_order", 1.5, "ok"),
         ("replay", 1.5, "ok"),
     ],
 )
-def test_no_trained_method_is_silent_beyond_its_training(method, amplitude, status):
+def test_no_reduced_vehicle_is_silent_where_it_is_wrong(method, amplitude, status):
     model = build("independent_suspension_vehicle")
     tests = (scenario(model.name, 1.0, amplitude),)
     chosen = complete_settings(model, method)
@@ -266,5 +264,5 @@ def test_no_trained_method_is_silent_beyond_its_training(method, amplitude, stat
     found = evaluate(make_experiment(model, method, chosen, training, tests, "errors"))
     assert found["status"].item() == status
     if status == "untrusted":
-        assert "input delta leaves its known range by a factor of" in found["message"].item()
-        assert found["trust_indicator"].item() == pytest.approx(amplitude / 1.1, rel=1e-5)
+        assert "the estimated error of" in found["message"].item()
+        assert found["trust_indicator"].item() > 1.0

@@ -1,7 +1,6 @@
 """How far a reduced vehicle's run is from that of the full model, estimated after the run.
 
-The estimate does not see the first tenth of a second after a start that is out of balance: hop of
-the wheels passes before it matters, see `error_model`.
+The estimate does not see what a start that violates constraints does in its first tenth of a second.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.registry import choice
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
@@ -35,7 +35,7 @@ RESERVE = 1.25
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorEstimate:
+class ErrorEstimate(ShortRepr):
     """Estimated errors of a run's outputs: the run minus that of the full model.
 
     Attributes
@@ -51,6 +51,8 @@ class ErrorEstimate:
     settled
         Whether all corrections were small in the end.
     """
+
+    repr_fields = ("in_bounds", "settled")
 
     times: np.ndarray
     errors: np.ndarray
@@ -110,21 +112,32 @@ def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBo
 def judged_run(
     simulate: Callable[[Excitation, Start], Trajectory],
     reduced: Any,
-    model: Model,
     maneuver: Excitation,
     start: Start,
     bounds: Mapping[str, ErrorBound] | None = None,
 ) -> Trajectory:
-    """A run of a reduced model, judged by its estimated error in bounds, those of the model.
+    """A run of a reduced model, judged by its estimated error in bounds, see `judged`."""
+    return judged(simulate(maneuver, start), simulate, reduced, (maneuver, start), bounds)
+
+
+def judged(
+    run: Trajectory,
+    simulate: Callable[[Excitation, Start], Trajectory],
+    reduced: Any,
+    given: tuple[Excitation, Start],
+    bounds: Mapping[str, ErrorBound] | None = None,
+) -> Trajectory:
+    """A run from what was given, judged by its estimated error in bounds, those of its model.
 
     Full orders have no error, and a model with a fallback judges its runs itself; so does a run
     that comes with a complaint.  Where output times are too far apart for an estimate, it is made
     of the same run with more of them.
     """
-    run = simulate(maneuver, start)
+    (maneuver, start), model = given, run.model
+    if getattr(reduced, "judges", False) or not estimates(model):
+        return run
     known = model.definition.error_bounds if bounds is None else bounds
-    judges = getattr(reduced, "judges", False) or run.status not in WITHOUT_COMPLAINT
-    if judges or not (known and estimates(model)):
+    if not known or run.status not in WITHOUT_COMPLAINT:
         return run
     began, loops, estimate = time.thread_time(), run.seconds, None
     for spacing, settled in LOOKS:

@@ -14,7 +14,7 @@ from vehiclemor.arguments import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction.error_estimate import judged_run
-from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost
+from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
 from vehiclemor.registry import component
@@ -68,9 +68,7 @@ class FallbackModel(ShortRepr):
 
         It is judged by its estimated error in bounds, those of the model by default.
         """
-        run = judged_run(
-            self.reduced.simulate, self.reduced, self.full.model, maneuver, start, bounds
-        )
+        run = judged_run(self.reduced.simulate, self.reduced, maneuver, start, bounds)
         if outputs is not None:
             run = run.chosen(outputs)
         if run.status in WITHOUT_COMPLAINT and run.trust and np.isinf(run.trust.until):
@@ -98,3 +96,19 @@ def with_fallback(reduced: FittedModel, model: Any, settings: Any) -> FittedMode
         solver=settings.fallback, tolerance=settings.fallback_tolerance
     )
     return FallbackModel(reduced, full_order.fit(model, (), chosen))
+
+
+def run_of(
+    reduced: Any,
+    given: tuple[Excitation, Start],
+    outputs: tuple[str, ...] | None,
+    bounds: Mapping[str, ErrorBound] | None,
+    off: bool,
+) -> Trajectory:
+    """A run of a reduced model with some outputs alone; its error is estimated unless it is off."""
+    if isinstance(reduced, FallbackModel) and not off:
+        return reduced.simulate(*given, outputs, bounds)
+    if off or getattr(reduced, "judges", False):
+        return simulated(getattr(reduced, "reduced", reduced), *given, outputs)
+    run = judged_run(reduced.simulate, reduced, *given, bounds)
+    return run if outputs is None else run.chosen(outputs)

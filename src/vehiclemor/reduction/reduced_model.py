@@ -16,11 +16,10 @@ from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
-from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction import model_file
-from vehiclemor.reduction.error_estimate import checked_bounds, estimates, judged_run
-from vehiclemor.reduction.fallback import FallbackModel
-from vehiclemor.reduction.interface import FittedModel, Method, lower_rank, simulated
+from vehiclemor.reduction.error_estimate import checked_bounds
+from vehiclemor.reduction.fallback import run_of
+from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.training import own_speed, training_summary
 from vehiclemor.reduction.trust import InputRange
@@ -35,8 +34,6 @@ from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, ou
 
 if TYPE_CHECKING:
     import xarray as xr
-
-NOT_JUDGED = "its error was not estimated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +116,7 @@ class ReducedOrderModel(ShortRepr):
     ) -> Trajectory:
         """A run at the maneuver's output times.
 
-        Of a vehicle the error of the run is estimated, see `ErrorEstimate`; the run is `untrusted`
-        where the estimate passes a bound.
+        Of a vehicle its error is estimated (`ErrorEstimate`): beyond a bound it is `untrusted`.
 
         Parameters
         ----------
@@ -131,10 +127,9 @@ class ReducedOrderModel(ShortRepr):
         outputs, times
             What of it is recorded, see `Trajectory.chosen`.
         bounds
-            Output -> largest error in its unit, or its `measure` and that: the largest magnitude
-            (`max`, which is meant without one) or the RMS (`rms`).  By default those of the model.
+            Output -> largest error in its unit, or (`max` or `rms`, that); by default the model's.
         trust
-            `estimate`, or `off`: then the run is not judged, and its remark says so.
+            `estimate`, or `off`: the run is not judged.
         """
         chosen = self.model.definition.maneuver if maneuver is None else maneuver
         if isinstance(chosen, str):
@@ -144,34 +139,14 @@ class ReducedOrderModel(ShortRepr):
         own = None if bounds is None else checked_bounds(self.model, bounds)
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
-            run = self._judged(chosen, first, names, own, off)
+            run = run_of(self.reduced, (chosen, first), names, own, off)
         # A copy would take a twentieth of a short run.
         run.__dict__.update(method=self.method, maneuver=chosen.name)
-        if self._lower_rank:
-            run.__dict__["remark"] = "; ".join(filter(None, (run.remark, self._lower_rank)))
-        if off:
-            run.__dict__["remark"] = "; ".join(filter(None, (run.remark, NOT_JUDGED)))
-        elif not run.trust and self._range is not None:
+        remarks = run.remark, self._lower_rank, "its error was not estimated" if off else ""
+        run.__dict__["remark"] = "; ".join(filter(None, remarks))
+        if not (off or run.trust) and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
         return run if times is None else run.chosen(times=times)
-
-    def _judged(
-        self,
-        maneuver: Excitation,
-        start: Start,
-        outputs: tuple[str, ...] | None,
-        bounds: Mapping[str, ErrorBound] | None,
-        off: bool,
-    ) -> Trajectory:
-        """A run with some outputs alone; its error is estimated unless that is off."""
-        reduced: Any = self.reduced
-        if isinstance(reduced, FallbackModel) and not off:
-            return reduced.simulate(maneuver, start, outputs, bounds)
-        if off or getattr(reduced, "judges", False) or not estimates(self.model):
-            fitted = reduced.reduced if isinstance(reduced, FallbackModel) else reduced
-            return simulated(fitted, maneuver, start, outputs)
-        run = judged_run(reduced.simulate, reduced, self.model, maneuver, start, bounds)
-        return run if outputs is None else run.chosen(outputs)
 
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The model with other parameters, reduced by a method that learns from no run.

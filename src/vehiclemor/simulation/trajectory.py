@@ -131,7 +131,7 @@ class Trajectory(ShortRepr):
     method: str = ""
     maneuver: str = ""
     further_states: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    error_estimate: Any = None
+    error_estimate: Any = field(default=None, repr=False)
 
     # Outputs have names: Python would try the numbers 0, 1, ... otherwise.
     __iter__ = None

@@ -14,7 +14,7 @@ from vehiclemor.error_measures import rms
 from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, blamed
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.progress import first_use
-from vehiclemor.reduction.error_estimate import judged_run
+from vehiclemor.reduction.error_estimate import judged as judged_by_error
 from vehiclemor.reduction.fallback import with_fallback
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.settings import Settings
@@ -248,10 +248,7 @@ def _tested(
         checked_run(tested, scenario.maneuver, start, reduced)
         fit.warm = True
     simulate = partial(checked_run, tested, reduced=reduced)
-    if many:
-        run = judged_run(simulate, reduced, tested, scenario.maneuver, start)
-    else:
-        run = simulate(scenario.maneuver, start)
+    run = simulate(scenario.maneuver, start)
     if run.finished and not np.isfinite(run.outputs[: run.samples_to_stop]).all():
         run = replace(run, status="diverged", message="an output is not finite")
     if reference is not None and run.stops_early(reference):
@@ -259,7 +256,7 @@ def _tested(
         run = replace(run, status="diverged", message=message)
     if remark := lower_rank(experiment.settings, reduced):
         run = replace(run, remark="; ".join(filter(None, (run.remark, remark))))
-    judged = run
+    judged = judged_by_error(run, simulate, reduced, (scenario.maneuver, start))
     method: Method = component("method", experiment.method)
     trained = partial(known_inputs, model, experiment.training, method.follows_time)
     # A model that is silent is not trusted beyond the inputs that its method knows.
@@ -267,6 +264,8 @@ def _tested(
         judged = run.judged(known.trust(model, scenario.maneuver, speed_of(model, scenario)))
     if many:
         return Outcome(judged, reference)
+    # Times of a study on a grid are those of the method alone.
+    judged = Trajectory.of(**judged.__dict__ | {"seconds": run.seconds})
     if judged.status != run.status:
         # A study shows what a protocol would not trust; the status is that of the method.
         remark = "; ".join(filter(None, (run.remark, f"not to be trusted: {judged.message}")))
