@@ -1,6 +1,6 @@
 """How far a reduced vehicle's run is from that of the full model, estimated after the run.
 
-The estimate does not see what a start that violates constraints does in its first tenth of a second.
+What a start that violates constraints does in its first tenth of a second is not seen.
 """
 
 from __future__ import annotations
