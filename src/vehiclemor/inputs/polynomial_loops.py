@@ -102,7 +102,7 @@ def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
     degree, pieces, segments = coefficients.shape[1] - 1, len(coefficients), len(edges) - 1
     for j in range(coefficients.shape[2]):
         low, high, since = math.inf, -math.inf, math.inf
-        segment, parts, span, share = 0, 1, 1.0, 1.0
+        segment = 0
         even = (edges[1] - edges[0]) / (first[1] - first[0])
         for piece in range(pieces):
             if piece == first[segment + 1] and segment + 1 < segments:

@@ -280,21 +280,22 @@ def full_rates(first, end, inputs, shape, equations, scratch):
         call_lanes(equations.kernels, 0, *arrays, scratch.rates, at)
         if scratch.violations.shape[1]:
             call_lanes(equations.kernels, 1, *arrays, scratch.violations, at)
+    heading = shape.planar[0]
+    for i in range(first, end):
+        rates, state = scratch.rates[i], scratch.states[i]
+        for p in range(len(shape.pairs)):
+            # Components in a frame that turns.
+            a, b = shape.pairs[p, 0], shape.pairs[p, 1]
+            rates[a] += rates[heading] * state[b]
+            rates[b] -= rates[heading] * state[a]
 
 
 def modal_sources(begin, end, shape, modes, scratch):
     """What drives the errors at the nodes of a window, in modes."""
-    count, heading = modes.weights.shape[1], shape.planar[0]
+    count = modes.weights.shape[1]
     for i in range(begin, end):
-        rates, state, into = scratch.rates[i], scratch.states[i], scratch.sources[i]
+        rates, into = scratch.rates[i], scratch.sources[i]
         errors, path = scratch.errors[i], scratch.path_rates[i]
-        turn = rates[heading]
-        for p in range(len(shape.pairs)):
-            # Components in a frame that turns.
-            a, b = shape.pairs[p, 0], shape.pairs[p, 1]
-            if i > begin or begin == 0:
-                rates[a] += turn * state[b]
-                rates[b] -= turn * state[a]
         for k in range(count):
             real, imaginary = modes.weights[RATES, k], modes.weights[RATES + 1, k]
             a, b = errors[k], errors[count + k]

@@ -9,8 +9,7 @@ in which A is their linearisation at straight running.  It is propagated exactly
 the bracket is taken from the pass before, in windows of time one after another.  This is deferred
 correction by an exponential integrator (A. Dutt, L. Greengard, V. Rokhlin, BIT 40, 2000, 241-266;
 M. Hochbruck, A. Ostermann, Acta Numerica 19, 2010, 209-286).  Constraints are met by Newton's
-method with a frozen Jacobian.  Heading and position of the corrected shape
-are quadratures.
+method with a frozen Jacobian.  Heading and position of the corrected shape are quadratures.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy.linalg
 
-from vehiclemor.codegen.loops import loops
+from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.reduction.error_loops import FullEquations, ModesOfErrors, Passes, Scratch, Shape
 from vehiclemor.reduction.vehicle.shape import RANK, Linearisation, VehicleShape
@@ -49,7 +48,29 @@ def error_model(model: DynamicModel, states: np.ndarray, duration: float) -> Err
 
 @lru_cache(maxsize=256)
 def _at_speed(model: DynamicModel, speed: float) -> ErrorModel:
-    return ErrorModel(VehicleShape(model), speed)
+    return ErrorModel(_shape(model), speed)
+
+
+# Its derivatives serve all speeds.
+@lru_cache(maxsize=64)
+def _shape(model: DynamicModel) -> VehicleShape:
+    return VehicleShape(model)
+
+
+@lru_cache(maxsize=256)
+def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
+    """What the loop needs of the modes at nodes that are a step in s apart."""
+    modes = errors.modes
+    return ready(
+        ModesOfErrors(
+            modes.coordinates,
+            modes.shapes,
+            errors.weights(step),
+            *errors.starts(step),
+            errors.free.correction,
+            np.ascontiguousarray(errors.linearised.velocity_a),
+        )
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,19 +94,11 @@ class ErrorModel:
         and the start (n,) of the full model.  The truth value tells whether all changes were small
         enough in the end to be settled.
         """
-        nodes, modes = len(states), self._modes
-        n, count = modes.coordinates.shape
-        widths = 2 * [states.shape[1]] + [len(self._free.correction), n, 3] + 3 * [count]
+        nodes, (n, count) = len(states), self.modes.coordinates.shape
+        widths = 2 * [states.shape[1]] + [len(self.free.correction), n, 3] + 3 * [count]
         rooms: list[Any] = [np.empty((nodes, columns)) for columns in widths]
         scratch = Scratch(*rooms, *(np.empty(size) for size in (count, n, n, 3)))
-        of_errors = ModesOfErrors(
-            modes.coordinates,
-            modes.shapes,
-            self._weights(step),
-            *self._starts(step),
-            self._free.correction,
-            np.ascontiguousarray(self._linearised.velocity_a),
-        )
+        of_errors = _modes_of_errors(self, step)
         passes, result = Passes(WINDOW, MOST_PASSES, settled, LEAST_RANGE), np.empty_like(states)
         loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
         unsettled = loop(
@@ -94,7 +107,7 @@ class ErrorModel:
         return (None if unsettled < 0 else result), unsettled == 0
 
     @cached_property
-    def _linearised(self) -> Linearisation:
+    def linearised(self) -> Linearisation:
         """Derivatives at straight running at the speed, which all states of that motion follow."""
         linear = self.shape.linearised
         found: Any = np.linalg.eig(linear.a)
@@ -103,20 +116,19 @@ class ErrorModel:
         faster = still / (linear.velocity_a[1] @ still)
         return self.shape.linearised_at((self.speed - self.shape.speed) * faster)
 
-    @lru_cache(maxsize=4)  # noqa: B019
-    def _starts(self, step: float) -> tuple[np.ndarray, np.ndarray]:
+    def starts(self, step: float) -> tuple[np.ndarray, np.ndarray]:
         """One (2 modes,) for modes that start with an error, which nodes so far apart follow.
 
         And what of a start's deviation (n, 3) goes to heading and place while the others decay.
         """
-        linear, modes = self._linearised, self._modes
+        linear, modes = self.linearised, self.modes
         slow = np.tile(np.abs(modes.rates) * step <= FOLLOWED, 2).astype(float)
         kept = (modes.coordinates * slow) @ modes.shapes
         decayed = -np.linalg.pinv(linear.a, rcond=RANK).T @ linear.velocity_a.T
         return slow, np.ascontiguousarray((np.eye(len(kept)) - kept) @ decayed)
 
     @cached_property
-    def _bundles(self) -> tuple[Shape, FullEquations]:
+    def _bundles(self) -> tuple[Ready, Ready]:
         """The shape and the full equations, as the loop takes them."""
         shape, model = self.shape, self.shape.model
         x, y, heading = model.planar
@@ -125,10 +137,9 @@ class ErrorModel:
         addresses = [
             address_of(model.kernels, n, LANES) if n in model.kernels else 0 for n in names
         ]
-        return (
-            Shape(shape.indices, np.array([heading, x, y]), pairs, shape.reference),
-            FullEquations(np.array(addresses), model.constants),
-        )
+        places = shape.indices, np.array([heading, x, y]), pairs, shape.reference
+        equations = FullEquations(np.array(addresses), model.constants)
+        return ready(Shape(*places)), ready(equations)
 
     def _violations(self, deviations: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Violations of the constraints and their rates (samples, 2 c)."""
@@ -138,7 +149,7 @@ class ErrorModel:
         return at_samples(model.kernels, "violations", model.constants, (states, inputs), sizes)
 
     @cached_property
-    def _free(self) -> Free:
+    def free(self) -> Free:
         """Coordinates of the shape that are free, those by which the others are known best."""
         shape, n = self.shape, len(self.shape.indices)
         if not shape.model.definition.constraints:
@@ -153,10 +164,10 @@ class ErrorModel:
         return Free(free, inverse[:, : len(free)], np.ascontiguousarray(inverse[:, len(free) :].T))
 
     @cached_property
-    def _modes(self) -> Modes:
+    def modes(self) -> Modes:
         """Modes of the free coordinates; of a conjugate pair the upper one."""
-        free = self._free
-        found: Any = np.linalg.eig(self._linearised.a[free.indices] @ free.shapes)
+        free = self.free
+        found: Any = np.linalg.eig(self.linearised.a[free.indices] @ free.shapes)
         rates, vectors = found
         inverse, upper = np.linalg.inv(vectors), rates.imag >= 0.0
         shapes = (free.shapes @ vectors[:, upper]) * np.where(rates[upper].imag > 0.0, 2.0, 1.0)
@@ -168,17 +179,15 @@ class ErrorModel:
             np.ascontiguousarray(np.vstack([shapes.real.T, -shapes.imag.T])),
         )
 
-    @lru_cache(maxsize=4)  # noqa: B019
-    def _weights(self, step: float) -> np.ndarray:
+    def weights(self, step: float) -> np.ndarray:
         """Weights of a step in s, see `error_loops`."""
-        z: Any = self._modes.rates * step
+        z: Any = self.modes.rates * step
         small = np.abs(z) < SERIES
         divisor = np.where(small, 1.0, z)
         decay = np.exp(z)
         mean = np.where(small, 1.0 + z / 2.0 + z**2 / 6.0, (decay - 1.0) / divisor)
         end = np.where(small, 0.5 + z / 6.0 + z**2 / 24.0, (mean - 1.0) / divisor)
-        parts = decay, step * (mean - end), step * end
-        parts = (*parts, self._modes.rates)
+        parts = decay, step * (mean - end), step * end, self.modes.rates
         return np.array([half for part in parts for half in (part.real, part.imag)])
 
 

@@ -31,7 +31,6 @@ class DecodingSpace(NamedTuple):
     `counts` are the words of the call in which the number of rows stands.
     """
 
-    times: np.ndarray
     states: np.ndarray
     call: Prepared
     counts: Sequence[int]
@@ -85,30 +84,27 @@ class Decoding(ShortRepr):
         sizes = self.features.states + PLANAR, self.features.inputs, self._results
         return at_samples(kernels, "full_state", constants, (path, inputs), sizes)
 
-    def of_run(self, run: Run, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Times and, as of `states`, results where a run is recorded: its first `run.rows` rows.
+    def of_run(self, run: Run, inputs: np.ndarray) -> np.ndarray:
+        """As of `states`, results where a run is recorded: its first `run.rows` rows.
 
-        `inputs` are those at the samples.  The arrays belong to the run.
+        `inputs` are those at the samples.  The array belongs to the run.
         """
         space = run.cached_loops.get("decoded")
         if space is None:
-            times, inputs = run.recorded_at(inputs)
-            space = self._space(times, run.recorded_states, inputs, run.rows)
+            space = self._space(run.recorded_states, run.recorded_at(inputs)[1], run.rows)
             run.cached_loops["decoded"] = space
         for index in space.counts:
             space.call.words[index] = run.rows
         space.call()
-        return space.times, space.states
+        return space.states
 
-    def _space(
-        self, times: np.ndarray, path: np.ndarray, inputs: np.ndarray, rows: int
-    ) -> DecodingSpace:
+    def _space(self, path: np.ndarray, inputs: np.ndarray, rows: int) -> DecodingSpace:
         """The loop over arrays of a run, packed once."""
         kernels, constants = self._kernels
         lanes = LANES if rows >= LANES else 1
         address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
-        states = np.empty((len(times), self._results))
+        states = np.empty((len(path), self._results))
         loop = path_loops()["lane_path" if lanes == LANES else "kernel_path"]
         call = loop.prepared(path, inputs, address, constants, states)
         counts = [call.address(name) + 1 for name in ("path", "inputs", "result")]
-        return DecodingSpace(times, states, call, counts)
+        return DecodingSpace(states, call, counts)

@@ -120,11 +120,9 @@ class ReducedVehicle(ReducedSystem):
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
         """How far states (samples, states + 3) go in the ranges that are watched."""
-        return self._trust(np.zeros(len(states)), self.decoder.states(states, inputs))
-
-    def _trust(self, times: np.ndarray, decoded: np.ndarray) -> Trust | None:
         names = [name for _, name in self.decoder.features.watched]
-        return trust_of(times, decoded[:, self.decoder.layout.size :], names) if names else None
+        used = self.decoder.states(states, inputs)[:, self.decoder.layout.size :]
+        return trust_of(np.zeros(len(states)), used, names) if names else None
 
     def encode(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Reduced state (states + 3,) of a full one and the inputs (inputs,) at that time.
@@ -175,7 +173,7 @@ class ReducedVehicle(ReducedSystem):
         inputs = maneuver.recorded_inputs[1]
         state, encoded = self.known(start, inputs[0])
         run = self.run(maneuver, encoded, direct_until=0.0)
-        states = self.decoder.of_run(run, inputs)[1]
+        states = self.decoder.of_run(run, inputs)
         if not len(run.point_of_sample) or run.point_of_sample[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(state)] = state
