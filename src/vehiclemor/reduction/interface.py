@@ -16,7 +16,6 @@ import numpy as np
 from vehiclemor.arguments import line_of_text, quoted
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.reduction.error_estimate import estimates
 from vehiclemor.reduction.settings import Settings, Value
 from vehiclemor.reduction.trust import InputRange, band_range
 from vehiclemor.registry import choice
@@ -237,7 +236,7 @@ class Method(ShortRepr):
         self, model: Model, settings: Mapping[str, Any], trained: Callable[[], InputRange | None]
     ) -> InputRange | None:
         """Known inputs, where runs carry no trust indicator; none where all are known."""
-        if self.own_limits or estimates(model):
+        if self.own_limits:
             return None
         if self.learns_from != "nothing":
             return trained()

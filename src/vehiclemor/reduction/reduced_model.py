@@ -168,12 +168,6 @@ class ReducedOrderModel(ShortRepr):
         return replace(self, model=model, reduced=for_model(method, self.reduced, model, settings))
 
     @cached_property
-    def _learnt(self) -> InputRange | None:
-        """Inputs that the method has learnt from, if it has, and does not judge its states."""
-        method: Method = component("method", self.method)
-        return None if method.own_limits or method.learns_from == "nothing" else self.input_range
-
-    @cached_property
     def _range(self) -> InputRange | None:
         """Known inputs, if the method does not judge its runs."""
         method: Method = component("method", self.method)
@@ -303,8 +297,8 @@ class ReducedOrderModel(ShortRepr):
         if left := self._left_validity(states, u):
             return Trust(np.inf, 0.0, left)
         trust = self._stepped.trust(states, u)
-        if trust is None and self._learnt:
-            trust = self._learnt.trust_of_inputs(self.inputs, u)
+        if trust is None and self._range is not None:
+            trust = self._range.trust_of_inputs(self.inputs, u)
         return trust or Trust(0.0)
 
     def _left_validity(self, states: np.ndarray, inputs: np.ndarray) -> str:

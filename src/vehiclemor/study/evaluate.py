@@ -260,7 +260,7 @@ def _tested(
     method: Method = component("method", experiment.method)
     trained = partial(known_inputs, model, experiment.training, method.follows_time)
     # A model that is silent is not trusted beyond the inputs that its method knows.
-    if not run.trust and (known := method.known_range(model, experiment.settings, trained)):
+    if not judged.trust and (known := method.known_range(model, experiment.settings, trained)):
         judged = run.judged(known.trust(model, scenario.maneuver, speed_of(model, scenario)))
     if many:
         return Outcome(judged, reference)

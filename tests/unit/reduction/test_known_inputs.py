@@ -1,5 +1,6 @@
 """Reduced models tell of inputs that they have not been trained on, between output times too."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -72,6 +73,17 @@ def test_pod_tells_when_it_leaves_its_training_run():
     assert run.error_estimate.in_bounds == pytest.approx(missed(pod, run, full), rel=0.05)
     # Half a second of the training run is known; what comes then is not.
     assert 0.0 < run.trust.until < 1.0
+
+
+def test_a_vehicle_without_error_bounds_knows_its_training():
+    car = vm.model(CAR)
+    car = replace(car, definition=replace(car.definition, error_bounds={}))
+    pod, wider = vm.reduce(car, "pod", rank=3), vm.maneuver("lane_change", amplitude=1.3)
+    assert pod.simulate("lane_change").status == "ok"
+    run = pod.simulate(wider)
+    assert run.status == "untrusted"
+    assert "leaves its known range" in run.message
+    assert pod.simulate(wider, bounds={"yaw": 10.0}).status == "ok"
 
 
 def test_a_lower_rank_than_asked_for_is_told():

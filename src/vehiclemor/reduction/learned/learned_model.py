@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.reduction.error_estimate import estimates
 from vehiclemor.reduction.interface import OfflineCost, installed
 from vehiclemor.reduction.learned.samples import (
     Coordinates,
@@ -289,7 +290,8 @@ class LearnedModel(ShortRepr):
         else:
             states = self._states(times, values, state)
             run = model.trajectory(times, inputs, states, counts, seconds, failure)
-        if run.status != "ok":
+        # The error of a vehicle's run is estimated afterwards.
+        if run.status != "ok" or estimates(model):
             return run
         known = np.hstack([table, used[:, len(model.inputs) :]])
         beyond = (known - self.middle) / np.where(self.reach > 0.0, self.reach, 1.0)

@@ -203,20 +203,21 @@ def test_reduced_lateral_dynamics_answer_slow_steering_as_all_modes_do(car, meth
         vm.reduce(car, method, rank=90)
 
 
-def test_a_run_beyond_the_states_of_training_is_not_trusted(car, runs):
-    reduced, _ = learned("operator_inference", car, runs, rank=4, form="linear")
-    assert reduced.simulate(runs[0].maneuver, "equilibrium").status == "ok"
-    run = reduced.simulate(lane_change, "dropped")
-    assert (run.status, run.trust.until) == ("untrusted", 0.0)
-    assert run.trust.reason.startswith("component ")
+def test_a_car_is_judged_by_its_error_not_by_the_states_of_training():
+    reduced = vm.reduce(CAR, "operator_inference", training="lane_change", rank=4, form="linear")
+    wider = vm.maneuver("lane_change", amplitude=1.3)
+    assert reduced.simulate(wider).message.startswith("the estimated error of yaw is ")
+    assert reduced.simulate(wider, bounds={"yaw": 10.0}).status == "ok"
 
 
-def test_a_truck_without_the_payload_of_training_is_not_trusted():
+def test_a_truck_beyond_the_states_or_the_payload_of_training_is_not_trusted():
     truck = vm.model("flexible_truck")
     reduced = vm.reduce(truck, "dynamic_mode_decomposition", training="road:1", rank=10)
     own, empty = reduced.simulate("road:1"), reduced.for_parameters({"payload": 0.0})
     assert own.status == "ok"
     assert "payload" in empty.simulate("road:1").message
+    rougher = reduced.simulate(vm.maneuver("road:1", amplitude=1.5))
+    assert rougher.message.startswith("component ")
 
 
 def test_what_cannot_be_learned_is_said_in_one_line(car, runs, monkeypatch, tmp_path):
