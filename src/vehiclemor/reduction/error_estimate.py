@@ -111,30 +111,27 @@ def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBo
 
 def judged_run(
     simulate: Callable[[Excitation, Start], Trajectory],
-    reduced: Any,
     maneuver: Excitation,
     start: Start,
     bounds: Mapping[str, ErrorBound] | None = None,
 ) -> Trajectory:
     """A run of a reduced model, judged by its estimated error in bounds, see `judged`."""
-    return judged(simulate(maneuver, start), simulate, reduced, (maneuver, start), bounds)
+    return judged(simulate(maneuver, start), simulate, (maneuver, start), bounds)
 
 
 def judged(
     run: Trajectory,
     simulate: Callable[[Excitation, Start], Trajectory],
-    reduced: Any,
     given: tuple[Excitation, Start],
     bounds: Mapping[str, ErrorBound] | None = None,
 ) -> Trajectory:
     """A run from what was given, judged by its estimated error in bounds, those of its model.
 
-    Full orders have no error, and a model with a fallback judges its runs itself; so does a run
-    that comes with a complaint.  Where output times are too far apart for an estimate, it is made
-    of the same run with more of them.
+    One that its model has judged, or that comes with a complaint, stays as it is.  Where output
+    times are too far apart for an estimate, it is made of the same run with more of them.
     """
     (maneuver, start), model = given, run.model
-    if getattr(reduced, "judges", False) or not estimates(model):
+    if run.trust or not estimates(model):
         return run
     known = model.definition.error_bounds if bounds is None else bounds
     if not known or run.status not in WITHOUT_COMPLAINT:

@@ -31,7 +31,6 @@ class FallbackModel(ShortRepr):
 
     reduced: FittedModel
     full: ReducedSystem
-    judges = True
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if the first is no reduced model."""
@@ -68,7 +67,7 @@ class FallbackModel(ShortRepr):
 
         It is judged by its estimated error in bounds, those of the model by default.
         """
-        run = judged_run(self.reduced.simulate, self.reduced, maneuver, start, bounds)
+        run = judged_run(self.reduced.simulate, maneuver, start, bounds)
         if outputs is not None:
             run = run.chosen(outputs)
         if run.status in WITHOUT_COMPLAINT and run.trust and np.isinf(run.trust.until):
@@ -108,7 +107,7 @@ def run_of(
     """A run of a reduced model with some outputs alone; its error is estimated unless it is off."""
     if isinstance(reduced, FallbackModel) and not off:
         return reduced.simulate(*given, outputs, bounds)
-    if off or getattr(reduced, "judges", False):
+    if off:
         return simulated(getattr(reduced, "reduced", reduced), *given, outputs)
-    run = judged_run(reduced.simulate, reduced, *given, bounds)
+    run = judged_run(reduced.simulate, *given, bounds)
     return run if outputs is None else run.chosen(outputs)

@@ -139,7 +139,7 @@ class ReducedOrderModel(ShortRepr):
         own = None if bounds is None else checked_bounds(self.model, bounds)
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
-            run = run_of(self.reduced, (chosen, first), names, own, off)
+            run = run_of(self.reduced, (chosen, first), names, own, off or self._own_limits)
         # A copy would take a twentieth of a short run.
         run.__dict__.update(method=self.method, maneuver=chosen.name)
         remarks = run.remark, self._lower_rank, "its error was not estimated" if off else ""
@@ -166,6 +166,10 @@ class ReducedOrderModel(ShortRepr):
         model, method = reparametrised(self.model, parameters), component("method", self.method)
         settings = validated(method, self.model.kind, self.settings)
         return replace(self, model=model, reduced=for_model(method, self.reduced, model, settings))
+
+    @cached_property
+    def _own_limits(self) -> bool:
+        return component("method", self.method).own_limits
 
     @cached_property
     def _range(self) -> InputRange | None:

@@ -256,8 +256,10 @@ def _tested(
         run = replace(run, status="diverged", message=message)
     if remark := lower_rank(experiment.settings, reduced):
         run = replace(run, remark="; ".join(filter(None, (run.remark, remark))))
-    judged = judged_by_error(run, simulate, reduced, (scenario.maneuver, start))
     method: Method = component("method", experiment.method)
+    judged = run
+    if not method.own_limits:
+        judged = judged_by_error(run, simulate, (scenario.maneuver, start))
     trained = partial(known_inputs, model, experiment.training, method.follows_time)
     # A model that is silent is not trusted beyond the inputs that its method knows.
     if not judged.trust and (known := method.known_range(model, experiment.settings, trained)):

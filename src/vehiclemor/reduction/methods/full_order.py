@@ -88,8 +88,6 @@ def _presets(solver: str, tolerance: float, **others: Mapping[str, Value]) -> Pr
 class FullOrder:
     """The full-order model as if it were a reduced one."""
 
-    judges = True
-
     model: Model
     solver: str
     tolerance: float

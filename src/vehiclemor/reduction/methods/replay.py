@@ -26,8 +26,6 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 class ReplayModel(ShortRepr):
     """Stored training trajectories, each with the conditions (runs, k) that it began with."""
 
-    judges = True
-
     model: Model
     recorded: tuple[Trajectory, ...]
     conditions: np.ndarray
