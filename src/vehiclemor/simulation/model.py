@@ -17,8 +17,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.columns import listed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
-from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.input_choice import driving
+from vehiclemor.multibody.definition import ModelDefinition, driving
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
