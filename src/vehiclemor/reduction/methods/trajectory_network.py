@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, installed
-from vehiclemor.reduction.learned.learned_model import (
+from vehiclemor.reduction.learned_model import (
     LearnedModel,
     LearnedSettings,
     TrainingData,

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, installed
-from vehiclemor.reduction.learned.samples import (
+from vehiclemor.reduction.learned_samples import (
     Coordinates,
     Samples,
     States,
