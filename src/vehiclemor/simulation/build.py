@@ -32,7 +32,7 @@ from vehiclemor.parameters import (
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
-from vehiclemor.simulation.constants import hoisted_constants, solved_parameters, values_of
+from vehiclemor.simulation.evaluation import hoisted_constants, solved_parameters, values_of
 from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
 if TYPE_CHECKING:
