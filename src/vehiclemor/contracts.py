@@ -66,7 +66,7 @@ def _check_algebraic(model: AlgebraicModel, maneuver: Excitation) -> None:
     jacobian, step = model.jacobian(q, u), 1e-6
     # Residuals and their rounding errors are as large as the Jacobian.
     size = max(1.0, float(np.abs(jacobian).max()))
-    largest = np.abs(model.residual_at(trajectory.coordinates, trajectory.inputs)).max()
+    largest = np.abs(model.values_at("residual", trajectory.coordinates, trajectory.inputs)).max()
     assert largest < 1e-10 * size, f"{name}: residual {largest:.1e} along the nominal run"
     differences = np.column_stack(
         [

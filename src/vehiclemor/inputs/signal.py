@@ -29,8 +29,8 @@ from vehiclemor.inputs.excitation import (
     polynomial_loops,
     values_at,
 )
-from vehiclemor.inputs.interpolation import HOLDS, interpolants, time_derivative
 from vehiclemor.inputs.polynomial_loops import Pieces
+from vehiclemor.inputs.polynomials import HOLDS, interpolants, time_derivative
 from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, integral_of
 from vehiclemor.registry import choice
 

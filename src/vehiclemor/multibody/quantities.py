@@ -68,12 +68,6 @@ WHEELS = ("FL", "FR", "RL", "RR")
 
 # Outputs that are zero where a wheel has left the road.
 TIRE_LOADS = tuple(f"Fz_{wheel}" for wheel in WHEELS)
-SLIP_RATIOS = tuple(f"slip_ratio_{wheel}" for wheel in WHEELS)
-# Outputs that are zero where a vehicle has come to rest.
-STANDSTILL = ("longitudinal_speed", "lateral_speed")
-# Bounds beyond which the models mean nothing: of the longitudinal speed, and of the attitude.
-FORWARD = (0.5, math.inf)
-UPRIGHT = {"roll": (-1.2, 1.2), "pitch": (-1.2, 1.2)}
 
 
 def error_bounds(yaw: float) -> dict[str, ErrorBound]:
@@ -128,7 +122,16 @@ def _optional_inputs() -> Iterator[tuple[Quantity, tuple[float, float]]]:
 # What drives, brakes and lifts a vehicle, and where these inputs mean anything.
 _RANGES = dict(_optional_inputs())
 OPTIONAL_INPUTS = tuple(_RANGES)
-OPTIONAL_RANGES = {quantity.name: valid for quantity, valid in _RANGES.items()}
+# What the declarations of all vehicles share.
+VEHICLE: dict[str, Any] = {
+    "optional_inputs": OPTIONAL_INPUTS,
+    "standstill": ("longitudinal_speed", "lateral_speed"),
+    "loads": TIRE_LOADS,
+    "slips": tuple(f"slip_ratio_{wheel}" for wheel in WHEELS),
+}
+# Where they mean anything: they drive forwards and stand upright.
+VALIDITY = {"longitudinal_speed": (0.5, math.inf), "roll": (-1.2, 1.2), "pitch": (-1.2, 1.2)}
+VALIDITY |= {quantity.name: valid for quantity, valid in _RANGES.items()}
 
 
 def declared(model: str) -> dict[str, Any]:
@@ -142,13 +145,13 @@ def declared(model: str) -> dict[str, Any]:
     return tables
 
 
-def equations_of(package: str) -> Callable[..., Any]:
-    """What derives by the module `equations` of a package; SymPy is imported when it is called."""
-    return partial(_derived, f"vehiclemor.multibody.{package}.equations")
+def equations_of(package: str, function: str = "derive") -> Callable[..., Any]:
+    """A function of the module `equations` of a package; SymPy is imported when it is called."""
+    return partial(_derived, f"vehiclemor.multibody.{package}.equations", function)
 
 
-def _derived(module: str, *choice: Any) -> Any:
-    return import_module(module).derive(*choice)
+def _derived(module: str, function: str, *choice: Any) -> Any:
+    return getattr(import_module(module), function)(*choice)
 
 
 def check_moments(name: str, moments: np.ndarray) -> None:

@@ -8,8 +8,7 @@ from pydantic import BaseModel
 
 from vehiclemor.files import data_names
 from vehiclemor.inputs.excitation import FACTORS
-from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
-from vehiclemor.multibody.input_choice import with_overrides
+from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition, with_overrides
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path
 from vehiclemor.reduction.interface import never_refused
 from vehiclemor.reduction.model_file import training_of

@@ -110,10 +110,6 @@ class AlgebraicModel(Model):
         follows = self.jacobian_of(function, state, u, "state") @ moved
         return self.jacobian_of(function, state, u, by) + follows
 
-    def residual_at(self, coordinates: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Residuals (samples, n) along a path of coordinates and inputs."""
-        return self.values_at("residual", coordinates, inputs, finite=True)
-
     def joints_at(self, q: Any) -> dict[str, np.ndarray]:
         """Positions (3,) in m of the moving joints, for drawing."""
         positions = self.evaluated("joints", q, np.zeros(len(self.inputs)))

@@ -14,8 +14,13 @@ from vehiclemor.arguments import quoted, real_array
 from vehiclemor.codegen.kernels import Derivation, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.exceptions import GeometryError, InputError, VehiclemorError, blamed
-from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
-from vehiclemor.multibody.input_choice import driving, with_constants, with_overrides
+from vehiclemor.multibody.definition import (
+    DESIGN_START,
+    ModelDefinition,
+    driving,
+    with_constants,
+    with_overrides,
+)
 from vehiclemor.multibody.quantities import DEFAULTS
 from vehiclemor.parameters import (
     ParameterSet,
@@ -27,7 +32,7 @@ from vehiclemor.parameters import (
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
-from vehiclemor.simulation.constants import hoisted_constants, solved_parameters, values_of
+from vehiclemor.simulation.evaluation import hoisted_constants, solved_parameters, values_of
 from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
 if TYPE_CHECKING:

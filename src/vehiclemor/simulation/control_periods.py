@@ -10,9 +10,6 @@ from vehiclemor.codegen.loops import Ready, ready
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.loop_arguments import Spans, Subspaces
 
-# Lists of spans that are cached.
-MOST_SPANS = 64
-
 
 @dataclass(frozen=True)
 class ControlPeriods(ShortRepr):
@@ -50,20 +47,14 @@ class ControlPeriods(ShortRepr):
         """Subspaces as the compiled loop takes them."""
         return ready(Subspaces(self.means, self.trial_basis, self.test_basis, self.ranks))
 
-    @cached_property
-    def _spans(self) -> dict[tuple[bytes, float], Ready]:
-        return {}
-
     def spans(self, breaks: np.ndarray, end: float, begin: float = 0.0) -> Ready:
-        """As `smooth_spans`, with the window edges; those of complete runs are cached."""
-        if begin:
-            return ready(smooth_spans(breaks, self.edges, end, begin))
-        key = breaks.tobytes(), end
-        if key not in self._spans:
-            if len(self._spans) >= MOST_SPANS:
-                self._spans.clear()
-            self._spans[key] = ready(smooth_spans(breaks, self.edges, end))
-        return self._spans[key]
+        """As `smooth_spans`, with the window edges; cached."""
+        return _spans(breaks.tobytes(), self.edges.tobytes(), end, begin)
+
+
+@lru_cache(maxsize=256)
+def _spans(breaks: bytes, edges: bytes, end: float, begin: float) -> Ready:
+    return ready(smooth_spans(np.frombuffer(breaks), np.frombuffer(edges), end, begin))
 
 
 def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float = 0.0) -> Spans:

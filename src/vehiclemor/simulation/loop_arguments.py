@@ -17,6 +17,7 @@ RHS_CALLS, STEPS, REJECTED_STEPS, JACOBIANS, FACTORISATIONS, LINEAR_SOLVES = ran
 # Nodes of a step: the Chebyshev points of a cubic, as parts of the step.
 NODES = 4
 NODE_1, NODE_2 = 0.03806023374435663, 0.30865828381745514
+NO_INPUTS = np.empty((0, 0))
 
 
 class Equations(NamedTuple):
@@ -162,45 +163,25 @@ class Output(NamedTuple):
     record_all_until: Float
 
     @classmethod
-    def at_samples(
+    def of(
         cls,
         samples: np.ndarray,
         states: np.ndarray,
         counts: np.ndarray,
-        inputs: np.ndarray | None = None,
+        inputs: np.ndarray = NO_INPUTS,
+        record_all_until: float = math.inf,
     ) -> "Output":
-        """Record a run at its samples."""
-        return cls(
-            samples,
-            states,
-            np.zeros(1, dtype=np.int64),
-            counts,
-            sample_inputs=np.empty((0, 0)) if inputs is None else inputs,
-            point_inputs=np.empty((0, 0)),
-            point_times=np.empty(0),
-            point_of_sample=np.empty((0, 2)),
-            record_all_until=math.inf,
-        )
-
-    @classmethod
-    def at_points(
-        cls,
-        samples: np.ndarray,
-        states: np.ndarray,
-        counts: np.ndarray,
-        inputs: np.ndarray,
-        record_all_until: float,
-    ) -> "Output":
-        """Record a run at few points from a time on."""
+        """Record a run at its samples, or from a time on at few points."""
+        points = len(samples) if record_all_until < math.inf else 0
         return cls(
             samples,
             states,
             np.zeros(1, dtype=np.int64),
             counts,
             sample_inputs=inputs,
-            point_inputs=np.empty(inputs.shape),
-            point_times=np.empty(len(samples)),
-            point_of_sample=np.empty((len(samples), 2)),
+            point_inputs=np.empty((points, inputs.shape[1])),
+            point_times=np.empty(points),
+            point_of_sample=np.empty((points, 2)),
             record_all_until=record_all_until,
         )
 

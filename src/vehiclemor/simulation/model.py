@@ -17,21 +17,22 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.columns import listed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
-from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.input_choice import driving
+from vehiclemor.multibody.definition import ModelDefinition, driving
 from vehiclemor.parameters import ParameterSet
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import checked_array
-from vehiclemor.simulation.constants import components, constant_derivatives, solved_parameters
 from vehiclemor.simulation.evaluation import (
     CONSTANTS,
     PLACES,
     By,
     at_samples,
+    components,
+    constant_derivatives,
     directional,
     parameter_names,
     partial,
+    solved_parameters,
 )
 from vehiclemor.simulation.trajectory import COUNTS, EVALUATIONS, Names, Start, Trajectory
 

@@ -146,7 +146,7 @@ class SteppedSystem:
         if self.moved:
             windows = replace(windows, means=windows.means.copy())
         drive = RunInputs(signal, spans, np.empty((0, 0)))
-        output = Output.at_samples(sample, path, counts)
+        output = Output.of(sample, path, counts)
         space = self.system.packed(windows, Solver(self.solver, self.tolerance), drive, output)
         words = space.call.words
         first = c_double.from_buffer(words, 8 * space.call.address("control.first"))

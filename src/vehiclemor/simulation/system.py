@@ -207,12 +207,11 @@ class System(ShortRepr):
         path = np.empty((len(times), len(self.error_scale)))
         counts = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
         if solver.times is not None or solver.begin:
-            return self.packed(windows, solver, drive, Output.at_samples(times, path, counts))
-        inputs, cubic = drive.inputs.copy(), catalogue.integrator(solver.name).cubic
-        if cubic and len(times) >= LANES and record_all_until < times[-1]:
-            output = Output.at_points(times, path, counts, inputs, record_all_until)
-        else:
-            output = Output.at_samples(times, path, counts, inputs)
+            return self.packed(windows, solver, drive, Output.of(times, path, counts))
+        few = catalogue.integrator(solver.name).cubic and len(times) >= LANES
+        if not few or record_all_until >= times[-1]:
+            record_all_until = np.inf
+        output = Output.of(times, path, counts, drive.inputs.copy(), record_all_until)
         return self.packed(windows, solver, drive, output)
 
     def _drive(

@@ -82,20 +82,6 @@ def test_kernels_are_the_specified_residual_and_its_derivatives(model, program, 
             np.testing.assert_allclose(jacobian, exact, rtol=0, atol=2e-15)
 
 
-def test_products_of_a_jacobian_by_its_entries(model, rng):
-    q, u = rng.uniform(-1.0, 1.0, 8), rng.uniform(-0.1, 0.1, 2)
-    kernels = model.equations.kernels
-    entries = np.full(kernels.sources["jacobian_entries"].sizes[-1], np.nan)
-    kernels.call("jacobian_entries", q, u, model.constants, entries)
-    np.testing.assert_allclose(entries[:8], model.residual(q, u), atol=1e-15)
-    for column in rng.standard_normal((5, 8)):
-        result = np.full(8, np.nan)
-        kernels.call("jacobian_product", entries, column, result)
-        np.testing.assert_allclose(result, model.jacobian(q, u) @ column, atol=1e-14)
-    # What is always the same is not evaluated: fewer entries than the matrix has.
-    assert len(entries) < 8 + np.count_nonzero(model.jacobian(q, u))
-
-
 @pytest.mark.parametrize(
     ("result", "size", "named"),
     [(1, 2, "1"), (sp.nan, 1, "nan"), (sp.zoo, 1, "zoo"), (sp.I, 1, "I"), (y, 1, "y")],

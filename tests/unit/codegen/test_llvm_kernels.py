@@ -10,7 +10,7 @@ from tests.unit.kernels import kernel
 from tests.unit.programs import precise, run
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.lowering import kernels_of
-from vehiclemor.codegen.operations import Kernel, Listing, padded
+from vehiclemor.codegen.operations import Kernel, padded
 from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
@@ -102,30 +102,3 @@ def test_weighted_sums_are_products_with_the_coefficients(targets, rng):
     # All that the vectors load must be there.
     with pytest.raises(TypeError, match="sums: constants must be"):
         run_sums(x, np.zeros(first + terms * width - 1), result)
-
-
-# Statements on whole vectors
-
-
-def stepped(statement, size: int, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-    result, listing = np.full(size + 1, 7.0), Listing()
-    statement(listing)
-    compiled(listing.kernel("step", ("_x", "_u", "_result")))(x, u, result)
-    assert result[-1] == 7.0
-    return result[:-1]
-
-
-TO = ("_result", 0)
-
-
-@pytest.mark.parametrize(
-    ("n", "columns"), [(4, ()), (8, (5,)), (8, (0, 2, 7)), (28, range(0, 28, 2))]
-)
-def test_a_product_takes_some_columns_and_keeps_other_places(n, columns, rng):
-    rows, x = rng.normal(size=(len(columns), n)), rng.normal(size=n)
-    kept = tuple(i for i in range(n) if i not in columns)
-    detail = TO, n, ("_u", 0), ("_x", 0), tuple(columns), kept, 0.25
-    expected = x[list(columns)] @ rows
-    expected[list(kept)] += 0.25 * x[list(kept)]
-    found = stepped(lambda listing: listing.new("product", detail=detail), n, x, np.append(rows, 0))
-    np.testing.assert_allclose(found, expected, atol=1e-13)

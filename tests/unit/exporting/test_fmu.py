@@ -16,7 +16,7 @@ from vehiclemor.exporting import fmu
 from vehiclemor.exporting.c import START_ALONE, CSettings, c_files
 from vehiclemor.exporting.export import system_of
 from vehiclemor.exporting.fmu import variables_of
-from vehiclemor.simulation.constants import hoisted_constants
+from vehiclemor.simulation.evaluation import hoisted_constants
 
 fmpy = pytest.importorskip("fmpy")
 validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu

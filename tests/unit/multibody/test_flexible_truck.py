@@ -15,7 +15,7 @@ from vehiclemor.multibody.flexible_truck import frame
 from vehiclemor.multibody.flexible_truck.definition import DEFINITION
 from vehiclemor.parameters import load_parameters
 from vehiclemor.simulation.build import compiled
-from vehiclemor.simulation.constants import hoisted_constants, values_of
+from vehiclemor.simulation.evaluation import hoisted_constants, values_of
 
 NAMES = [q.name for q in DEFINITION.outputs]
 # Frame and cab mounts ten thousand times as stiff.

@@ -137,20 +137,6 @@ TENTH = {
 }
 
 
-@pytest.mark.parametrize("name", ["double_wishbone", *VEHICLES])
-@pytest.mark.parametrize("samples", [1, 7, 8, 9, 20])
-def test_samples_in_lanes_give_what_each_gives_alone(name, samples):
-    model = build(name)
-    run = model.simulate(component("maneuver", model.definition.maneuver))
-    places = np.linspace(0, len(run.times) - 1, samples).astype(int)
-    states, inputs = run.states[places], run.inputs[places]
-    alone = [model.evaluated("outputs", x, u) for x, u in zip(states, inputs, strict=True)]
-    scale = 1.0 + np.abs(run.outputs).max(axis=0)
-    # Rounding of a slip, 2e-16, times a stiffness of 1e5 N.
-    found = model.outputs_at(states, inputs)
-    np.testing.assert_allclose(found / scale, alone / scale, rtol=0.0, atol=2e-11)
-
-
 @pytest.mark.parametrize("start", ["equilibrium", "dropped"])
 @pytest.mark.parametrize(("name", "maneuver"), RUNS)
 def test_a_run_read_at_few_points_is_the_run_at_its_samples(name, maneuver, start):

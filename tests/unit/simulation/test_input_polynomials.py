@@ -13,7 +13,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import values_at
 from vehiclemor.inputs.maneuver import Maneuver, smooth
 from vehiclemor.inputs.polynomial_loops import Pieces
-from vehiclemor.inputs.polynomials import ACCURACY, fitted_pieces
+from vehiclemor.inputs.polynomials import fitted_pieces
 from vehiclemor.registry import component
 from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.system import Solver
@@ -124,29 +124,6 @@ def test_a_value_that_is_no_number_is_refused_with_its_time(bad):
     # Not at one of the thousand equidistant times, but where the polynomials are made.
     with pytest.raises(InputError, match="not finite"):
         fitted_pieces(steered(lambda t: np.where((t > 0.6249) & (t < 0.6251), bad, np.cos(t))))
-
-
-def test_a_maneuver_that_is_linear_in_its_amplitude_is_searched_once():
-    calls = []
-
-    def inputs(times, frequency, amplitude):
-        calls.append(amplitude)
-        return (amplitude * np.sin(frequency * times))[:, None]
-
-    linear = Maneuver("mine", "", inputs, ("u",), 3.0, 11, smooth, linear_in_amplitude=True)
-    general = dataclasses.replace(linear, linear_in_amplitude=False)
-    for frequency in (1.0, 2.0):
-        assert linear.perturbed(frequency, 3.0).pieces
-        calls.clear()
-        scaled = linear.perturbed(frequency, -0.7).pieces
-        assert not calls
-        searched = general.perturbed(frequency, -0.7).pieces
-        assert set(calls) == {-0.7}
-        np.testing.assert_array_equal(scaled.edges, searched.edges)
-        times = np.linspace(0.0, 3.0, 997)
-        found, wanted = (values_at(signal, times) for signal in (scaled, searched))
-        # Both round off in the powers of the pieces, far below the accuracy of these.
-        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=0.1 * ACCURACY)
 
 
 def test_a_copy_with_another_signal_is_not_taken_for_linear():

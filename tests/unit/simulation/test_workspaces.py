@@ -13,7 +13,7 @@ from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.evaluation import path_loops
 from vehiclemor.simulation.loop_arguments import NODE_1, NODE_2, Outputs
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.simulation.workspaces import MOST_KINDS, Pool, Solver
+from vehiclemor.simulation.workspaces import Solver
 
 CASES = {
     "independent_suspension_vehicle": ("etdrk4", ("equilibrium", "dropped")),
@@ -66,18 +66,6 @@ def test_a_run_keeps_its_path_until_it_gives_it_back():
     third, fourth = run("dropped"), run("dropped")
     assert np.shares_memory(third.recorded_states, second.recorded_states)
     assert not np.shares_memory(third.recorded_states, fourth.recorded_states)
-
-
-def test_spare_spaces_are_found_by_kind_and_are_few():
-    spare: Pool[list] = Pool()
-    mine = spare.taken("a", list)
-    spare.give_back("a", mine)
-    assert spare.taken("b", list) is not mine
-    assert spare.taken("a", list) is mine
-    assert spare.taken("a", list) is not mine
-    for kind in range(2 * MOST_KINDS):
-        spare.give_back(kind, [])
-    assert len(spare._spare) <= MOST_KINDS
 
 
 def test_limits_are_watched_between_the_points_of_a_step(rng):

@@ -1,4 +1,4 @@
-"""The free chassis that vehicles share, with its coordinates.
+"""The free chassis that vehicles share, with its coordinates, and the inputs of vehicles.
 
 Chassis frame: origin at the centre of mass of the sprung body, x forward, y left, z up (ISO 8855).
 The speeds are components in this frame.  The road is the plane z = 0.
@@ -15,10 +15,42 @@ from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
 from vehiclemor.symbolic.tape import Tape
 
+# Spin in rad/s below which a brake fades, so that its torque changes sign smoothly.
+BRAKE_SPEED = sp.Integer(1)
+# Inputs at a wheel in the order of `WheelInputs`.
+AT_WHEEL = "drive_torque_{}", "brake_torque_{}", "friction_{}", "road_{}", "road_{}_dot"
+
 
 def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
     """A symbol for each quantity, real."""
     return [sp.Symbol(quantity.name, real=True) for quantity in quantities]
+
+
+@dataclass(frozen=True)
+class WheelInputs:
+    """Symbols, or defaults of inputs that are neither driven nor parameters.
+
+    Attributes
+    ----------
+    drive, brake
+        Torques in N m: forwards on the wheel; against its spin, not negative.
+    friction
+        Factor on the friction of the tire.
+    road, road_rate
+        Height of the road under the wheel in m, upwards, and its rate in m/s.
+    """
+
+    drive: sp.Expr
+    brake: sp.Expr
+    friction: sp.Expr
+    road: sp.Expr
+    road_rate: sp.Expr
+
+    def torque(self, tape: Tape, spin: sp.Expr) -> sp.Expr:
+        """Torque of drive and brake on a wheel that spins on its carrier at so many rad/s."""
+        # In one expression: without a brake nothing is left of it.
+        against = self.brake * spin / sp.sqrt(spin**2 + BRAKE_SPEED**2)
+        return tape.let(self.drive - against)
 
 
 @dataclass(frozen=True)
@@ -36,6 +68,10 @@ class Inputs:
     values: dict[str, sp.Expr]
     driven: list[sp.Symbol]
     constant: list[sp.Symbol]
+
+    def at(self, wheel: str) -> WheelInputs:
+        """Inputs at one wheel."""
+        return WheelInputs(*(self.values[name.format(wheel)] for name in AT_WHEEL))
 
 
 def inputs(every_run: Sequence[Quantity], choice: InputChoice) -> Inputs:

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from vehiclemor.multibody.components.body import WheelInputs
 from vehiclemor.multibody.components.slip import SlipLaw
-from vehiclemor.multibody.components.wheel_inputs import WheelInputs
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.mechanics import ZERO, Body, kane

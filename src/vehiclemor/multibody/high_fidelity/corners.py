@@ -14,7 +14,6 @@ import sympy as sp
 from vehiclemor.multibody.components import body
 from vehiclemor.multibody.components import linkage as links
 from vehiclemor.multibody.components.tires import Corner, WheelMotion, WheelOnRoad, tilted_wheel
-from vehiclemor.multibody.components.wheel_inputs import wheel_inputs
 from vehiclemor.multibody.double_wishbone.definition import POINTS
 from vehiclemor.multibody.high_fidelity.definition import ARMS, CORNER, DECLARED, SOLVED, SPINS
 from vehiclemor.multibody.quantities import WHEELS, InputChoice
@@ -217,7 +216,7 @@ def _wheeled_body(
 ) -> tuple[Body, WheelOnRoad, Vector]:
     """A carrier or arm with its wheel, the wheel on the road, torque of the half shaft on it."""
     frame, axle, spin = v.frame, part.axle, v.rates[SPINS[k]]
-    inputs = wheel_inputs(v.inputs.values, WHEELS[k])
+    inputs = v.inputs.at(WHEELS[k])
     levers = (part.to_centre, part.to_wheel)
     positions = [g.named(tape, part.base + lever) for lever in levers]
     centre, wheel = (

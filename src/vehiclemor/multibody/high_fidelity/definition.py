@@ -17,13 +17,8 @@ from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.definition import Derivative, ModelDefinition
 from vehiclemor.multibody.double_wishbone.definition import POINTS, check_linkage, tie_rod_angles
 from vehiclemor.multibody.quantities import (
-    FORWARD,
-    OPTIONAL_INPUTS,
-    OPTIONAL_RANGES,
-    SLIP_RATIOS,
-    STANDSTILL,
-    TIRE_LOADS,
-    UPRIGHT,
+    VALIDITY,
+    VEHICLE,
     WHEELS,
     check_moments,
     declared,
@@ -205,7 +200,7 @@ DEFINITION = ModelDefinition(
     summary="vehicle with 26 coordinates and 12 constraints, double wishbones, Fiala tires (DAE)",
     maneuver="rack_lane_change",
     **DECLARED,
-    optional_inputs=OPTIONAL_INPUTS,
+    **VEHICLE,
     derive=equations_of("high_fidelity"),
     check=check,
     starts=starts,
@@ -219,15 +214,7 @@ DEFINITION = ModelDefinition(
     error_scale=dict.fromkeys(STATES, 10.0) | {"psi": 1.0, "psi_dot": 1.0},
     # Slips need forward motion.  At 1.3 rad of steering the linkage locks; another branch lies
     # beyond.
-    validity={
-        "longitudinal_speed": FORWARD,
-        **{f"steer_{wheel}": (-1.1, 1.1) for wheel in WHEELS[:2]},
-        **UPRIGHT,
-        **OPTIONAL_RANGES,
-    },
-    standstill=STANDSTILL,
-    loads=TIRE_LOADS,
-    slips=SLIP_RATIOS,
+    validity=VALIDITY | {f"steer_{wheel}": (-1.1, 1.1) for wheel in WHEELS[:2]},
     error_bounds=error_bounds(2.5e-4),
     wheelbase=wheelbase,
     tabled_outputs=(

@@ -15,13 +15,8 @@ import numpy as np
 from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.multibody.quantities import (
-    FORWARD,
-    OPTIONAL_INPUTS,
-    OPTIONAL_RANGES,
-    SLIP_RATIOS,
-    STANDSTILL,
-    TIRE_LOADS,
-    UPRIGHT,
+    VALIDITY,
+    VEHICLE,
     WHEELS,
     check_moments,
     declared,
@@ -119,7 +114,7 @@ DEFINITION = ModelDefinition(
     summary="vehicle with independent suspension, 14 degrees of freedom, Magic Formula tires (ODE)",
     maneuver="lane_change",
     **DECLARED,
-    optional_inputs=OPTIONAL_INPUTS,
+    **VEHICLE,
     derive=equations_of("independent_suspension"),
     check=check,
     starts=starts,
@@ -127,15 +122,7 @@ DEFINITION = ModelDefinition(
     planar=("X", "Y", "psi"),
     # Slip needs forward motion, the contact point lies below the wheel centre.
     # Steering as far as that of the car (CommonRoad, BMW 320i).
-    validity={
-        "longitudinal_speed": FORWARD,
-        **UPRIGHT,
-        "delta": (-1.066, 1.066),
-        **OPTIONAL_RANGES,
-    },
-    standstill=STANDSTILL,
-    loads=TIRE_LOADS,
-    slips=SLIP_RATIOS,
+    validity=VALIDITY | {"delta": (-1.066, 1.066)},
     error_bounds=error_bounds(7.59e-5),
     wheelbase=wheelbase,
     tabled_outputs=("pitch", "yaw", "roll", "lateral_position", "vertical_speed"),

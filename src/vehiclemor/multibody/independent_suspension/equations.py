@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 
 import sympy as sp
 
 from vehiclemor.multibody.components import body
-from vehiclemor.multibody.components.slip import SlipLaw, static_slip
+from vehiclemor.multibody.components.slip import SlipLaw, relaxed_slip, static_slip
 from vehiclemor.multibody.components.tires import (
     Corner,
     WheelMotion,
@@ -15,8 +16,8 @@ from vehiclemor.multibody.components.tires import (
     tire_outputs,
     upright_wheel,
 )
-from vehiclemor.multibody.components.wheel_inputs import WheelInputs, wheel_inputs
 from vehiclemor.multibody.independent_suspension.definition import DECLARED, Derived, derived
+from vehiclemor.multibody.independent_suspension.relaxation import DEFINITION as RELAXED
 from vehiclemor.multibody.quantities import DEFAULTS, WHEELS, InputChoice
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
@@ -29,6 +30,14 @@ from vehiclemor.symbolic.tape import Tape
 def derive(choice: InputChoice = DEFAULTS) -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
     return derive_with(choice, DECLARED["parameters"], [static_slip] * len(WHEELS))
+
+
+def derive_relaxed(choice: InputChoice = DEFAULTS) -> Program:
+    """The same of the vehicle with relaxation, by another law of slip."""
+    states = body.symbols(RELAXED.further_states)
+    wheels = zip(states[:4], states[4:], strict=True)
+    laws = [partial(relaxed_slip, deflections=deflections) for deflections in wheels]
+    return derive_with(choice, RELAXED.parameters, laws, states)
 
 
 def derive_with(
@@ -86,9 +95,9 @@ class _Vehicle:
     derived: Derived
 
     @property
-    def at_wheels(self) -> list[WheelInputs]:
+    def at_wheels(self) -> list[body.WheelInputs]:
         """Optional inputs at the four wheels."""
-        return [wheel_inputs(self.inputs.values, wheel) for wheel in WHEELS]
+        return [self.inputs.at(wheel) for wheel in WHEELS]
 
     @property
     def weight(self) -> g.Vector:

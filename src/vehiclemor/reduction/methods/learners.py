@@ -21,7 +21,7 @@ from pydantic import Field
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.learned.learned_model import (
+from vehiclemor.reduction.learned_model import (
     LearnedModel,
     LearnedSettings,
     TrainingData,

@@ -19,8 +19,8 @@ from pydantic import Field
 from scipy.optimize import least_squares
 
 from vehiclemor.reduction.interface import Method
-from vehiclemor.reduction.learned.learned_model import LearnedModel, SampledSettings, TrainingData
-from vehiclemor.reduction.learned.samples import Coordinates, Samples
+from vehiclemor.reduction.learned_model import LearnedModel, SampledSettings, TrainingData
+from vehiclemor.reduction.learned_samples import Coordinates, Samples
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.shape import RANK, VehicleShape, no_steered_vehicle
 

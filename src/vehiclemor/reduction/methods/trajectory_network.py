@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, installed
-from vehiclemor.reduction.learned.learned_model import (
+from vehiclemor.reduction.learned_model import (
     LearnedModel,
     LearnedSettings,
     TrainingData,
@@ -51,7 +51,6 @@ def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings)
         import jax  # pyright: ignore[reportMissingImports]
         import jax.numpy as jnp  # pyright: ignore[reportMissingImports]
         from jax_sysid.models import Model  # pyright: ignore[reportMissingImports]
-        from sklearn.linear_model import LinearRegression
         from sklearn.neural_network import MLPRegressor
 
     data = TrainingData.of(model, training, settings, "sklearn", settings.of_samples)
@@ -74,13 +73,9 @@ def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings)
     known = np.isfinite(wanted)
     wanted[~known] = 0.0
     # Whole runs are no start for small random weights: one step is fitted first.
-    arguments, changes = data.regression
-    linear: Any = LinearRegression(fit_intercept=False).fit(arguments, changes)
-    left = changes - linear.predict(arguments)
-    size = left.std(axis=0)
     shape: Any = {"hidden_layer_sizes": (settings.width,), "activation": "tanh"}
     begun: Any = MLPRegressor(**shape, max_iter=STEPS, random_state=SEED)
-    begun.fit(arguments, left / size)
+    linear, size = data.fit_residual(begun, slice(None))
     first = [linear.coef_.T, begun.coefs_[0], begun.intercepts_[0], begun.coefs_[1] * size]
     network = Model(runs * r, runs * r, runs * m, state_fcn=step, output_fcn=lambda x, *_: x)
     network.init(params=first, x0=wanted[0])

@@ -17,7 +17,6 @@ from vehiclemor.reduction.projection.bases import (
     Rank,
     RankTolerance,
     Snapshots,
-    by_window,
     check_pod,
     first_samples,
     pod_basis,
@@ -127,7 +126,9 @@ class AlgebraicProjection(ReducedMechanism):
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""
-        return by_window(states, self.edges, lambda part, k: project(part, self.bases[k]))
+        times = np.linspace(self.edges[0], self.edges[-1], len(states))
+        parts = zip(pairwise(first_samples(times, self.edges)), self.bases, strict=True)
+        return np.concatenate([project(states[a:b], basis) for (a, b), basis in parts])
 
 
 def fit_windows(

@@ -30,7 +30,7 @@ OVER_SPEED = (True, True, False, True)
 ONE, FAST = ("1",), ("m",)
 # Arguments are clipped at this multiple of their training range.
 HULL = 1.1
-# A brake fades below this spin in rad/s, see `components/wheel_inputs`.
+# A brake fades below this spin in rad/s, see `components/body`.
 BRAKE_SPEED = 1.0
 
 

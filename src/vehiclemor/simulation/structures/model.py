@@ -332,19 +332,33 @@ class StructuralModel(Model):
             )
             histories[left:] = np.nan
         remarks = wheel_remarks(self.definition, first[len(limited) :], times)
-        run = Trajectory.of(
+        run = self.trajectory(times, inputs, histories, counts, seconds, failure)
+        further: dict[str, Any] = {"remark": "; ".join(filter(None, (*remarks, remark)))}
+        if recorded:
+            further["coordinates"] = states
+        run = Trajectory.of(**run.__dict__ | further)
+        return run if names is None else run.chosen(names)
+
+    def trajectory(
+        self,
+        times: np.ndarray,
+        inputs: np.ndarray,
+        outputs: np.ndarray,
+        counts: np.ndarray,
+        seconds: float,
+        failure: str = "",
+    ) -> Trajectory:
+        """Trajectory of histories of outputs (samples, outputs); it has diverged if it failed."""
+        return Trajectory.of(
             times=times,
             inputs=inputs,
-            coordinates=states if recorded else inputs[:, :0],
+            coordinates=inputs[:, :0],
             speeds=inputs[:, :0],
-            outputs=histories,
+            outputs=outputs,
             counts=dict(zip(STRUCTURAL_COUNTS, counts.tolist(), strict=True)),
             seconds=seconds,
             status="diverged" if failure else "ok",
             message=failure,
-            remark="; ".join(filter(None, (*remarks, remark))),
-            trust=None,
             names=self.outputs,
             model=self,
         )
-        return run if names is None else run.chosen(names)

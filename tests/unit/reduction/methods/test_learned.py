@@ -14,7 +14,7 @@ from tests.models import CAR
 from tests.reducing import training_runs
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change
-from vehiclemor.reduction.learned.learned_model import TrainingData, stepped
+from vehiclemor.reduction.learned_model import TrainingData, stepped
 from vehiclemor.reduction.methods.learners import RIDGES
 from vehiclemor.reduction.methods.single_track import (
     BODY,

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import maneuver
 from vehiclemor.simulation.control_periods import whole_space
-from vehiclemor.simulation.integrators.etdrk4 import exponential_tables, phi_functions
+from vehiclemor.simulation.integrators.etdrk4 import phi_functions
 from vehiclemor.simulation.integrators.step_kernels import partners, signs
 from vehiclemor.simulation.system import Solver
 
@@ -38,15 +38,6 @@ def test_phi_functions_agree_with_one_exponential(norm):
         pairs = zip(phi_functions(matrix), exact_functions(matrix, 3), strict=True)
         for found, expected in pairs:
             np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
-
-
-def test_the_tables_hold_what_a_step_needs():
-    rates, h = np.array([[-3.0, 2.0], [-2.0, -3.0]]), 0.25
-    (table,) = exponential_tables(rates, [h])
-    _, half1, half2, _ = exact_functions(0.5 * h * rates, 3)
-    _, phi1, phi2, phi3 = exact_functions(h * rates, 3)
-    expected = [rates, half1 / 2, half2, phi1, 2 * phi2, 2 * phi2 - 4 * phi3, 4 * phi3 - phi2]
-    np.testing.assert_allclose(table, [matrix.T for matrix in expected], rtol=1e-12, atol=1e-14)
 
 
 def test_partners_are_told_by_names_and_an_asymmetric_system_has_no_signs():

@@ -15,7 +15,7 @@ from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.error_estimate import estimates
 from vehiclemor.reduction.interface import OfflineCost, installed
-from vehiclemor.reduction.learned.samples import (
+from vehiclemor.reduction.learned_samples import (
     Coordinates,
     Samples,
     States,
@@ -172,17 +172,22 @@ class TrainingData:
 
     def with_residual(self, regressor: Any, samples: slice | np.ndarray) -> "LearnedModel":
         """The model of a linear regression, and a regressor of what it leaves at some samples."""
+        linear, size = self.fit_residual(regressor, samples)
+        if self.static:
+            return self.model(lambda _, u: linear.predict(u) + size * regressor.predict(u))
+        return self.model(predicted((linear, 1.0), (regressor, size)))
+
+    def fit_residual(self, regressor: Any, samples: slice | np.ndarray) -> tuple[Any, np.ndarray]:
+        """Fit a regressor to what a linear regression leaves; this, and the sizes (m,) of that."""
         from sklearn.linear_model import LinearRegression
 
         arguments, results = self.regression
-        linear: Any = LinearRegression(fit_intercept=self.constant).fit(arguments, results)
+        linear = LinearRegression(fit_intercept=self.constant).fit(arguments, results)
         left = results - linear.predict(arguments)
         size = left.std(axis=0)
         size[size == 0.0] = 1.0
         regressor.fit(arguments[samples], left[samples] / size)
-        if self.static:
-            return self.model(lambda _, u: linear.predict(u) + size * regressor.predict(u))
-        return self.model(predicted((linear, 1.0), (regressor, size)))
+        return linear, size
 
     def model(self, path: Path) -> "LearnedModel":
         """The model of learned paths, with what follows from its coordinates."""
@@ -273,23 +278,9 @@ class LearnedModel(ShortRepr):
         table = _splined(steps[: len(z)], z)(np.minimum(times, steps[len(z) - 1]))
         values = self.readout.predict(np.hstack([table, used / self.input_scale]))
         values[~reached] = np.nan
-        if model.kind == "structural":
-            run = Trajectory.of(
-                times=times,
-                inputs=inputs,
-                coordinates=inputs[:, :0],
-                speeds=inputs[:, :0],
-                outputs=values,
-                counts=dict.fromkeys(model.counts, 0),
-                seconds=seconds,
-                status="diverged" if failure else "ok",
-                message=failure,
-                names=model.outputs,
-                model=model,
-            )
-        else:
-            states = self._states(times, values, state)
-            run = model.trajectory(times, inputs, states, counts, seconds, failure)
+        if model.kind != "structural":
+            values = self._states(times, values, state)
+        run = model.trajectory(times, inputs, values, counts, seconds, failure)
         # The error of a vehicle's run is estimated afterwards.
         if run.status != "ok" or estimates(model):
             return run

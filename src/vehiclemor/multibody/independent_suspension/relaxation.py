@@ -1,6 +1,6 @@
 """The 14-DOF vehicle with relaxation of its tires: eight states more, down to standstill.
 
-The equations are those of `independent_suspension`; the slips of each wheel follow from two
+The equations are those of the vehicle beside it; the slips of each wheel follow from two
 deflections of its contact, see `components.slip.relaxed_slip`.
 """
 
@@ -35,7 +35,7 @@ DEFINITION = replace(
     summary="14-DOF vehicle whose tires relax: it stops, stands and starts (ODE)",
     further_states=DECLARED["further_states"],
     parameters={**RIGID_CONTACT.parameters, **DECLARED["parameters"]},
-    derive=equations_of("relaxation"),
+    derive=equations_of("independent_suspension", "derive_relaxed"),
     starts=starts,
     # A deflection of 1 cm is large.
     error_scale={quantity.name: 0.01 for quantity in DECLARED["further_states"]},
