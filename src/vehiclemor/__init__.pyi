@@ -13,6 +13,7 @@ from .error_measures import errors as errors
 from .exceptions import VehiclemorError as VehiclemorError
 from .exporting.export import export as export
 from .handling.metrics import metrics as metrics
+from .handling.metrics import weighted_rms as weighted_rms
 from .inputs.maneuver import maneuver as maneuver
 from .inputs.road import road as road
 from .inputs.signal import Signal as Signal
@@ -22,11 +23,10 @@ from .reduction.reduced_model import rom as rom
 from .report.comparison import compare as compare
 from .report.figures.animation import animate as animate
 from .report.figures.catalogue import figures as figures
+from .report.frames import convert as convert
 from .report.page import write_report as write_report
-from .report.study_formats import convert as convert
-from .ride_comfort import weighted_rms as weighted_rms
 from .simulation.batches import simulate_many as simulate_many
-from .study.dataset import dataset as dataset
-from .study.judge import judge as judge
+from .study.outside_methods import dataset as dataset
+from .study.outside_methods import judge as judge
 
 __version__: str

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from time import perf_counter
 
 _LOG = logging.getLogger("vehiclemor")
@@ -32,23 +33,13 @@ if not _LOG.handlers:
         _LOG.setLevel(logging.INFO)
 
 
+@dataclass
 class FirstUse:
     """A use of something whose code may not be in the cache yet."""
 
-    def __init__(self, what: str) -> None:
-        self.what, self.announced, self.seconds = what, False, 0.0
-
-    @contextmanager
-    def compiling(self, announce: bool) -> Iterator[None]:
-        """A part of its code that is missing, timed."""
-        if announce and not self.announced:
-            self.announced = True
-            _LOG.info("first use of %s: compiling, cached for later runs", self.what)
-        begin = perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds += perf_counter() - begin
+    what: str
+    announced: bool = False
+    seconds: float = 0.0
 
 
 _CURRENT: ContextVar[FirstUse | None] = ContextVar("first use", default=None)
@@ -77,8 +68,15 @@ def compiling(what: str, slow: bool = True) -> Iterator[None]:
     It is announced if it is slow, or part of a first use.
     """
     announce = slow or _CURRENT.get() is not None
-    with first_use(what) as use, use.compiling(announce):
-        yield
+    with first_use(what) as use:
+        if announce and not use.announced:
+            use.announced = True
+            _LOG.info("first use of %s: compiling, cached for later runs", use.what)
+        begin = perf_counter()
+        try:
+            yield
+        finally:
+            use.seconds += perf_counter() - begin
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from vehiclemor.cli import main
 from vehiclemor.codegen.kernels import Derivation
 from vehiclemor.report.published import fixed_test_sets
 from vehiclemor.study import timing
-from vehiclemor.study.dataset import EQUATIONS, digest_of
+from vehiclemor.study.outside_methods import EQUATIONS, digest_of
 from vehiclemor.study.plans.protocol import (
     fixed_protocols,
     load_protocol,

@@ -179,7 +179,7 @@ def metrics(
     """
     import pandas as pd
 
-    from vehiclemor.report.handling import handling_rows
+    from vehiclemor.report.comparison import handling_rows
     from vehiclemor.report.labels import Column
     from vehiclemor.report.printing import Table, json_text
 

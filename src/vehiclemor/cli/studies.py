@@ -25,8 +25,8 @@ from vehiclemor.cli.options import (
     new_file,
 )
 from vehiclemor.exceptions import InputError
+from vehiclemor.report.labels import Format
 from vehiclemor.report.printing import Table, ends_text, wrapped
-from vehiclemor.report.study_formats import Format
 
 Study = Annotated[str, Parameter(help="Name of a study or collection, or a TOML file.")]
 # Reasons that are printed of each study.

@@ -6,14 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from jinja2 import Environment, FileSystemLoader
 
-from vehiclemor.codegen.operations import COMPARISONS, uses
+from vehiclemor.codegen.operations import COMPARISONS, Value, uses
 from vehiclemor.exceptions import InputError
-from vehiclemor.exporting.ros2 import solve_function
-from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
+from vehiclemor.exporting.straight_line import FUNCTIONS, Lines, StraightLine
 from vehiclemor.exporting.systems import SIGNATURES, TANGENTS, TOOL, ExportedSystem
+from vehiclemor.simulation.system import System
 
 SOURCES = Path(__file__).parent / "c_sources"
 SELECT = """\
@@ -54,6 +56,9 @@ INTEGRATORS = {
     "ros2": ("linearly implicit method of order 2, with the Jacobian at the first start", 4, 0),
 }
 # Of `ros2`: the solution of the linear system of a stage.
+GAMMA = 1.0 - np.sqrt(0.5)
+# Entries of the inverse below it are left out: rounding, and A may be any matrix.
+ROUNDING = 1e-12
 SIGNATURES_IN_C = SIGNATURES | TANGENTS | {"solve": ("x", "r", "k")}
 
 
@@ -71,7 +76,7 @@ def c_files(system: ExportedSystem, settings: CSettings) -> dict[str, str]:
     shipped = {name: (SOURCES / file).read_text("utf-8") for name, file in sources.items()}
     suffix = TYPES[settings.precision][1]
     values = [_array("parameters", system.values, suffix)]
-    values += [_array(_start(name), state, suffix) for name, state in system.starts.items()]
+    values += [_array(f"start_{name}", state, suffix) for name, state in system.starts.items()]
     functions = dict(system.functions)
     if settings.integrator == "ros2":
         if system.dynamics is None:
@@ -87,13 +92,19 @@ def c_files(system: ExportedSystem, settings: CSettings) -> dict[str, str]:
     } | shipped
 
 
-def _header(system: ExportedSystem, settings: CSettings) -> str:
-    def listed(title: str, quantities: Sequence) -> list[str]:
-        rows = [
-            f"     {i:3d}  {q.name} ({q.unit}): {q.long_name}" for i, q in enumerate(quantities)
-        ]
-        return [f"   {title}:", *rows]
+def written(template: str, **values: object) -> str:
+    """Text of a file by its template."""
+    environment = Environment(  # noqa: S701  (what is written is no HTML)
+        loader=FileSystemLoader(SOURCES),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["quoted"] = quoteattr
+    return environment.get_template(f"{template}.jinja").render(tool=TOOL, **values)
 
+
+def _header(system: ExportedSystem, settings: CSettings) -> str:
     sizes = system.sizes
     parameters = [
         q if i in system.acting else replace(q, long_name=f"{q.long_name}; {START_ALONE}")
@@ -108,63 +119,27 @@ def _header(system: ExportedSystem, settings: CSettings) -> str:
         "CONSTANTS": sizes["c"],
         "SCRATCH": of_states * max(sizes["x"], 1) + of_inputs * max(sizes["u"], 1),
     }
-    of_integrator = []
-    if settings.integrator == "ros2":
-        of_integrator = ["", "/* Solve the linear system of a step. */", f"{_signature('solve')};"]
-    starts = list(system.starts)
-    states = [_declared(_start(name), sizes["x"]) for name in starts]
-    lines = [
-        f"/* {system.name}: {system.summary}.",
-        f"   Written by {TOOL}.",
-        "",
-        *listed("States x", system.states),
-        *listed("Inputs u", system.inputs),
-        *listed("Outputs y", system.outputs),
-        *listed("Parameters p", parameters),
-        f"   Starts: {', '.join(starts)} */",
-        "",
-        "#ifndef VEHICLEMOR_MODEL_H",
-        "#define VEHICLEMOR_MODEL_H",
-        "",
-        f"/* Numbers are in {settings.precision} precision. */",
-        f"typedef {TYPES[settings.precision][0]} vehiclemor_real;",
-        "",
-        "/* Sizes; an array in C holds one number at least.  Scratch are the numbers that a step",
-        "   holds on the stack, beside what the functions have there. */",
-        *(f"#define VEHICLEMOR_{name} {count}" for name, count in counts.items()),
-        "#define VEHICLEMOR_FLOATS(count) ((count) > 0 ? (count) : 1)",
-        "",
-        f"/* Integrator: {summary}.",
-        "   Step size in s that it is exported for, the longest one to use. */",
-        f'#define VEHICLEMOR_INTEGRATOR "{settings.integrator}"',
-        f"#define VEHICLEMOR_STEP {settings.step!r}",
-        "",
-        *(f"extern {declared};" for declared in (_declared("parameters", sizes["p"]), *states)),
-        f"#define vehiclemor_start vehiclemor_{_start(starts[0])}",
-        "",
-        "/* Constants c follow from the parameters p: needed once, and whenever p changes. */",
-        *(f"{_signature(name)};" for name in SIGNATURES),
-        "",
-        "/* What their results change by where the arguments change by seeds. */",
-        *(f"{_signature(name)};" for name in TANGENTS),
-        "",
-        "/* Take x over a step of h seconds; inputs are linear from u to u_end, which may be u. */",
-        "void vehiclemor_step(vehiclemor_real *x, const vehiclemor_real *u,",
-        "                     const vehiclemor_real *u_end, const vehiclemor_real *c,",
-        "                     vehiclemor_real h);",
-        *of_integrator,
-        "",
-        "#endif",
-    ]
-    return "\n".join(lines) + "\n"
+    listed = {"States x": system.states, "Inputs u": system.inputs}
+    listed |= {"Outputs y": system.outputs, "Parameters p": parameters}
+    arrays = [_declared("parameters", sizes["p"])]
+    arrays += [_declared(f"start_{name}", sizes["x"]) for name in system.starts]
+    return written(
+        HEADER,
+        system=system,
+        settings=settings,
+        type=TYPES[settings.precision][0],
+        integrator=summary,
+        listed=listed,
+        counts=counts,
+        arrays=arrays,
+        functions=map(_signature, SIGNATURES),
+        tangents=map(_signature, TANGENTS),
+        solve=_signature("solve") if settings.integrator == "ros2" else "",
+    )
 
 
 def _declared(name: str, size: int) -> str:
     return f"const vehiclemor_real vehiclemor_{name}[{max(size, 1)}]"
-
-
-def _start(name: str) -> str:
-    return f"start_{name}"
 
 
 def _signature(name: str) -> str:
@@ -233,3 +208,42 @@ def _function(name: str, function: StraightLine, suffix: str) -> str:
     # What is not read is said so, for compilers that ask.
     unread = [a for a in (*given, result) if f" {a}[" not in text and f"({a}[" not in text]
     return "\n".join([text, *(f"    (void){argument};" for argument in unread), "}"])
+
+
+def solve_function(
+    system: System, start: np.ndarray, inputs: np.ndarray, step: float
+) -> StraightLine:
+    """Solution (n,) of a linear system of a step of ROS2, in s, for the arrays `x` and `r`.
+
+    ROS2 (J. Verwer, E. Spee, J. Blom, W. Hundsdorfer, SIAM J. Sci. Comput. 20 (1999), 1456-1480),
+    with gamma = 1 - 1/sqrt(2), is of order 2 for every matrix A, and L-stable if A is the Jacobian:
+
+        (I - gamma h A) k1 = f(t, x),  (I - gamma h A) k2 = f(t + h, x + h k1) - 2 k1,
+        x + h/2 (3 k1 + k2)
+
+    A is the Jacobian at a start, turned to the heading at the beginning of the step.
+    """
+    frame, lines = system.frame, Lines()
+    x, vector = lines.entries("x", len(start)), lines.entries("r", len(start))
+    heading = x[frame.rotating[0]] if frame.rotating else lines.number(0.0)
+    sine, cosine = lines.new("sin", heading), lines.new("cos", heading)
+    coordinates = lines.product(frame.transform, _turned(vector, frame.rotating, cosine, -sine))
+    solved: list[Value] = []
+    for block in frame.diagonal(system.jacobian(start, inputs)):
+        inverse = np.linalg.inv(np.eye(len(block)) - GAMMA * step * block)
+        inverse[np.abs(inverse) < ROUNDING] = 0.0
+        part = coordinates[len(solved) : len(solved) + len(block)]
+        solved += lines.product(inverse, part)
+    solution = _turned(lines.product(frame.inverse, solved), frame.rotating, cosine, sine)
+    return StraightLine(lines.operations, [value.number for value in solution])
+
+
+def _turned(
+    vector: Sequence[Value], rotating: Sequence[int], cosine: Value, sine: Value
+) -> list[Value]:
+    """A vector of states whose pairs that turn with the heading are turned by an angle."""
+    turned = list(vector)
+    for a, b in zip(rotating[1::2], rotating[2::2], strict=True):
+        turned[a] = cosine * vector[a] - sine * vector[b]
+        turned[b] = sine * vector[a] + cosine * vector[b]
+    return turned

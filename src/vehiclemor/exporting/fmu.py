@@ -14,14 +14,21 @@ import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree import ElementTree
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.exporting.c import DRIVER, MODEL, SOURCES, STEPPER, TANGENT, CSettings, c_files
-from vehiclemor.exporting.systems import TOOL, ExportedSystem
+from vehiclemor.exporting.c import (
+    DRIVER,
+    MODEL,
+    SOURCES,
+    STEPPER,
+    TANGENT,
+    CSettings,
+    c_files,
+    written,
+)
+from vehiclemor.exporting.systems import ExportedSystem
 
 _LOG = logging.getLogger("vehiclemor")
 # Platform -> folder of its binaries, and ending of its shared libraries.
@@ -31,7 +38,6 @@ BINARIES = {
     "Windows": ("win64", ".dll"),
 }
 OPTIMISED = ("-std=c99", "-O2", "-ffp-contract=off")
-CAPABILITIES = ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative")
 # Files that a binary is compiled of, the interface first.
 UNIT = "vehiclemor_fmi2.c"
 COMPILED = UNIT, MODEL, TANGENT, STEPPER
@@ -134,65 +140,20 @@ def model_description(system: ExportedSystem, token: str, step: float) -> bytes:
     By the token an importer's file and binary know one another.
     """
     every = variables_of(system)
-    root = ElementTree.Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=system.name,
-        guid=token,
-        description=system.summary,
-        generationTool=TOOL,
-        variableNamingConvention="structured",
-        numberOfEventIndicators="0",
-    )
-    common = {"modelIdentifier": system.name, **dict.fromkeys(CAPABILITIES, "true")}
-    exchange = ElementTree.SubElement(root, "ModelExchange", common)
-    simulation = ElementTree.SubElement(
-        root, "CoSimulation", common | {"canHandleVariableCommunicationStepSize": "true"}
-    )
-    for kind in (exchange, simulation):
-        files = ElementTree.SubElement(kind, "SourceFiles")
-        for name in COMPILED:
-            ElementTree.SubElement(files, "File", name=name)
-    units = ElementTree.SubElement(root, "UnitDefinitions")
-    for name in dict.fromkeys(v.unit for v in every.values() if v.unit != "1"):
-        ElementTree.SubElement(units, "Unit", name=name)
-    exchange = max(COMMUNICATION, step)
-    times = {"startTime": "0.0", "stopTime": repr(STOP), "stepSize": repr(exchange)}
-    ElementTree.SubElement(root, "DefaultExperiment", times)
-    listed = ElementTree.SubElement(root, "ModelVariables")
-    for reference, variable in every.items():
-        _variable(listed, variable, reference)
-    _structure(ElementTree.SubElement(root, "ModelStructure"), every)
-    ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
-
-
-def _variable(listed: ElementTree.Element, variable: Variable, reference: int) -> None:
-    attributes = {
-        "name": variable.name,
-        "valueReference": str(reference),
-        "description": variable.description,
-        "causality": variable.causality,
-        "variability": variable.variability,
-    }
-    if variable.initial:
-        attributes["initial"] = variable.initial
-    typed = {} if variable.unit == "1" else {"unit": variable.unit}
-    if variable.start is not None:
-        typed["start"] = repr(variable.start)
-    if variable.derivative_of is not None:
-        # Variables are counted from one, and time is the first.
-        typed["derivative"] = str(variable.derivative_of + 1)
-    scalar = ElementTree.SubElement(listed, "ScalarVariable", attributes)
-    ElementTree.SubElement(scalar, "Real", typed)
-
-
-def _structure(structure: ElementTree.Element, every: Mapping[int, Variable]) -> None:
     outputs = [i for i, v in every.items() if v.causality == "output"]
     rates = [i for i, v in every.items() if v.derivative_of is not None]
-    kinds = {"Outputs": outputs, "Derivatives": rates, "InitialUnknowns": sorted(outputs + rates)}
-    for name, references in kinds.items():
-        if references:
-            listed = ElementTree.SubElement(structure, name)
-            for reference in references:
-                ElementTree.SubElement(listed, "Unknown", index=str(reference + 1))
+    text = written(
+        "modelDescription.xml",
+        system=system,
+        token=token,
+        sources=COMPILED,
+        stop=STOP,
+        exchange=max(COMMUNICATION, step),
+        variables=every,
+        unknowns={
+            "Outputs": outputs,
+            "Derivatives": rates,
+            "InitialUnknowns": sorted(outputs + rates),
+        },
+    )
+    return text.rstrip().encode()

@@ -1,4 +1,4 @@
-"""Numbers of the standards of a run; `data/handling/metrics.toml` defines them."""
+"""Numbers of the standards: handling, by `data/handling/metrics.toml`, and ride comfort."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import quoted
+from vehiclemor.arguments import quoted, real_array
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import data_folder
-from vehiclemor.handling import driving_tests, steering_tests
+from vehiclemor.handling import open_loop_tests
 from vehiclemor.handling.motion import Motion
 from vehiclemor.registry import choice
 from vehiclemor.simulation.trajectory import Trajectory
@@ -20,20 +20,25 @@ from vehiclemor.toml_files import FileSchema, Line, read_toml
 if TYPE_CHECKING:
     import xarray as xr
 
+# Of ride comfort, in Hz: high pass and low pass (Butterworth), transition from acceleration to
+# velocity, upward step.
+HIGH_PASS, LOW_PASS, TRANSITION, STEP = 0.4, 100.0, 12.5, (2.37, 3.35)
+# Resonant quality factors.
+BUTTERWORTH, TRANSITION_QUALITY, STEP_QUALITY = 0.5**0.5, 0.63, 0.91
 # Maneuvers of the rack are those of the steering angle.
 RACK = "rack_"
 # Maneuver -> its numbers by name.
 TESTS: dict[str, Callable[[Motion], Mapping[str, Any]]] = {
-    "slow_ramp_steer": steering_tests.steady_turn,
-    "step_steer": steering_tests.step,
-    "sine_sweep": steering_tests.frequency_response,
-    "weave": steering_tests.weave,
-    "sine_with_dwell": steering_tests.sine_with_dwell,
-    "straight_braking": driving_tests.straight_braking,
-    "braking_in_turn": driving_tests.braking_in_turn,
-    "split_friction": driving_tests.split_friction,
-    "power_in_turn": driving_tests.power_in_turn,
-    "bump": driving_tests.bump,
+    "slow_ramp_steer": open_loop_tests.steady_turn,
+    "step_steer": open_loop_tests.step,
+    "sine_sweep": open_loop_tests.frequency_response,
+    "weave": open_loop_tests.weave,
+    "sine_with_dwell": open_loop_tests.sine_with_dwell,
+    "straight_braking": open_loop_tests.straight_braking,
+    "braking_in_turn": open_loop_tests.braking_in_turn,
+    "split_friction": open_loop_tests.split_friction,
+    "power_in_turn": open_loop_tests.power_in_turn,
+    "bump": open_loop_tests.bump,
 }
 
 
@@ -95,7 +100,7 @@ def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
         variables[name] = ("frequency" if np.ndim(value) else (), value, attributes)
         if np.ndim(value):
             hertz = {"units": "Hz", "long_name": "frequency of the steering"}
-            coordinates["frequency"] = "frequency", steering_tests.FREQUENCIES, hertz
+            coordinates["frequency"] = "frequency", open_loop_tests.FREQUENCIES, hertz
     speed = {"units": "m/s", "long_name": "speed at the start"}
     variables["speed"] = (), motion.speed[0], speed
     return xr.Dataset(variables, coordinates, {"maneuver": test})
@@ -117,3 +122,56 @@ def motion_of(run: Trajectory) -> Motion:
     wheelbase = model.definition.wheelbase
     length = np.nan if wheelbase is None else float(wheelbase(model.parameters.values()))
     return Motion(run.times[:n], dict([*inputs, *outputs]), length)
+
+
+def weighted_rms(times: Any, acceleration: Any) -> float:
+    """Frequency-weighted RMS of a vertical acceleration in m/s^2: ride comfort of a seated person.
+
+    Weighting Wk of ISO 2631-1:1997 by its transfer functions (annex A), from 0.4 to 100 Hz: what is
+    faster than half the sampling rate is not in it.
+
+    Parameters
+    ----------
+    times
+        Equidistant (n,) in s.
+    acceleration
+        At these times (n,) in m/s^2.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two samples, times aren't equidistant, or a value isn't finite.
+    """
+    try:
+        t, a = real_array(times), real_array(acceleration)
+    except (TypeError, ValueError):
+        raise InputError("times and acceleration must be lists of numbers") from None
+    if t.ndim != 1 or a.shape != t.shape or len(t) < 2:
+        raise InputError(
+            f"times of shape {t.shape} and acceleration of shape {a.shape}: "
+            f"both must be (n,) with two samples at least"
+        )
+    if not (np.isfinite(t).all() and np.isfinite(a).all()):
+        raise InputError("times and acceleration must be finite")
+    step = (t[-1] - t[0]) / (len(t) - 1)
+    if step <= 0.0 or np.abs(np.diff(t) - step).max() > 1e-6 * step:
+        raise InputError("times must increase in equal steps")
+    # Zeros after the end, so that nothing comes round to the beginning.
+    padded = 2 * len(t)
+    spectrum = np.fft.rfft(a, padded) * _weighting(np.fft.rfftfreq(padded, step))
+    return float(np.sqrt(np.mean(np.fft.irfft(spectrum, padded)[: len(t)] ** 2)))
+
+
+def _weighting(hertz: np.ndarray) -> np.ndarray:
+    """Wk at frequencies (n,) in Hz, with its phase."""
+    s = 1j * hertz
+
+    def resonance(corner: float, quality: float) -> np.ndarray:
+        return 1.0 + s / (quality * corner) + (s / corner) ** 2
+
+    low, high = STEP
+    limits = (s / HIGH_PASS) ** 2 / resonance(HIGH_PASS, BUTTERWORTH)
+    limits /= resonance(LOW_PASS, BUTTERWORTH)
+    transition = (1.0 + s / TRANSITION) / resonance(TRANSITION, TRANSITION_QUALITY)
+    step = (low / high) ** 2 * resonance(low, STEP_QUALITY) / resonance(high, STEP_QUALITY)
+    return limits * transition * step

@@ -253,7 +253,7 @@ def dropped_modes_excited(*_: object) -> Finding:
     share, more = 1.0 - left_out[1], left_out[1] / left_out[0]
     text = "share of the energy of the run at twice the frequency that three modes hold"
     seen = f"they leave out {left_out[1]:.2g} of it, {more:.2g} times as much as of the nominal run"
-    return Finding.below(share, 0.5, measure=text, reason=seen, source=IN_WORDS)
+    return Finding.below(share, 0.5, measure=text, reason=seen, threshold_source=IN_WORDS)
 
 
 @criterion("dw_fig14_six_states_follow", UNCUT)

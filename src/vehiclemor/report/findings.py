@@ -56,32 +56,17 @@ class Finding(NamedTuple):
     strongest: float = math.nan
 
     @classmethod
-    def below(
-        cls,
-        value: float,
-        bound: float,
-        *,
-        measure: str,
-        reason: str = "",
-        valid: bool = True,
-        source: str = OWN,
-    ) -> Self:
-        """A value that must stay below its bound; a run that has failed is not `valid`."""
-        return cls(value, bound, valid and value < bound, measure, reason, source)
+    def below(cls, value: float, bound: float, *, valid: bool = True, **about: Any) -> Self:
+        """A value that must stay below its bound; a run that has failed is not `valid`.
+
+        `about` are further fields.
+        """
+        return cls(value, bound, valid and value < bound, **about)
 
     @classmethod
-    def above(
-        cls,
-        value: float,
-        bound: float,
-        *,
-        measure: str,
-        reason: str = "",
-        valid: bool = True,
-        source: str = OWN,
-    ) -> Self:
-        """A value that must exceed its bound, where what else is asked for is `valid`."""
-        return cls(value, bound, valid and value > bound, measure, reason, source)
+    def above(cls, value: float, bound: float, *, valid: bool = True, **about: Any) -> Self:
+        """As `below`, of a value that must exceed its bound."""
+        return cls(value, bound, valid and value > bound, **about)
 
 
 @dataclass(frozen=True)

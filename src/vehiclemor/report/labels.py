@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 # What is drawn of a run, or of a point of a grid.
 Kind = Literal["histories", "paths", "errors", "frequency_response", "sine_with_dwell"]
+# What results are converted to.
+Format = Literal["zarr", "parquet", "csv"]
 # What is said of a run that was in its own training, and the mark of it in a legend.
 TRAINED, MARK = "trained on this run", "*"
 # Letters of an axis' label that leave no room for more beside them; of one beside a low panel.

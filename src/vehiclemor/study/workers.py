@@ -141,17 +141,10 @@ class Workers:
 
 def one_of_each_method_first(groups: Groups) -> list[Sequence[Experiment]]:
     """Groups in an order in which workers compile different loops at a time."""
-    first: list[Sequence[Experiment]] = []
-    later: list[Sequence[Experiment]] = []
-    methods: set[str] = set()
+    first: dict[str, Sequence[Experiment]] = {}
     for group in groups:
-        method = group[0].method
-        if method in methods:
-            later.append(group)
-        else:
-            methods.add(method)
-            first.append(group)
-    return first + later
+        first.setdefault(group[0].method, group)
+    return sorted(groups, key=lambda group: group is not first[group[0].method])
 
 
 def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.handling.motion import Motion
-from vehiclemor.handling.steering_tests import (
+from vehiclemor.handling.open_loop_tests import (
     FREQUENCIES,
     RATIO_TIMES,
     frequency_response,

@@ -105,17 +105,13 @@ class Protocol:
 
 def protocol_names() -> dict[str, str]:
     """Model -> name of the study with bounds that the package has of it."""
-    return {model: name for model, name in _by_test_set().items() if model.isidentifier()}
+    models = {name.removeprefix(PREFIX): name for name in fixed_protocols()}
+    return {model: name for model, name in models.items() if model.isidentifier()}
 
 
 def fixed_protocols() -> list[str]:
     """Names of all studies with bounds of the package: those of further test sets end in `-2`."""
-    return [*_by_test_set().values()]
-
-
-def _by_test_set() -> dict[str, str]:
-    known = (name for name in data_names("studies") if name.startswith(PREFIX))
-    return {name.removeprefix(PREFIX): name for name in known}
+    return [name for name in data_names("studies") if name.startswith(PREFIX)]
 
 
 def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protocol:
