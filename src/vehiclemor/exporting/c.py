@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.codegen.operations import COMPARISONS, uses
-from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.ros2 import solve_function
 from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
 from vehiclemor.exporting.systems import SIGNATURES, TANGENTS, TOOL, ExportedSystem
@@ -74,11 +73,7 @@ def c_files(system: ExportedSystem, settings: CSettings) -> dict[str, str]:
     values += [_array(_start(name), state, suffix) for name, state in system.starts.items()]
     functions = dict(system.functions)
     if settings.integrator == "ros2":
-        if system.dynamics is None:
-            raise InputError(f"{system.name} has no states, which ros2 could integrate")
-        start = next(iter(system.starts.values()))
-        inputs = np.array([q.default or 0.0 for q in system.inputs])
-        functions["solve"] = solve_function(system.dynamics, start, inputs, settings.step)
+        functions["solve"] = solve_function(system, settings.step)
     tangents = {f"{name}_tangent": function for name, function in system.tangents().items()}
     return {
         HEADER: _header(system, settings),

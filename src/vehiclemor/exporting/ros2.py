@@ -16,25 +16,32 @@ from collections.abc import Sequence
 import numpy as np
 
 from vehiclemor.codegen.operations import Value
+from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.straight_line import Lines, StraightLine
-from vehiclemor.simulation.system import System
+from vehiclemor.exporting.systems import ExportedSystem
 
 GAMMA = 1.0 - np.sqrt(0.5)
 # Entries of the inverse below it are left out: rounding, and A may be any matrix.
 ROUNDING = 1e-12
 
 
-def solve_function(
-    system: System, start: np.ndarray, inputs: np.ndarray, step: float
-) -> StraightLine:
-    """Solution (n,) of a linear system of the step, in s, for the arrays `x` and `r`."""
-    frame, lines = system.frame, Lines()
+def solve_function(system: ExportedSystem, step: float) -> StraightLine:
+    """Solution (n,) of a linear system of the step, in s, for the arrays `x` and `r`.
+
+    The Jacobian is that of the first start; `InputError` if the system has no states.
+    """
+    dynamics = system.dynamics
+    if dynamics is None:
+        raise InputError(f"{system.name} has no states, which ros2 could integrate")
+    start = next(iter(system.starts.values()))
+    inputs = np.array([quantity.default or 0.0 for quantity in system.inputs])
+    frame, lines = dynamics.frame, Lines()
     x, vector = lines.entries("x", len(start)), lines.entries("r", len(start))
     heading = x[frame.rotating[0]] if frame.rotating else lines.number(0.0)
     sine, cosine = lines.new("sin", heading), lines.new("cos", heading)
     coordinates = lines.product(frame.transform, _turned(vector, frame.rotating, cosine, -sine))
     solved: list[Value] = []
-    for block in frame.diagonal(system.jacobian(start, inputs)):
+    for block in frame.diagonal(dynamics.jacobian(start, inputs)):
         inverse = np.linalg.inv(np.eye(len(block)) - GAMMA * step * block)
         inverse[np.abs(inverse) < ROUNDING] = 0.0
         part = coordinates[len(solved) : len(solved) + len(block)]
