@@ -1,11 +1,12 @@
 """Exported C at fixed steps: how long a step may be, what it costs, and what memory it takes.
 
-Usage: python benchmarks/steps.py [--results DIR] [--again]
+Usage: python benchmarks/steps.py [--results DIR] [--again] [--arm]
 
 A lane change at several speeds, with inputs known at the ends of the steps, against the accurate
 full model.  Writes DIR/steps.json, which `paper/measured_numbers.py` reads, and prints tables; what
 is stored is not measured again unless asked for.  The full car is exported at the speed that it
-runs at, so that the linearly implicit step has the Jacobian of that speed.
+runs at, so that the linearly implicit step has the Jacobian of that speed.  With `--arm` the steps
+are counted on emulated Cortex processors too, see `arm`.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -34,6 +35,8 @@ MANEUVERS = {
     "high_fidelity_vehicle": "rack_lane_change",
 }
 RELAXED = "relaxation_vehicle"
+# Held steering of steps that are counted, in rad, or of the rack in m.
+ARM_STEERING = {"independent_suspension_vehicle": 0.02, "high_fidelity_vehicle": 0.003}
 SPEEDS, NOMINAL = (5.0, 10.0, 20.0, 30.0), 20.0
 DURATION = 10.0
 # Steps in s that divide the duration; each implicit one is compiled on its own.
@@ -226,6 +229,25 @@ def costs(vehicle: str) -> list[dict[str, Any]]:
     return rows
 
 
+def on_arm(vehicle: str) -> dict[str, Any]:
+    """Instructions of a step with three outputs, and memory, on Cortex processors.
+
+    Empty, with a line that says so, where tools are missing.
+    """
+    # Beside this file where it is a script; who reads its numbers does not need it.
+    import arm
+
+    if missing := arm.missing():
+        print(f"no Cortex processor is emulated: {missing} not installed")
+        return {}
+    rows, exported, held = [], subjects(vehicle, NOMINAL), ARM_STEERING[vehicle]
+    for model, integrator, name in product(("full", "reduced"), STEPS, arm.PROCESSORS):
+        options = {"integrator": integrator, "step": 0.005, "outputs": READ}
+        cost = arm.cost(exported[model].model, arm.PROCESSORS[name], held, **options)
+        rows.append({"model": model, "integrator": integrator, "processor": name} | cost)
+    return {"about": arm.about(), "rows": rows}
+
+
 def longest(rows: list[dict[str, Any]], measure: str, limit: float) -> float:
     """Longest step for which it and all shorter ones keep a limit; 0 if there is none."""
     found = 0.0
@@ -282,6 +304,10 @@ def tables(vehicle: str, part: dict[str, Any]) -> str:
         cells = [form.format(**row) if row else "none" for row in both]
         gain = f"{both[0]['time'] / both[1]['time']:.1f}" if all(both) else ""
         lines.append(_row([f"{speed:g}", f"{level:g}", *cells, gain]))
+    if part.get("arm"):
+        lines += ["", part["arm"]["about"], "", _row(part["arm"]["rows"][0])]
+        lines.append(_row(["---"] * len(part["arm"]["rows"][0])))
+        lines += [_row(row.values()) for row in part["arm"]["rows"]]
     return "\n".join(lines)
 
 
@@ -289,8 +315,8 @@ def _least(rows: list[dict[str, Any]], measure: str) -> float:
     return min(row[measure] for row in rows)
 
 
-def _row(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+def _row(cells: Iterable[object]) -> str:
+    return f"| {' | '.join(map(str, cells))} |"
 
 
 def about() -> str:
@@ -308,6 +334,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="exported C at fixed steps")
     parser.add_argument("--results", type=Path, default=Path("results"))
     parser.add_argument("--again", action="store_true", help="measure what is stored once more")
+    parser.add_argument("--arm", action="store_true", help="count on emulated Cortex processors")
     given = parser.parse_args()
     path = given.results / "steps.json"
     content = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
@@ -317,7 +344,9 @@ def main() -> None:
             for speed in SPEEDS:
                 part["scan"] += scan(vehicle, speed)
             content[vehicle] = part
-            write_text(path, json.dumps(content, indent=1) + "\n")
+        if given.arm:
+            content[vehicle]["arm"] = on_arm(vehicle)
+        write_text(path, json.dumps(content, indent=1) + "\n")
         print(tables(vehicle, content[vehicle]), end="\n\n")
 
 

@@ -257,6 +257,10 @@ def steps(vehicles: dict[str, Any]) -> Iterator[Entry]:
         for row in part["costs"]:
             head = "steps", vehicle, row["model"], row["integrator"], row["precision"]
             yield from ((slug(*head, name), row[name], unit) for name, unit in units.items())
+        for row in part.get("arm", {}).get("rows", ()):
+            head = "steps", vehicle, row["model"], row["integrator"], row["processor"]
+            yield slug(*head, "instructions"), row["instructions"], "1"
+            yield from ((slug(*head, name), row[name], "B") for name in ("code", "stack"))
         for row in study.reached(part):
             at = f"v{row['speed']:g}", f"within{row['level']:g}"
             head = "steps", vehicle, row["model"], row["integrator"], *at

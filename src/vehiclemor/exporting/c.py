@@ -11,11 +11,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from jinja2 import Environment, FileSystemLoader
 
-from vehiclemor.codegen.operations import COMPARISONS, Value, uses
-from vehiclemor.exceptions import InputError
-from vehiclemor.exporting.straight_line import FUNCTIONS, Lines, StraightLine
+from vehiclemor.codegen.operations import COMPARISONS, uses
+from vehiclemor.exporting.ros2 import solve_function
+from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
 from vehiclemor.exporting.systems import SIGNATURES, TANGENTS, TOOL, ExportedSystem
-from vehiclemor.simulation.system import System
 
 SOURCES = Path(__file__).parent / "c_sources"
 SELECT = """\
@@ -55,10 +54,6 @@ INTEGRATORS = {
     "rk4": ("explicit Runge-Kutta method of order 4", 5, 1),
     "ros2": ("linearly implicit method of order 2, with the Jacobian at the first start", 4, 0),
 }
-# Of `ros2`: the solution of the linear system of a stage.
-GAMMA = 1.0 - np.sqrt(0.5)
-# Entries of the inverse below it are left out: rounding, and A may be any matrix.
-ROUNDING = 1e-12
 SIGNATURES_IN_C = SIGNATURES | TANGENTS | {"solve": ("x", "r", "k")}
 
 
@@ -79,11 +74,7 @@ def c_files(system: ExportedSystem, settings: CSettings) -> dict[str, str]:
     values += [_array(f"start_{name}", state, suffix) for name, state in system.starts.items()]
     functions = dict(system.functions)
     if settings.integrator == "ros2":
-        if system.dynamics is None:
-            raise InputError(f"{system.name} has no states, which ros2 could integrate")
-        start = next(iter(system.starts.values()))
-        inputs = np.array([q.default or 0.0 for q in system.inputs])
-        functions["solve"] = solve_function(system.dynamics, start, inputs, settings.step)
+        functions["solve"] = solve_function(system, settings.step)
     tangents = {f"{name}_tangent": function for name, function in system.tangents().items()}
     return {
         HEADER: _header(system, settings),
@@ -208,42 +199,3 @@ def _function(name: str, function: StraightLine, suffix: str) -> str:
     # What is not read is said so, for compilers that ask.
     unread = [a for a in (*given, result) if f" {a}[" not in text and f"({a}[" not in text]
     return "\n".join([text, *(f"    (void){argument};" for argument in unread), "}"])
-
-
-def solve_function(
-    system: System, start: np.ndarray, inputs: np.ndarray, step: float
-) -> StraightLine:
-    """Solution (n,) of a linear system of a step of ROS2, in s, for the arrays `x` and `r`.
-
-    ROS2 (J. Verwer, E. Spee, J. Blom, W. Hundsdorfer, SIAM J. Sci. Comput. 20 (1999), 1456-1480),
-    with gamma = 1 - 1/sqrt(2), is of order 2 for every matrix A, and L-stable if A is the Jacobian:
-
-        (I - gamma h A) k1 = f(t, x),  (I - gamma h A) k2 = f(t + h, x + h k1) - 2 k1,
-        x + h/2 (3 k1 + k2)
-
-    A is the Jacobian at a start, turned to the heading at the beginning of the step.
-    """
-    frame, lines = system.frame, Lines()
-    x, vector = lines.entries("x", len(start)), lines.entries("r", len(start))
-    heading = x[frame.rotating[0]] if frame.rotating else lines.number(0.0)
-    sine, cosine = lines.new("sin", heading), lines.new("cos", heading)
-    coordinates = lines.product(frame.transform, _turned(vector, frame.rotating, cosine, -sine))
-    solved: list[Value] = []
-    for block in frame.diagonal(system.jacobian(start, inputs)):
-        inverse = np.linalg.inv(np.eye(len(block)) - GAMMA * step * block)
-        inverse[np.abs(inverse) < ROUNDING] = 0.0
-        part = coordinates[len(solved) : len(solved) + len(block)]
-        solved += lines.product(inverse, part)
-    solution = _turned(lines.product(frame.inverse, solved), frame.rotating, cosine, sine)
-    return StraightLine(lines.operations, [value.number for value in solution])
-
-
-def _turned(
-    vector: Sequence[Value], rotating: Sequence[int], cosine: Value, sine: Value
-) -> list[Value]:
-    """A vector of states whose pairs that turn with the heading are turned by an angle."""
-    turned = list(vector)
-    for a, b in zip(rotating[1::2], rotating[2::2], strict=True):
-        turned[a] = cosine * vector[a] - sine * vector[b]
-        turned[b] = sine * vector[a] + cosine * vector[b]
-    return turned

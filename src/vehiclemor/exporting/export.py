@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # What a file, or a folder, is written for; the others are objects alone.
 FileTarget = Literal["c", "fmu", "casadi"]
-Target = Literal[FileTarget, "jax", "sympy"]
+Target = Literal[FileTarget, "jax", "sympy", "rollouts"]
 TARGETS: tuple[str, ...] = Target.__args__
 Integrator = Literal["rk4", "ros2"]
 Precision = Literal["double", "single"]
@@ -37,8 +37,9 @@ IS_EXPORT: dict[str, Callable[[Path], bool]] = {
     "fmu": begins_with(b"modelDescription.xml", at=30),
     "casadi": begins_with(b"jhpnnagiieaha"),
 }
-# Targets that are always written to a file.
+# Targets that are always written to a file, and those that bring an integrator along.
 FILES = ("c", "fmu")
+STEPPED = (*FILES, "rollouts")
 # A folder with this file is one of ours.
 OURS = "vehiclemor_model.h"
 
@@ -66,6 +67,7 @@ def export(
         exchange and co-simulation, with sources, and a binary for this platform where there is a C
         compiler.  `casadi`: a `Function` (x, u, p) -> (dx, y), where p of a full model is its
         `parameter_values`.  `jax`: a function (x, u, p) -> (dx, y).  `sympy`: expressions.
+        `rollouts`: a function (states, inputs, period) -> outputs of many runs at once, `Rollouts`.
     out
         File or folder to write.  Without it C and FMU go under the model's name into the working
         folder; of the others the object is returned.  With it CasADi writes its file for
@@ -73,7 +75,7 @@ def export(
     overwrite
         Whether an export that is there is replaced.
     step
-        Of the integrator that C and FMU bring along, in s.
+        Of the integrator that C, FMU and rollouts bring along, in s.
     integrator
         `rk4`: explicit Runge-Kutta of order 4.  `ros2`: linearly implicit of order 2 with one
         Jacobian, that of the model's first start at this step: stable at longer steps where the
@@ -88,7 +90,7 @@ def export(
 
     Returns
     -------
-    pathlib.Path, or casadi.Function, callable, Expressions
+    pathlib.Path, or casadi.Function, callable, Expressions, Rollouts
         What was written, or the object.
 
     Raises
@@ -101,8 +103,10 @@ def export(
     step = within("step", number("step", step), STEPS, " s")
     choice("integrator", integrator, Integrator.__args__)
     choice("precision", precision, Precision.__args__)
-    if to not in FILES and (integrator, precision) != ("rk4", "double"):
-        raise InputError(f"integrator and precision are choices for C and FMU, not for {to}")
+    if to not in STEPPED and integrator != "rk4":
+        raise InputError(f"integrator is a choice for {', '.join(STEPPED)}, not for {to}")
+    if to not in FILES and precision != "double":
+        raise InputError(f"precision is a choice for {', '.join(FILES)}, not for {to}")
     if out is not None and to not in ENDINGS:
         raise InputError(f"out: an export to {to} is an object, no file")
     if isinstance(model, str):
@@ -128,6 +132,10 @@ def export(
 
         files = fmu_files(system, CSettings(step, integrator, precision))
         return write_whole(path, lambda temporary: write_archive(files, temporary))
+    if to == "rollouts":
+        from vehiclemor.exporting.rollouts import Rollouts
+
+        return Rollouts(system, step, integrator)
     from vehiclemor.exporting.libraries import OBJECTS
 
     exported = OBJECTS[to](system)

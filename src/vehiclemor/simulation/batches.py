@@ -69,6 +69,8 @@ def simulate_many(
 ) -> xr.Dataset:
     """Many runs in threads, each the same to the bit as if it were done alone.
 
+    A controller's rollouts by fixed steps are far faster: `export(model, "rollouts")`.
+
     Parameters
     ----------
     model
