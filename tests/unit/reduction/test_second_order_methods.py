@@ -9,8 +9,10 @@ from scipy.sparse import csc_array, diags_array
 
 import vehiclemor as vm
 from vehiclemor.exceptions import InputError
+from vehiclemor.reduction.methods.craig_bampton import METHOD as CRAIG_BAMPTON
+from vehiclemor.reduction.methods.krylov import METHOD as KRYLOV
+from vehiclemor.reduction.methods.krylov import krylov_vectors
 from vehiclemor.reduction.methods.linearised import BALANCED_TRUNCATION
-from vehiclemor.reduction.methods.structural_bases import CRAIG_BAMPTON, KRYLOV, krylov_vectors
 from vehiclemor.reduction.projection.structural import modes_within, port_rates, projected
 
 

@@ -1,1 +1,1 @@
-"""Reduction methods, kindred ones in one file; files know nothing of one another."""
+"""Reduction methods, one in each file; none knows another."""
