@@ -81,8 +81,8 @@ def replaceable(path: Path, kind: str, is_kind: Callable[[Path], bool]) -> Path:
     Devices, pipes, sockets and links that lead nowhere are of no kind.
     """
     try:
-        known = path.is_file() or path.is_dir()
-        if os.path.lexists(path) and not (known and is_kind(path)):
+        # Whether there is something is asked first: another process may just be storing it.
+        if os.path.lexists(path) and not ((path.is_file() or path.is_dir()) and is_kind(path)):
             raise FileError(f"{path} exists and is no {kind}: it is not replaced; move it away")
     except OSError as error:
         raise not_written(path, error) from None

@@ -116,10 +116,11 @@ def opened(
     """
     import netCDF4
 
-    if not path.is_file():
-        if path.exists():
-            raise CorruptError(f"not a {kind}: {NO_FILE}", path)
+    # In this order: another process may just be storing it.
+    if not path.exists():
         raise FileError(f"{path}: no such {kind}")
+    if not path.is_file():
+        raise CorruptError(f"not a {kind}: {NO_FILE}", path)
     try:
         digest = _sealed(path)
         if digest not in _KNOWN and not (digest and trusted):

@@ -1,6 +1,7 @@
 """README and pages describe what is there: files, commands, code.  Sphinx checks their links."""
 
 import ast
+import json
 import re
 import runpy
 import shlex
@@ -191,10 +192,19 @@ def test_an_example_uses_names_of_the_api_reference_alone(path):
     assert path.stem in (DOCS / "examples.py").read_text(encoding="utf-8")
 
 
+def test_the_linter_before_a_commit_is_that_of_the_project():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    linter = project["dependency-groups"]["style"][0]
+    assert f'"{linter}"' in (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
+
+
 def test_citation_names_this_version_and_the_published_paper():
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     paper = dict(re.findall(r"(\w+) += {+(.*?)}+,", citations().partition("@article")[2]))
+    described = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))
     assert f"\nversion: {vm.__version__}\n" in citation
+    assert described["version"] == vm.__version__
+    assert f"\ndate-released: {described['dateModified']}\n" in citation
     assert f"\n## {vm.__version__}\n" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     told = [f'"{paper[key]}"' for key in ("title", "journal")]
     for value in (*told, paper["doi"], f"year: {paper['year']}"):

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -344,6 +345,21 @@ def test_a_write_leaves_the_old_file_until_the_new_one_is_complete(tmp_path: Pat
             write_whole(path, writer)
         assert path.read_text() == content
         assert names_in(tmp_path) == ["file.txt"]
+
+
+def test_what_another_process_writes_at_the_same_time_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, is_dir = tmp_path / "file.txt", Path.is_dir
+
+    def then_it_is_written(self: Path, **options: Any) -> bool:
+        found = is_dir(self, **options)
+        if not path.exists():
+            path.write_text("other")
+        return found
+
+    monkeypatch.setattr(Path, "is_dir", then_it_is_written)
+    assert write_whole(path, lambda temporary: temporary.write_text("new")).read_text() == "new"
 
 
 def test_a_disk_error_is_one_line(tmp_path: Path) -> None:

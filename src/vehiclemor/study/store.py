@@ -261,6 +261,8 @@ def stored(
     The global `attribute` holds the key, `content` is the hash of a study file.  `make` is called
     again if one of its sources is missing, or a bug has ended a run.
     """
+    # Asked before it is read: what another process stores meanwhile is none of others.
+    there = os.path.lexists(path)
     held = global_attributes(path, stored=True)
     if held.get(attribute) == key and all(source.exists() for source in sources()):
         dataset = read_dataset(path, "source", "vehiclemor", stored=True)
@@ -269,7 +271,7 @@ def stored(
             dataset.encoding["source"] = str(path)
             return dataset
     make_folder(path.parent)
-    if os.path.lexists(path) and held.get("source") != "vehiclemor":
+    if there and held.get("source") != "vehiclemor":
         quarantine(path, path.parent, "not as it was written, or no result of this package")
     dataset = make().assign_attrs({attribute: key})
     if content:
