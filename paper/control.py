@@ -2,7 +2,7 @@
 
 Usage: python paper/control.py [--results DIR]
 
-Writes DIR/braking_car.nc, a fitted model, and DIR/control.nc, named values with units, which
+Writes DIR/models/braking_car.nc, a fitted car, and DIR/control.nc, named values with units, which
 `paper/measured_numbers.py` reads, in a few minutes.  Times are CPU times of one thread, CasADi's
 expressions interpreted where nothing else is said.
 """
@@ -38,7 +38,7 @@ HORIZONS, LOOP = (5, 10, 15, 20, 30, 40, 60), 0.5
 # Periods of the plan whose generated C is compiled.
 COMPILED = 30
 # Of rollouts: steps a period that are tried, errors of a position (m) that are allowed, calls.
-PARTS, NEAR, ROUNDS = (1, 2, 3, 4, 5, 10, 20), (5e-4, 1e-3, 1e-2), 5
+PARTS, NEAR, ROUNDS = (1, 2, 3, 4, 5, 10, 20), (5e-4, 1e-3, 1e-2), 15
 
 
 def example(name: str) -> Any:
@@ -183,7 +183,7 @@ def main() -> None:
     results = parser.parse_args().results
     values: Values = {}
     with one_thread():
-        known = models(braking_car(results / "braking_car.nc"))
+        known = models(braking_car(results / "models" / "braking_car.nc"))
         for part in (plans, rollouts, loops, compiled, shooting):
             values |= dict(part(known))
             store(values, "Models in control", results / "control.nc")
