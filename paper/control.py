@@ -2,19 +2,23 @@
 
 Usage: python paper/control.py [--results DIR]
 
-Writes DIR/control.nc, named values with units, which `paper/measured_numbers.py` reads, in a few
-minutes.  Times are CPU times of one thread, CasADi's expressions interpreted.
+Writes DIR/models/braking_car.nc, a fitted car, and DIR/control.nc, named values with units, which
+`paper/measured_numbers.py` reads, in a few minutes.  Times are CPU times of one thread, CasADi's
+expressions interpreted where nothing else is said.
 """
 
 from __future__ import annotations
 
 import argparse
 import runpy
+import subprocess
 import time
 from collections.abc import Callable, Iterator
+from contextlib import chdir
 from functools import partial
 from itertools import product
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,14 +26,19 @@ import numpy as np
 from in_use import Values, store
 
 import vehiclemor as vm
+from vehiclemor.files import make_folder
+from vehiclemor.reduction.reduced_model import ReducedOrderModel
 from vehiclemor.simulation.run_timer import one_thread
 
+Models = dict[str, tuple[Any, int]]
 EXAMPLES = Path(__file__).parents[1] / "examples"
 MODEL = "independent_suspension_vehicle"
 # Periods that are tried as horizons in the loop until one is too long, and the loop's length in s.
 HORIZONS, LOOP = (5, 10, 15, 20, 30, 40, 60), 0.5
+# Periods of the plan whose generated C is compiled.
+COMPILED = 30
 # Of rollouts: steps a period that are tried, errors of a position (m) that are allowed, calls.
-PARTS, NEAR, ROUNDS = (1, 2, 3, 4, 5, 10, 20), (5e-4, 1e-3, 1e-2), 5
+PARTS, NEAR, ROUNDS = (1, 2, 3, 4, 5, 10, 20), (5e-4, 1e-3, 1e-2), 15
 
 
 def example(name: str) -> Any:
@@ -37,42 +46,66 @@ def example(name: str) -> Any:
     return SimpleNamespace(**runpy.run_path(str(EXAMPLES / f"{name}.py")))
 
 
-def models() -> dict[str, tuple[Any, int]]:
-    """Label -> model, and Runge-Kutta steps a period, none for collocation; first the full one."""
+def braking_car(path: Path) -> ReducedOrderModel:
+    """The example's car that brakes; it is fitted once."""
+    if not path.exists():
+        make_folder(path.parent)
+        example("optimal_control").braking_car().save(path)
+    return vm.load(path)
+
+
+def models(braking: ReducedOrderModel) -> Models:
+    """Label -> model, and Runge-Kutta steps a period, none for collocation; full ones come first.
+
+    The last two brake too.
+    """
     reduced = vm.rom(MODEL)
-    full = vm.reduce(reduced.model, "full_order")
+    full, braked = (vm.reduce(car.model, "full_order") for car in (reduced, braking))
     track = vm.reduce(reduced.model, "linear_single_track")
-    return {"full": (full, 0), "reduced": (reduced, 1), "track": (track, 1)}
+    steered = {"full": (full, 0), "reduced": (reduced, 1), "track": (track, 1)}
+    return steered | {"braked full": (braked, 0), "braked reduced": (braking, 1)}
 
 
-def plans() -> Iterator[tuple[str, float]]:
-    """Optimal lane change of 60 periods: seconds, unknowns, distance to the full car's plan."""
+def plans(known: Models) -> Iterator[tuple[str, float]]:
+    """Optimal lane change of 60 periods: seconds, unknowns, distance to the full car's plan.
+
+    With the bytes of the C that CasADi writes of its functions.
+    """
     planning, found = example("optimal_control"), {}
-    for label, (car, steps) in models().items():
+    for label, (car, steps) in known.items():
         planner = planning.Planner(car, steps=steps)
-        found[label], seconds = planner.plan(car.state())
+        found[label], seconds = planner.plan(planner.start())
+        apart = np.abs(found[label] - found[full_of(label)]).max(axis=1)
         yield f"{label} plan, s", seconds
         yield f"{label} unknowns, 1", len(planner.guess)
-        yield f"{label} off, rad", float(np.abs(found[label] - found["full"]).max())
+        yield from zip((f"{label} off, rad", f"{label} braking off, m/s^2"), apart, strict=False)
+        with TemporaryDirectory() as folder, chdir(folder):
+            planner.solver.generate_dependencies("plan.c")
+            yield f"{label} generated, B", Path("plan.c").stat().st_size
     yield "largest steering, rad", float(np.abs(found["full"]).max())
 
 
-def shooting() -> Iterator[tuple[str, float]]:
+def full_of(label: str) -> str:
+    """Label of the full model that a model plans for."""
+    return "braked full" if label.startswith("braked") else "full"
+
+
+def shooting(known: Models) -> Iterator[tuple[str, float]]:
     """The full car's plan by five Runge-Kutta steps a period."""
-    planner = example("optimal_control").Planner(car := models()["full"][0], steps=5)
-    yield "full shooting, s", planner.plan(car.state())[1]
+    planner = example("optimal_control").Planner(known["full"][0], steps=5)
+    yield "full shooting, s", planner.plan(planner.start())[1]
 
 
-def loops() -> Iterator[tuple[str, float]]:
+def loops(known: Models) -> Iterator[tuple[str, float]]:
     """Longest horizon whose usual plan fits into a period, with the full car as plant; its times.
 
     Of a model that has none the times are those of the shortest horizon.
     """
-    planning, known = example("optimal_control"), models()
-    plant = known["full"][0]
+    planning = example("optimal_control")
     for label, (car, steps) in known.items():
         fits, best = 0, np.zeros(0)
         for periods in HORIZONS:
+            plant = known[full_of(label)][0]
             _, seconds = planning.drive(planning.Planner(car, periods, steps), plant, LOOP)
             if not best.size:
                 best = seconds
@@ -84,7 +117,26 @@ def loops() -> Iterator[tuple[str, float]]:
         yield f"{label} longest, s", float(best.max())
 
 
-def rollouts() -> Iterator[tuple[str, float]]:
+def compiled(known: Models) -> Iterator[tuple[str, float]]:
+    """The reduced car's usual plan in the loop by CasADi's C, and interpreted."""
+    import casadi as ca
+
+    planning = example("optimal_control")
+    car, steps = known["reduced"]
+    planner = planning.Planner(car, COMPILED, steps)
+    solvers = {"interpreted": planner.solver}
+    with TemporaryDirectory() as folder, chdir(folder):
+        planner.solver.generate_dependencies("plan.c")
+        command = ["cc", "-w", "-O1", "-fPIC", "-shared", "-o", "plan.so", "plan.c", "-lm"]
+        subprocess.run(command, check=True)  # noqa: S603  (a C compiler)
+        solvers["compiled"] = ca.nlpsol("plan", "ipopt", "./plan.so", planning.QUIET)
+    for how, solver in solvers.items():
+        planner.solver, planner.guess = solver, None
+        _, seconds = planning.drive(planner, known["full"][0], LOOP)
+        yield f"reduced {how} usual, s", float(np.median(seconds))
+
+
+def rollouts(_: Models) -> Iterator[tuple[str, float]]:
     """Rollouts of 2 s a second of one core: whole runs, and the fastest fixed steps by error."""
     sampling = example("sampled_plans")
     random = np.random.default_rng(1)
@@ -131,8 +183,9 @@ def main() -> None:
     results = parser.parse_args().results
     values: Values = {}
     with one_thread():
-        for part in (plans, rollouts, loops, shooting):
-            values |= dict(part())
+        known = models(braking_car(results / "models" / "braking_car.nc"))
+        for part in (plans, rollouts, loops, compiled, shooting):
+            values |= dict(part(known))
             store(values, "Models in control", results / "control.nc")
 
 
