@@ -156,7 +156,7 @@ class DynamicProjection(ReducedSystem):
         """Projection of states (samples of equidistant times, 2 n) onto the subspaces."""
         # Where a window begins has no influence on what is near its subspace.
         own, still = replace(self, restart="own"), self.model.inputs_at_rest
-        times = np.linspace(*self.spaces.edges[[0, -1]], len(states))
+        times = np.linspace(self.spaces.edges[0], self.spaces.edges[-1], len(states))
         pairs = zip(states, times, strict=True)
         return np.array([own.projected(state, still, time) for state, time in pairs])
 
