@@ -72,8 +72,8 @@ def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
     modes = errors.modes
     return ready(
         ModesOfErrors(
-            modes.coordinates,
-            modes.shapes,
+            in_blocks(modes.coordinates),
+            in_blocks(modes.shapes),
             errors.weights(step),
             *errors.starts(step),
             errors.free.correction,
@@ -104,9 +104,10 @@ class ErrorModel:
         enough in the end to be settled.
         """
         nodes, (n, count) = len(states), self.modes.coordinates.shape
-        widths = 2 * [states.shape[1]] + [len(self.free.correction), n, 3] + 3 * [count]
+        filled, shape = _filled(count), _filled(n)
+        widths = 2 * [states.shape[1]] + [len(self.free.correction), n, n, 3] + 2 * [filled]
         rooms: list[Any] = [np.empty((nodes, columns)) for columns in widths]
-        scratch = Scratch(*rooms, *(np.empty(size) for size in (count, n, n, 3)))
+        scratch = Scratch(*rooms, *(np.zeros(size) for size in (filled, shape, n, 3)))
         of_errors = _modes_of_errors(self, step)
         passes, result = Passes(WINDOW, MOST_PASSES, settled, LEAST_RANGE), np.empty_like(states)
         loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
@@ -130,7 +131,8 @@ class ErrorModel:
         And what of a start's deviation (n, 3) goes to heading and place while the others decay.
         """
         linear, modes = self.linearised, self.modes
-        slow = np.tile(np.abs(modes.rates) * step <= FOLLOWED, 2).astype(float)
+        follow = (np.abs(modes.rates) * step <= FOLLOWED).astype(float)
+        slow = np.append(follow, follow[: len(modes.coordinates.T) - len(follow)])
         kept = (modes.coordinates * slow) @ modes.shapes
         decayed = -np.linalg.pinv(linear.a, rcond=RANK).T @ linear.velocity_a.T
         return slow, np.ascontiguousarray((np.eye(len(kept)) - kept) @ decayed)
@@ -180,15 +182,16 @@ class ErrorModel:
         free = self.free
         found: Any = np.linalg.eig(self.linearised.a[free.indices] @ free.shapes)
         rates, vectors = found
-        inverse, upper = np.linalg.inv(vectors), rates.imag >= 0.0
-        shapes = (free.shapes @ vectors[:, upper]) * np.where(rates[upper].imag > 0.0, 2.0, 1.0)
-        left: Any = np.zeros((len(self.shape.indices), upper.sum()), dtype=complex)
-        left[free.indices] = inverse[upper].T
-        return Modes(
-            rates[upper],
-            np.ascontiguousarray(np.hstack([left.real, left.imag])),
-            np.ascontiguousarray(np.vstack([shapes.real.T, -shapes.imag.T])),
-        )
+        # Pairs first.
+        order = np.argsort(rates.imag <= 0.0, kind="stable")
+        order = order[rates.imag[order] >= 0.0]
+        pairs = int((rates.imag > 0.0).sum())
+        rates, left = rates[order], np.zeros((len(order), len(self.shape.indices)), dtype=complex)
+        left[:, free.indices] = np.linalg.inv(vectors)[order]
+        right = (free.shapes @ vectors[:, order]).T
+        right[:pairs] *= 2.0
+        coordinates = np.vstack([left.real, left.imag[:pairs]]).T
+        return Modes(rates, coordinates, np.vstack([right.real, -right.imag[:pairs]]))
 
     def weights(self, step: float) -> np.ndarray:
         """Weights of a step in s, see `error_loops`."""
@@ -200,6 +203,18 @@ class ErrorModel:
         end = np.where(small, 0.5 + z / 6.0 + z**2 / 24.0, (mean - 1.0) / divisor)
         parts = decay, step * (mean - end), step * end, self.modes.rates
         return np.array([half for part in parts for half in (part.real, part.imag)])
+
+
+def in_blocks(matrix: np.ndarray) -> np.ndarray:
+    """A matrix (rows, columns) in blocks (blocks, rows, 8) of columns, filled up with zeros."""
+    rows, columns = matrix.shape
+    filled = np.zeros((rows, _filled(columns)))
+    filled[:, :columns] = matrix
+    return np.ascontiguousarray(filled.reshape(rows, -1, LANES).swapaxes(0, 1))
+
+
+def _filled(columns: int) -> int:
+    return -(-columns // LANES) * LANES
 
 
 class Free(NamedTuple):
@@ -214,7 +229,10 @@ class Free(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """Rates (modes,) in 1/s, coordinates of deviations (n, 2 modes), and back (2 modes, n)."""
+    """Rates (modes,) in 1/s, pairs first; coordinates of deviations (n, k), and back (k, n).
+
+    The coordinates are real parts of all modes, then imaginary ones of pairs.
+    """
 
     rates: Any
     coordinates: np.ndarray
