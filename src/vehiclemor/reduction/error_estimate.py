@@ -42,10 +42,12 @@ class ErrorEstimate(ShortRepr):
     ----------
     times
         In s (nodes,).
-    errors
-        In the units of the outputs (nodes, outputs); infinite if they are too large to be known.
-    names, units
-        Of the outputs.
+    model
+        The full model.
+    inputs
+        At the nodes (nodes, inputs).
+    states, corrected
+        Of the run and of the full model (nodes, n); none of it if they can't be followed.
     bounds
         Output -> measure and bound, by which the run is judged.
     settled
@@ -55,40 +57,73 @@ class ErrorEstimate(ShortRepr):
     repr_fields = ("in_bounds", "settled")
 
     times: np.ndarray
-    errors: np.ndarray
-    names: tuple[str, ...]
-    units: tuple[str, ...]
+    model: DynamicModel
+    inputs: np.ndarray
+    states: np.ndarray
+    corrected: np.ndarray | None
     bounds: Mapping[str, ErrorBound]
     settled: bool
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Estimated error (nodes,) of an output."""
-        return self.errors[:, self.names.index(name)]
+        return self._errors((name,))[:, 0]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the outputs."""
+        return self.model.outputs
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Of the outputs."""
+        return tuple(quantity.unit for quantity in self.model.definition.outputs)
+
+    @property
+    def errors(self) -> np.ndarray:
+        """In the units of the outputs (nodes, outputs); infinite if too large to be known."""
+        return self._errors(self.names)
+
+    def _errors(self, names: tuple[str, ...]) -> np.ndarray:
+        if self.corrected is None:
+            return np.full((len(self.times), len(names)), np.inf)
+        own, full = (
+            self.model.histories_at(names, states, self.inputs)
+            for states in (self.states, self.corrected)
+        )
+        return own - full
 
     @cached_property
+    def _shares(self) -> np.ndarray:
+        """Sizes of the errors of bounded outputs in their bounds (nodes, bounds)."""
+        bounds = [bound.bound for bound in self.bounds.values()]
+        return np.abs(self._errors(tuple(self.bounds))) / bounds
+
+    @property
     def used(self) -> dict[str, np.ndarray]:
         """Part of its bound that the error of each bounded output has used up to each node."""
         used = {}
-        for name, bound in self.bounds.items():
-            size = np.abs(self[name]) / bound.bound
-            peaks = np.maximum.accumulate(size)
-            rms = np.sqrt(np.cumsum(size**2) / len(size))
+        for (name, bound), share in zip(self.bounds.items(), self._shares.T, strict=True):
+            peaks = np.maximum.accumulate(share)
+            rms = np.sqrt(np.cumsum(share**2) / len(share))
             used[name] = peaks if bound.measure == "max" else rms
         return used
 
-    @property
+    @cached_property
     def in_bounds(self) -> float:
         """Largest error of the run in multiples of its bound."""
-        return max((float(used[-1]) for used in self.used.values()), default=0.0)
+        peaks, rms = self._shares.max(axis=0), np.sqrt(np.mean(self._shares**2, axis=0))
+        largest = [bound.measure == "max" for bound in self.bounds.values()]
+        return float(np.where(largest, peaks, rms).max())
 
     def trust(self) -> Trust:
         """Trust of the run: its indicator is the estimated error in bounds, with a reserve."""
         indicator = RESERVE * self.in_bounds
         if not indicator > 1.0:
             return Trust(indicator)
-        since = {n: used.searchsorted(1.0 / RESERVE, "right") for n, used in self.used.items()}
+        used = self.used
+        since = {name: part.searchsorted(1.0 / RESERVE, "right") for name, part in used.items()}
         first = min(since, key=lambda name: since[name])
-        until, share = float(self.times[since[first]]), self.used[first][-1]
+        until, share = float(self.times[since[first]]), used[first][-1]
         size = "too large to be known" if np.isinf(share) else f"{share:.3g} times its bound"
         return Trust(indicator, until, f"the estimated error of {first} is {size}")
 
@@ -168,16 +203,12 @@ def error_estimate(
 
     model, times = run.model, run.times[nodes]
     states, inputs = (np.ascontiguousarray(part[nodes]) for part in (run.states, run.inputs))
-    errors, is_settled = np.full((len(times), len(model.outputs)), np.inf), False
+    corrected, is_settled = None, False
     if np.isfinite(states).all():
         step = float(times[1] - times[0])
         errors_of = error_model(model, states, float(times[-1]))
         corrected, is_settled = errors_of.corrected(step, states, inputs, start, settled)
-        if corrected is not None:
-            own = model.outputs_at(states, inputs)
-            errors = own - model.outputs_at(corrected, inputs)
-    units = tuple(q.unit for q in model.definition.outputs)
-    return ErrorEstimate(times, errors, model.outputs, units, bounds, is_settled)
+    return ErrorEstimate(times, model, inputs, states, corrected, bounds, is_settled)
 
 
 def estimates(model: object) -> bool:

@@ -1,13 +1,15 @@
 """Corrections of a run by the full equations, window by window: a compiled loop.
 
-See `error_model`.  Modal coordinates stand in rows, real parts of all modes first, then imaginary
-ones.
+See `error_model`.  Modal coordinates stand in rows: real parts of all modes, those of pairs first,
+then imaginary parts of pairs.  Matrices stand in blocks of eight columns, which are added up in
+registers; rows are filled up with zeros to as many.
 """
 
 import math
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import (
+    Cube,
     Float,
     Int,
     IntMatrix,
@@ -23,7 +25,7 @@ from vehiclemor.codegen.operations import LANES
 DECAY, BEGIN, END, RATES = 0, 2, 4, 6
 
 INLINED = (
-    *("begin_with", "shape_of", "turn", "in_modes", "slope", "integral", "place"),
+    *("begin_with", "shape_of", "turn", "product", "slopes", "slope", "integral", "place"),
     *("guess", "full_rates", "modal_sources", "propagate", "correct"),
 )
 # A change that is larger has gone to infinity, as one that is no number has.
@@ -51,15 +53,15 @@ class FullEquations(NamedTuple):
 
 
 class ModesOfErrors(NamedTuple):
-    """Modes: coordinates of shapes (n, 2 modes), and back (2 modes, n); weights (8, modes).
+    """Modes: coordinates of shapes and back, in blocks (blocks, rows, 8); weights (8, modes).
 
-    Slow (2 modes,) is one for those that start with an error; what the others add to heading and
-    place while they decay follows from the start's deviation by `settling` (n, 3).  The correction
-    (2 c, n) meets violations of constraints; velocity (3, n) gives psi', U, V.
+    Slow (modal coordinates,) is one for those that start with an error; what the others add to
+    heading and place while they decay follows from the start's deviation by `settling` (n, 3).  The
+    correction (2 c, n) meets violations of constraints; velocity (3, n) gives psi', U, V.
     """
 
-    coordinates: Matrix
-    shapes: Matrix
+    coordinates: Cube
+    shapes: Cube
     weights: Matrix
     slow: Vector
     settling: Matrix
@@ -80,18 +82,18 @@ class Passes(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Room for states, rates, violations, shapes, motions of all nodes; and for some in modes.
+    """Room for all nodes: states, their rates, violations, shapes, slopes of the path, motions.
 
-    Further for a change in modes (2 modes,), a shape, the ranges of its coordinates (n,), and what
-    a start adds to heading and place (3,).
+    Then in modes, filled up, what drives errors, and the errors; further for a change of these, a
+    shape (filled up), the ranges of its coordinates (n,), what a start adds to heading and place.
     """
 
     states: Matrix
     rates: Matrix
     violations: Matrix
     shapes: Matrix
+    slopes: Matrix
     motion: Matrix
-    path_rates: Matrix
     sources: Matrix
     errors: Matrix
     change: Vector
@@ -117,22 +119,21 @@ def corrected_run(
     Start (n,) is that of the full model.  Returned is the number of windows that were not settled,
     or minus one if a correction has gone to infinity.
     """
-    shapes, errors = scratch.shapes, scratch.errors
     begin_with(run, start, step, shape, modes, passes, scratch)
-    nodes, begin, unsettled = len(shapes), 0, 0
+    nodes, begin, unsettled = len(scratch.shapes), 0, 0
     while begin < nodes - 1:
         end = min(begin + passes.window, nodes)
         if nodes - end < LANES:
             end = nodes
         first = begin + 1 if begin else 0
-        guess(begin, first, end, modes.shapes, errors, shapes)
+        guess(begin, first, end, modes.shapes, scratch)
         change = 0.0
         for _ in range(passes.most):
             full_rates(first, end, inputs, shape, equations, scratch)
             modal_sources(begin, end, shape, modes, scratch)
             change = 0.0
             for i in range(first, end):
-                propagate(i, modes.weights, scratch)
+                propagate(i, modes, scratch)
                 largest = correct(i, shape, modes, scratch)
                 if not largest < LARGEST:
                     return -1
@@ -147,28 +148,30 @@ def corrected_run(
 
 
 def begin_with(run, start, step, shape, modes, passes, scratch):
-    """Shapes of a run, their rates in modes, the error at the start, and ranges."""
+    """Shapes of a run and their slopes, the error at the start, and ranges."""
     shapes, scale, moved = scratch.shapes, scratch.scale, scratch.moved
     nodes, n = shapes.shape
     for i in range(nodes):
         shape_of(run[i], shape, scratch.states[i], shapes[i])
     for j in range(n):
-        low, high = shapes[1, j], shapes[1, j]
-        for i in range(2, nodes):
-            low, high = min(low, shapes[i, j]), max(high, shapes[i, j])
-        scale[j] = max(high - low, passes.least)
         # A method may record the start itself, through which its own motion does not pass.
         near = 4.0 * shapes[1, j] - 6.0 * shapes[2, j]
         shapes[0, j] = near + 4.0 * shapes[3, j] - shapes[4, j]
-    for i in range(nodes):
+        moved[j] = scale[j] = shapes[1, j]
+    for i in range(2, nodes):
         for j in range(n):
-            moved[j] = slope(shapes, i, j, step)
-        in_modes(moved, modes.coordinates, scratch.path_rates[i])
+            scale[j] = max(scale[j], shapes[i, j])
+            moved[j] = min(moved[j], shapes[i, j])
+    for j in range(n):
+        scale[j] = max(scale[j] - moved[j], passes.least)
+    slopes(shapes, step, scratch.slopes)
     shape_of(start, shape, scratch.states[0], moved)
+    scratch.settled[:] = 0.0
     for j in range(n):
         moved[j] -= shapes[0, j]
-    in_modes(moved, modes.coordinates, scratch.errors[0])
-    in_modes(moved, modes.settling, scratch.settled)
+        for k in range(len(scratch.settled)):
+            scratch.settled[k] += moved[j] * modes.settling[j, k]
+    product(modes.coordinates, moved, scratch.errors[0])
     for k in range(len(modes.slow)):
         scratch.errors[0, k] *= modes.slow[k]
     scratch.states[:] = 0.0
@@ -178,7 +181,7 @@ def shape_of(state, shape, turned, deviation):
     """Deviation of the shape of a state from straight running; `turned` is room for a state."""
     heading = state[shape.planar[0]]
     turn(state, shape, math.cos(heading), -math.sin(heading), turned)
-    for j in range(len(deviation)):
+    for j in range(len(shape.indices)):
         deviation[j] = turned[shape.indices[j]] - shape.reference[j]
 
 
@@ -193,13 +196,36 @@ def turn(state, shape, cosine, sine, turned):
         turned[b] = sine * one + cosine * other
 
 
-def in_modes(deviation, coordinates, result):
-    """Modal coordinates of a deviation."""
-    result[:] = 0.0
-    for j in range(len(deviation)):
-        part, row = deviation[j], coordinates[j]
-        for k in range(len(result)):
-            result[k] += part * row[k]
+def product(blocks, values, result):
+    """Linear combinations of values (rows,) by a matrix in blocks (blocks, rows, 8)."""
+    for block in range(len(blocks)):
+        rows, into = blocks[block], result[8 * block : 8 * block + 8]
+        a = b = c = d = e = f = g = h = 0.0
+        for j in range(len(rows)):
+            value, row = values[j], rows[j]
+            a += value * row[0]
+            b += value * row[1]
+            c += value * row[2]
+            d += value * row[3]
+            e += value * row[4]
+            f += value * row[5]
+            g += value * row[6]
+            h += value * row[7]
+        into[0], into[1], into[2], into[3] = a, b, c, d
+        into[4], into[5], into[6], into[7] = e, f, g, h
+
+
+def slopes(values, step, result):
+    """Derivatives of all columns at all nodes."""
+    last, scale = len(values) - 1, 1.0 / (12.0 * step)
+    for i in range(2, last - 1):
+        before, after, row = values[i - 1], values[i + 1], result[i]
+        first, final = values[i - 2], values[i + 2]
+        for j in range(len(row)):
+            row[j] = scale * (8.0 * (after[j] - before[j]) - final[j] + first[j])
+    for i in (0, 1, last - 1, last):
+        for j in range(values.shape[1]):
+            result[i, j] = slope(values, i, j, step)
 
 
 def slope(values, i, j, step):
@@ -253,16 +279,16 @@ def place(step, start, shape, scratch, result):
         turn(state, shape, math.cos(state[heading]), math.sin(state[heading]), result[i])
 
 
-def guess(begin, first, end, shapes, modal, corrected):
+def guess(begin, first, end, blocks, scratch):
     """The error at the beginning of a window is a first guess of that at its other nodes."""
-    known = modal[begin]
+    known, moved = scratch.errors[begin], scratch.moved
+    product(blocks, known, moved)
     for i in range(first, end):
-        errors, into = modal[i], corrected[i]
+        errors, into = scratch.errors[i], scratch.shapes[i]
         for k in range(len(known)):
             errors[k] = known[k]
-            row = shapes[k]
-            for j in range(len(into)):
-                into[j] += known[k] * row[j]
+        for j in range(len(into)):
+            into[j] += moved[j]
 
 
 def full_rates(first, end, inputs, shape, equations, scratch):
@@ -292,66 +318,70 @@ def full_rates(first, end, inputs, shape, equations, scratch):
 
 def modal_sources(begin, end, shape, modes, scratch):
     """What drives the errors at the nodes of a window, in modes."""
-    count = modes.weights.shape[1]
+    moved, weights = scratch.moved, modes.weights
+    count = weights.shape[1]
+    pairs = len(modes.slow) - count
     for i in range(begin, end):
-        rates, into = scratch.rates[i], scratch.sources[i]
-        errors, path = scratch.errors[i], scratch.path_rates[i]
-        for k in range(count):
-            real, imaginary = modes.weights[RATES, k], modes.weights[RATES + 1, k]
-            a, b = errors[k], errors[count + k]
-            into[k] = -path[k] - (real * a - imaginary * b)
-            into[count + k] = -path[count + k] - (real * b + imaginary * a)
+        rates, slope_of_path = scratch.rates[i], scratch.slopes[i]
+        into, errors = scratch.sources[i], scratch.errors[i]
         for j in range(len(shape.indices)):
-            rate, row = rates[shape.indices[j]], modes.coordinates[j]
-            for k in range(2 * count):
-                into[k] += rate * row[k]
+            moved[j] = rates[shape.indices[j]] - slope_of_path[j]
+        product(modes.coordinates, moved, into)
+        for k in range(count):
+            into[k] -= weights[RATES, k] * errors[k]
+        for k in range(pairs):
+            m = count + k
+            into[k] += weights[RATES + 1, k] * errors[m]
+            into[m] -= weights[RATES, k] * errors[m] + weights[RATES + 1, k] * errors[k]
 
 
-def propagate(i, weights, scratch):
+def propagate(i, modes, scratch):
     """The error at a node from that at the one before it; and its change since the last pass."""
-    count, change = weights.shape[1], scratch.change
+    weights, change = modes.weights, scratch.change
+    count = weights.shape[1]
     if i == 0:
         change[:] = 0.0
         return
     before, errors = scratch.errors[i - 1], scratch.errors[i]
     begin, end = scratch.sources[i - 1], scratch.sources[i]
+    for k in range(len(modes.slow)):
+        change[k] = -errors[k]
     for k in range(count):
+        part = weights[DECAY, k] * before[k] + weights[BEGIN, k] * begin[k]
+        errors[k] = part + weights[END, k] * end[k]
+    for k in range(len(modes.slow) - count):
         m = count + k
-        real = (
-            (weights[DECAY, k] * before[k] - weights[DECAY + 1, k] * before[m])
-            + (weights[BEGIN, k] * begin[k] - weights[BEGIN + 1, k] * begin[m])
-            + (weights[END, k] * end[k] - weights[END + 1, k] * end[m])
+        errors[k] -= (
+            weights[DECAY + 1, k] * before[m]
+            + weights[BEGIN + 1, k] * begin[m]
+            + weights[END + 1, k] * end[m]
         )
-        imaginary = (
+        errors[m] = (
             (weights[DECAY, k] * before[m] + weights[DECAY + 1, k] * before[k])
             + (weights[BEGIN, k] * begin[m] + weights[BEGIN + 1, k] * begin[k])
             + (weights[END, k] * end[m] + weights[END + 1, k] * end[k])
         )
-        change[k], change[m] = real - errors[k], imaginary - errors[m]
-        errors[k], errors[m] = real, imaginary
+    for k in range(len(modes.slow)):
+        change[k] += errors[k]
 
 
 def correct(i, shape, modes, scratch):
     """Change the shape at a node, and write its motion; how much it changes in its scale."""
     rates, violations, change = scratch.rates[i], scratch.violations[i], scratch.change
     moved, into, largest = scratch.moved, scratch.shapes[i], 0.0
-    moved[:] = 0.0
-    for k in range(len(change)):
-        amount, row = change[k], modes.shapes[k]
-        for j in range(len(moved)):
-            moved[j] += amount * row[j]
+    product(modes.shapes, change, moved)
     for k in range(len(violations)):
         amount, row = violations[k], modes.correction[k]
-        for j in range(len(moved)):
+        for j in range(len(into)):
             moved[j] -= amount * row[j]
-    for j in range(len(moved)):
+    for j in range(len(into)):
         into[j] += moved[j]
         largest = max(largest, abs(moved[j]) / scratch.scale[j])
         if moved[j] != moved[j]:
             return INFINITE
     for k in range(len(shape.planar)):
         velocity = rates[shape.planar[k]]
-        for j in range(len(moved)):
+        for j in range(len(into)):
             velocity += modes.velocity[k, j] * moved[j]
         scratch.motion[i, k] = velocity
     return largest

@@ -14,12 +14,11 @@ method with a frozen Jacobian.  Heading and position of the corrected shape are 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
 
 from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.codegen.operations import LANES
@@ -43,18 +42,28 @@ DIFFERENCE, SERIES = 1e-6, 1e-3
 def error_model(model: DynamicModel, states: np.ndarray, duration: float) -> ErrorModel:
     """What corrects a run of a vehicle model, with states (nodes, n) over so many s."""
     way = np.hypot(*np.diff(states[:, model.planar[:2]], axis=0).T).sum()
-    return _at_speed(model, SPEEDS * max(round(float(way) / duration / SPEEDS), 1))
+    key = model.kernel_hash, model.inputs, model.constants.tobytes()
+    alike = Alike(key, model)
+    return _at_speed(alike, SPEEDS * max(round(float(way) / duration / SPEEDS), 1))
+
+
+@dataclass(frozen=True)
+class Alike:
+    """A model that stands for all with the same equations and constants."""
+
+    key: tuple[str, tuple[str, ...], bytes]
+    model: DynamicModel = field(compare=False)
 
 
 @lru_cache(maxsize=256)
-def _at_speed(model: DynamicModel, speed: float) -> ErrorModel:
-    return ErrorModel(_shape(model), speed)
+def _at_speed(alike: Alike, speed: float) -> ErrorModel:
+    return ErrorModel(_shape(alike), speed)
 
 
 # Its derivatives serve all speeds.
 @lru_cache(maxsize=64)
-def _shape(model: DynamicModel) -> VehicleShape:
-    return VehicleShape(model)
+def _shape(alike: Alike) -> VehicleShape:
+    return VehicleShape(alike.model)
 
 
 @lru_cache(maxsize=256)
@@ -63,8 +72,8 @@ def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
     modes = errors.modes
     return ready(
         ModesOfErrors(
-            modes.coordinates,
-            modes.shapes,
+            in_blocks(modes.coordinates),
+            in_blocks(modes.shapes),
             errors.weights(step),
             *errors.starts(step),
             errors.free.correction,
@@ -95,9 +104,10 @@ class ErrorModel:
         enough in the end to be settled.
         """
         nodes, (n, count) = len(states), self.modes.coordinates.shape
-        widths = 2 * [states.shape[1]] + [len(self.free.correction), n, 3] + 3 * [count]
+        filled, shape = _filled(count), _filled(n)
+        widths = 2 * [states.shape[1]] + [len(self.free.correction), n, n, 3] + 2 * [filled]
         rooms: list[Any] = [np.empty((nodes, columns)) for columns in widths]
-        scratch = Scratch(*rooms, *(np.empty(size) for size in (count, n, n, 3)))
+        scratch = Scratch(*rooms, *(np.zeros(size) for size in (filled, shape, n, 3)))
         of_errors = _modes_of_errors(self, step)
         passes, result = Passes(WINDOW, MOST_PASSES, settled, LEAST_RANGE), np.empty_like(states)
         loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
@@ -110,9 +120,8 @@ class ErrorModel:
     def linearised(self) -> Linearisation:
         """Derivatives at straight running at the speed, which all states of that motion follow."""
         linear = self.shape.linearised
-        found: Any = np.linalg.eig(linear.a)
-        rates, vectors = found
-        still = vectors[:, np.abs(rates).argmin()].real
+        # Straight running at another speed: the mode of eigenvalue zero.
+        still = np.linalg.svd(linear.a)[2][-1]
         faster = still / (linear.velocity_a[1] @ still)
         return self.shape.linearised_at((self.speed - self.shape.speed) * faster)
 
@@ -122,7 +131,8 @@ class ErrorModel:
         And what of a start's deviation (n, 3) goes to heading and place while the others decay.
         """
         linear, modes = self.linearised, self.modes
-        slow = np.tile(np.abs(modes.rates) * step <= FOLLOWED, 2).astype(float)
+        follow = (np.abs(modes.rates) * step <= FOLLOWED).astype(float)
+        slow = np.append(follow, follow[: len(modes.coordinates.T) - len(follow)])
         kept = (modes.coordinates * slow) @ modes.shapes
         decayed = -np.linalg.pinv(linear.a, rcond=RANK).T @ linear.velocity_a.T
         return slow, np.ascontiguousarray((np.eye(len(kept)) - kept) @ decayed)
@@ -157,6 +167,9 @@ class ErrorModel:
         steps = DIFFERENCE * np.vstack([np.eye(n), -np.eye(n)])
         violations = self._violations(steps, np.zeros((2 * n, len(shape.model.inputs))))
         jacobian = (violations[:n] - violations[n:]).T / (2.0 * DIFFERENCE)
+        # Its import takes longer than thousands of estimates.
+        import scipy.linalg
+
         kept = scipy.linalg.null_space(jacobian)
         *_, order = scipy.linalg.qr(kept.T, pivoting=True)
         free = np.sort(order[: kept.shape[1]])
@@ -169,15 +182,16 @@ class ErrorModel:
         free = self.free
         found: Any = np.linalg.eig(self.linearised.a[free.indices] @ free.shapes)
         rates, vectors = found
-        inverse, upper = np.linalg.inv(vectors), rates.imag >= 0.0
-        shapes = (free.shapes @ vectors[:, upper]) * np.where(rates[upper].imag > 0.0, 2.0, 1.0)
-        left: Any = np.zeros((len(self.shape.indices), upper.sum()), dtype=complex)
-        left[free.indices] = inverse[upper].T
-        return Modes(
-            rates[upper],
-            np.ascontiguousarray(np.hstack([left.real, left.imag])),
-            np.ascontiguousarray(np.vstack([shapes.real.T, -shapes.imag.T])),
-        )
+        # Pairs first.
+        order = np.argsort(rates.imag <= 0.0, kind="stable")
+        order = order[rates.imag[order] >= 0.0]
+        pairs = int((rates.imag > 0.0).sum())
+        rates, left = rates[order], np.zeros((len(order), len(self.shape.indices)), dtype=complex)
+        left[:, free.indices] = np.linalg.inv(vectors)[order]
+        right = (free.shapes @ vectors[:, order]).T
+        right[:pairs] *= 2.0
+        coordinates = np.vstack([left.real, left.imag[:pairs]]).T
+        return Modes(rates, coordinates, np.vstack([right.real, -right.imag[:pairs]]))
 
     def weights(self, step: float) -> np.ndarray:
         """Weights of a step in s, see `error_loops`."""
@@ -189,6 +203,18 @@ class ErrorModel:
         end = np.where(small, 0.5 + z / 6.0 + z**2 / 24.0, (mean - 1.0) / divisor)
         parts = decay, step * (mean - end), step * end, self.modes.rates
         return np.array([half for part in parts for half in (part.real, part.imag)])
+
+
+def in_blocks(matrix: np.ndarray) -> np.ndarray:
+    """A matrix (rows, columns) in blocks (blocks, rows, 8) of columns, filled up with zeros."""
+    rows, columns = matrix.shape
+    filled = np.zeros((rows, _filled(columns)))
+    filled[:, :columns] = matrix
+    return np.ascontiguousarray(filled.reshape(rows, -1, LANES).swapaxes(0, 1))
+
+
+def _filled(columns: int) -> int:
+    return -(-columns // LANES) * LANES
 
 
 class Free(NamedTuple):
@@ -203,7 +229,10 @@ class Free(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """Rates (modes,) in 1/s, coordinates of deviations (n, 2 modes), and back (2 modes, n)."""
+    """Rates (modes,) in 1/s, pairs first; coordinates of deviations (n, k), and back (k, n).
+
+    The coordinates are real parts of all modes, then imaginary ones of pairs.
+    """
 
     rates: Any
     coordinates: np.ndarray
