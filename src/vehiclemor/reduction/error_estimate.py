@@ -1,4 +1,4 @@
-"""How far a reduced vehicle's run is from that of the full model, estimated after the run.
+"""How far a reduced run is from that of the full model, estimated after the run.
 
 What a start that violates constraints does in its first tenth of a second is not seen.
 """
@@ -18,8 +18,10 @@ from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
+from vehiclemor.reduction.constraint_error import constraint_errors
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
@@ -137,7 +139,10 @@ def judged(
     if not known or run.status not in WITHOUT_COMPLAINT:
         return run
     began, loops, estimate = time.thread_time(), run.seconds, None
-    for spacing, settled in LOOKS:
+    is_mechanism = isinstance(model, AlgebraicModel)
+    if is_mechanism:
+        estimate = _estimate(run, run.times, *constraint_errors(run, maneuver), known)
+    for spacing, settled in () if is_mechanism else LOOKS:
         apart = maneuver.duration / (maneuver.samples - 1)
         parts = math.ceil(apart / spacing - 1e-6)
         finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
@@ -176,10 +181,23 @@ def error_estimate(
         if corrected is not None:
             own = model.outputs_at(states, inputs)
             errors = own - model.outputs_at(corrected, inputs)
-    units = tuple(q.unit for q in model.definition.outputs)
-    return ErrorEstimate(times, errors, model.outputs, units, bounds, is_settled)
+    return _estimate(run, times, errors, is_settled, bounds)
+
+
+def _estimate(
+    run: Trajectory,
+    times: np.ndarray,
+    errors: np.ndarray,
+    settled: bool,
+    bounds: Mapping[str, ErrorBound],
+) -> ErrorEstimate:
+    outputs = run.model.definition.outputs
+    names, units = (tuple(getattr(q, part) for q in outputs) for part in ("name", "unit"))
+    return ErrorEstimate(times, errors, names, units, bounds, settled)
 
 
 def estimates(model: object) -> bool:
-    """Whether errors of runs of a model can be estimated: it is a vehicle with a heading."""
+    """Whether errors of a model's runs are estimated: a mechanism, or a vehicle with a heading."""
+    if isinstance(model, AlgebraicModel):
+        return True
     return isinstance(model, DynamicModel) and len(model.planar) == 3
