@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -44,10 +44,10 @@ class ErrorEstimate(ShortRepr):
     ----------
     times
         In s (nodes,).
-    errors
-        In the units of the outputs (nodes, outputs); infinite if they are too large to be known.
-    names, units
-        Of the outputs.
+    model
+        The full model.
+    errors_of
+        Names of outputs -> their errors (nodes, names), see `errors`.
     bounds
         Output -> measure and bound, by which the run is judged.
     settled
@@ -57,40 +57,62 @@ class ErrorEstimate(ShortRepr):
     repr_fields = ("in_bounds", "settled")
 
     times: np.ndarray
-    errors: np.ndarray
-    names: tuple[str, ...]
-    units: tuple[str, ...]
+    model: Model
+    errors_of: Callable[[tuple[str, ...]], np.ndarray]
     bounds: Mapping[str, ErrorBound]
     settled: bool
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Estimated error (nodes,) of an output."""
-        return self.errors[:, self.names.index(name)]
+        return self.errors_of((name,))[:, 0]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the outputs."""
+        return self.model.outputs
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Of the outputs."""
+        return tuple(quantity.unit for quantity in self.model.definition.outputs)
+
+    @property
+    def errors(self) -> np.ndarray:
+        """In the units of the outputs (nodes, outputs); infinite if too large to be known."""
+        return self.errors_of(self.names)
 
     @cached_property
+    def _shares(self) -> np.ndarray:
+        """Sizes of the errors of bounded outputs in their bounds (nodes, bounds)."""
+        bounds = [bound.bound for bound in self.bounds.values()]
+        return np.abs(self.errors_of(tuple(self.bounds))) / bounds
+
+    @property
     def used(self) -> dict[str, np.ndarray]:
         """Part of its bound that the error of each bounded output has used up to each node."""
         used = {}
-        for name, bound in self.bounds.items():
-            size = np.abs(self[name]) / bound.bound
-            peaks = np.maximum.accumulate(size)
-            rms = np.sqrt(np.cumsum(size**2) / len(size))
+        for (name, bound), share in zip(self.bounds.items(), self._shares.T, strict=True):
+            peaks = np.maximum.accumulate(share)
+            rms = np.sqrt(np.cumsum(share**2) / len(share))
             used[name] = peaks if bound.measure == "max" else rms
         return used
 
-    @property
+    @cached_property
     def in_bounds(self) -> float:
         """Largest error of the run in multiples of its bound."""
-        return max((float(used[-1]) for used in self.used.values()), default=0.0)
+        peaks, rms = self._shares.max(axis=0), np.sqrt(np.mean(self._shares**2, axis=0))
+        largest = [bound.measure == "max" for bound in self.bounds.values()]
+        return float(np.where(largest, peaks, rms).max())
 
     def trust(self) -> Trust:
         """Trust of the run: its indicator is the estimated error in bounds, with a reserve."""
         indicator = RESERVE * self.in_bounds
         if not indicator > 1.0:
             return Trust(indicator)
-        since = {n: used.searchsorted(1.0 / RESERVE, "right") for n, used in self.used.items()}
+        used = self.used
+        since = {name: part.searchsorted(1.0 / RESERVE, "right") for name, part in used.items()}
         first = min(since, key=lambda name: since[name])
-        until, share = float(self.times[since[first]]), self.used[first][-1]
+        until, share = float(self.times[since[first]]), used[first][-1]
         size = "too large to be known" if np.isinf(share) else f"{share:.3g} times its bound"
         return Trust(indicator, until, f"the estimated error of {first} is {size}")
 
@@ -141,7 +163,8 @@ def judged(
     began, loops, estimate = time.thread_time(), run.seconds, None
     is_mechanism = isinstance(model, AlgebraicModel)
     if is_mechanism:
-        estimate = _estimate(run, run.times, *constraint_errors(run, maneuver), known)
+        errors_of, reached = constraint_errors(run, maneuver)
+        estimate = ErrorEstimate(run.times, model, errors_of, known, reached)
     for spacing, settled in () if is_mechanism else LOOKS:
         apart = maneuver.duration / (maneuver.samples - 1)
         parts = math.ceil(apart / spacing - 1e-6)
@@ -173,27 +196,27 @@ def error_estimate(
 
     model, times = run.model, run.times[nodes]
     states, inputs = (np.ascontiguousarray(part[nodes]) for part in (run.states, run.inputs))
-    errors, is_settled = np.full((len(times), len(model.outputs)), np.inf), False
+    corrected, is_settled = None, False
     if np.isfinite(states).all():
         step = float(times[1] - times[0])
         errors_of = error_model(model, states, float(times[-1]))
         corrected, is_settled = errors_of.corrected(step, states, inputs, start, settled)
-        if corrected is not None:
-            own = model.outputs_at(states, inputs)
-            errors = own - model.outputs_at(corrected, inputs)
-    return _estimate(run, times, errors, is_settled, bounds)
+    errors = partial(_errors_of_states, model, inputs, states, corrected)
+    return ErrorEstimate(times, model, errors, bounds, is_settled)
 
 
-def _estimate(
-    run: Trajectory,
-    times: np.ndarray,
-    errors: np.ndarray,
-    settled: bool,
-    bounds: Mapping[str, ErrorBound],
-) -> ErrorEstimate:
-    outputs = run.model.definition.outputs
-    names, units = (tuple(getattr(q, part) for q in outputs) for part in ("name", "unit"))
-    return ErrorEstimate(times, errors, names, units, bounds, settled)
+def _errors_of_states(
+    model: DynamicModel,
+    inputs: np.ndarray,
+    states: np.ndarray,
+    corrected: np.ndarray | None,
+    names: tuple[str, ...],
+) -> np.ndarray:
+    """Errors (nodes, names) of outputs at states (nodes, n), infinite without corrected ones."""
+    if corrected is None:
+        return np.full((len(states), len(names)), np.inf)
+    own, full = (model.histories_at(names, path, inputs) for path in (states, corrected))
+    return own - full
 
 
 def estimates(model: object) -> bool:

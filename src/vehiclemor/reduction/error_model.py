@@ -14,12 +14,11 @@ method with a frozen Jacobian.  Heading and position of the corrected shape are 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
 
 from vehiclemor.codegen.loops import Ready, loops, ready
 from vehiclemor.codegen.operations import LANES
@@ -43,18 +42,28 @@ DIFFERENCE, SERIES = 1e-6, 1e-3
 def error_model(model: DynamicModel, states: np.ndarray, duration: float) -> ErrorModel:
     """What corrects a run of a vehicle model, with states (nodes, n) over so many s."""
     way = np.hypot(*np.diff(states[:, model.planar[:2]], axis=0).T).sum()
-    return _at_speed(model, SPEEDS * max(round(float(way) / duration / SPEEDS), 1))
+    key = model.kernel_hash, model.inputs, model.constants.tobytes()
+    alike = Alike(key, model)
+    return _at_speed(alike, SPEEDS * max(round(float(way) / duration / SPEEDS), 1))
+
+
+@dataclass(frozen=True)
+class Alike:
+    """A model that stands for all with the same equations and constants."""
+
+    key: tuple[str, tuple[str, ...], bytes]
+    model: DynamicModel = field(compare=False)
 
 
 @lru_cache(maxsize=256)
-def _at_speed(model: DynamicModel, speed: float) -> ErrorModel:
-    return ErrorModel(_shape(model), speed)
+def _at_speed(alike: Alike, speed: float) -> ErrorModel:
+    return ErrorModel(_shape(alike), speed)
 
 
 # Its derivatives serve all speeds.
 @lru_cache(maxsize=64)
-def _shape(model: DynamicModel) -> VehicleShape:
-    return VehicleShape(model)
+def _shape(alike: Alike) -> VehicleShape:
+    return VehicleShape(alike.model)
 
 
 @lru_cache(maxsize=256)
@@ -110,9 +119,8 @@ class ErrorModel:
     def linearised(self) -> Linearisation:
         """Derivatives at straight running at the speed, which all states of that motion follow."""
         linear = self.shape.linearised
-        found: Any = np.linalg.eig(linear.a)
-        rates, vectors = found
-        still = vectors[:, np.abs(rates).argmin()].real
+        # Straight running at another speed: the mode of eigenvalue zero.
+        still = np.linalg.svd(linear.a)[2][-1]
         faster = still / (linear.velocity_a[1] @ still)
         return self.shape.linearised_at((self.speed - self.shape.speed) * faster)
 
@@ -157,6 +165,9 @@ class ErrorModel:
         steps = DIFFERENCE * np.vstack([np.eye(n), -np.eye(n)])
         violations = self._violations(steps, np.zeros((2 * n, len(shape.model.inputs))))
         jacobian = (violations[:n] - violations[n:]).T / (2.0 * DIFFERENCE)
+        # Its import takes longer than thousands of estimates.
+        import scipy.linalg
+
         kept = scipy.linalg.null_space(jacobian)
         *_, order = scipy.linalg.qr(kept.T, pivoting=True)
         free = np.sort(order[: kept.shape[1]])

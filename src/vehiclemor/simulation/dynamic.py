@@ -32,7 +32,7 @@ from vehiclemor.simulation.trajectory import (
     Trust,
     output_names,
 )
-from vehiclemor.simulation.workspaces import Run, Solver
+from vehiclemor.simulation.workspaces import ALL_SAMPLES, Run, Solver
 
 # What derivatives are of -> function of the equations.
 RESULTS = {"rhs": "derivative", "outputs": "outputs"}
@@ -298,6 +298,12 @@ class DynamicModel(Model):
         if trust is not None and trust.reason:
             return trajectory.judged(trust)
         return trajectory
+
+    def histories_at(
+        self, names: tuple[str, ...], states: np.ndarray, inputs: np.ndarray
+    ) -> np.ndarray:
+        """Outputs, coordinates or speeds (samples, names) along a path of states and inputs."""
+        return Recording(self._recorder, states, inputs, ALL_SAMPLES).columns(names)
 
     @cached_property
     def _recorder(self) -> Recorder:

@@ -263,6 +263,8 @@ class Trajectory(ShortRepr):
     @property
     def states(self) -> np.ndarray:
         """Coordinates, speeds and further states side by side (samples, n)."""
+        if "recording" in self.__dict__:
+            return self.__dict__["recording"].state_history
         return np.hstack((self.coordinates, self.speeds, self.further_states))
 
 
