@@ -17,6 +17,7 @@ from vehiclemor.reduction.projection.bases import (
     Rank,
     RankTolerance,
     Snapshots,
+    by_window,
     check_pod,
     first_samples,
     pod_basis,
@@ -126,9 +127,7 @@ class AlgebraicProjection(ReducedMechanism):
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, n) onto the subspaces."""
-        times = np.linspace(self.edges[0], self.edges[-1], len(states))
-        parts = zip(pairwise(first_samples(times, self.edges)), self.bases, strict=True)
-        return np.concatenate([project(states[a:b], basis) for (a, b), basis in parts])
+        return by_window(states, self.edges, lambda part, k: project(part, self.bases[k]))
 
 
 def fit_windows(

@@ -3,7 +3,9 @@
 Masoudi, Uchida, McPhee (2015), section 3, steps 1 to 5.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -110,3 +112,12 @@ def first_samples(times: np.ndarray, edges: np.ndarray) -> np.ndarray:
     slack = 1e-9 * (edges[-1] - edges[0])
     inner = np.searchsorted(times, edges[1:-1] - slack)
     return np.concatenate([[0], inner, [len(times)]]).astype(np.int64)
+
+
+def by_window(
+    states: np.ndarray, edges: np.ndarray, project: Callable[[np.ndarray, int], np.ndarray]
+) -> np.ndarray:
+    """States (samples of equidistant times, n), those of each window by `project(states, k)`."""
+    first = first_samples(np.linspace(edges[0], edges[-1], len(states)), edges)
+    parts = [project(states[a:b], k) for k, (a, b) in enumerate(pairwise(first))]
+    return np.concatenate(parts)

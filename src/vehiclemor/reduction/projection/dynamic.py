@@ -24,6 +24,7 @@ from vehiclemor.reduction.projection.bases import (
     Rank,
     RankTolerance,
     Snapshots,
+    by_window,
     check_pod,
     pod_basis,
 )
@@ -154,11 +155,23 @@ class DynamicProjection(ReducedSystem):
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, 2 n) onto the subspaces."""
-        # Where a window begins has no influence on what is near its subspace.
-        own, still = replace(self, restart="own"), self.model.inputs_at_rest
-        times = np.linspace(*self.spaces.edges[[0, -1]], len(states))
-        pairs = zip(states, times, strict=True)
-        return np.array([own.projected(state, still, time) for state, time in pairs])
+        return by_window(states, self.spaces.edges, self._projected)
+
+    def _projected(self, states: np.ndarray, window: int) -> np.ndarray:
+        spaces, n = self.spaces, len(self.model.coordinates)
+        mean, rank = spaces.means[window], spaces.ranks[window]
+        trial, test = spaces.trial_basis[window], spaces.test_basis[window]
+        if spaces.formulation == "state":
+            return mean + (states - mean) @ test[:rank].T @ trial[:rank]
+        trial, test = trial[: rank // 2, :n], test[: rank // 2, :n]
+        inputs = np.zeros((len(states), len(self.model.inputs)))
+        rates = self.model.rhs_at(states, inputs)[:, :n]
+        result = np.empty_like(states)
+        result[:, :n] = mean[:n] + (states[:, :n] - mean[:n]) @ test.T @ trial
+        result[:, n:] = rates @ test.T @ trial
+        for row in result:
+            row[n:] = self.model.speeds_of_rates(row)
+        return result
 
     @cached_property
     def spectral_abscissas(self) -> np.ndarray:
