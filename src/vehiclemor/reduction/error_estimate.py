@@ -1,4 +1,4 @@
-"""How far a reduced vehicle's run is from that of the full model, estimated after the run.
+"""How far a reduced run is from that of the full model, estimated after the run.
 
 What a start that violates constraints does in its first tenth of a second is not seen.
 """
@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,10 @@ from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
+from vehiclemor.reduction.constraint_error import constraint_errors
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
+from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
@@ -44,10 +46,8 @@ class ErrorEstimate(ShortRepr):
         In s (nodes,).
     model
         The full model.
-    inputs
-        At the nodes (nodes, inputs).
-    states, corrected
-        Of the run and of the full model (nodes, n); none of it if they can't be followed.
+    errors_of
+        Names of outputs -> their errors (nodes, names), see `errors`.
     bounds
         Output -> measure and bound, by which the run is judged.
     settled
@@ -57,16 +57,14 @@ class ErrorEstimate(ShortRepr):
     repr_fields = ("in_bounds", "settled")
 
     times: np.ndarray
-    model: DynamicModel
-    inputs: np.ndarray
-    states: np.ndarray
-    corrected: np.ndarray | None
+    model: Model
+    errors_of: Callable[[tuple[str, ...]], np.ndarray]
     bounds: Mapping[str, ErrorBound]
     settled: bool
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Estimated error (nodes,) of an output."""
-        return self._errors((name,))[:, 0]
+        return self.errors_of((name,))[:, 0]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -81,22 +79,13 @@ class ErrorEstimate(ShortRepr):
     @property
     def errors(self) -> np.ndarray:
         """In the units of the outputs (nodes, outputs); infinite if too large to be known."""
-        return self._errors(self.names)
-
-    def _errors(self, names: tuple[str, ...]) -> np.ndarray:
-        if self.corrected is None:
-            return np.full((len(self.times), len(names)), np.inf)
-        own, full = (
-            self.model.histories_at(names, states, self.inputs)
-            for states in (self.states, self.corrected)
-        )
-        return own - full
+        return self.errors_of(self.names)
 
     @cached_property
     def _shares(self) -> np.ndarray:
         """Sizes of the errors of bounded outputs in their bounds (nodes, bounds)."""
         bounds = [bound.bound for bound in self.bounds.values()]
-        return np.abs(self._errors(tuple(self.bounds))) / bounds
+        return np.abs(self.errors_of(tuple(self.bounds))) / bounds
 
     @property
     def used(self) -> dict[str, np.ndarray]:
@@ -172,7 +161,11 @@ def judged(
     if not known or run.status not in WITHOUT_COMPLAINT:
         return run
     began, loops, estimate = time.thread_time(), run.seconds, None
-    for spacing, settled in LOOKS:
+    is_mechanism = isinstance(model, AlgebraicModel)
+    if is_mechanism:
+        errors_of, reached = constraint_errors(run, maneuver)
+        estimate = ErrorEstimate(run.times, model, errors_of, known, reached)
+    for spacing, settled in () if is_mechanism else LOOKS:
         apart = maneuver.duration / (maneuver.samples - 1)
         parts = math.ceil(apart / spacing - 1e-6)
         finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
@@ -208,9 +201,26 @@ def error_estimate(
         step = float(times[1] - times[0])
         errors_of = error_model(model, states, float(times[-1]))
         corrected, is_settled = errors_of.corrected(step, states, inputs, start, settled)
-    return ErrorEstimate(times, model, inputs, states, corrected, bounds, is_settled)
+    errors = partial(_errors_of_states, model, inputs, states, corrected)
+    return ErrorEstimate(times, model, errors, bounds, is_settled)
+
+
+def _errors_of_states(
+    model: DynamicModel,
+    inputs: np.ndarray,
+    states: np.ndarray,
+    corrected: np.ndarray | None,
+    names: tuple[str, ...],
+) -> np.ndarray:
+    """Errors (nodes, names) of outputs at states (nodes, n), infinite without corrected ones."""
+    if corrected is None:
+        return np.full((len(states), len(names)), np.inf)
+    own, full = (model.histories_at(names, path, inputs) for path in (states, corrected))
+    return own - full
 
 
 def estimates(model: object) -> bool:
-    """Whether errors of runs of a model can be estimated: it is a vehicle with a heading."""
+    """Whether errors of a model's runs are estimated: a mechanism, or a vehicle with a heading."""
+    if isinstance(model, AlgebraicModel):
+        return True
     return isinstance(model, DynamicModel) and len(model.planar) == 3

@@ -188,7 +188,7 @@ class ErrorModel:
         pairs = int((rates.imag > 0.0).sum())
         rates, left = rates[order], np.zeros((len(order), len(self.shape.indices)), dtype=complex)
         left[:, free.indices] = np.linalg.inv(vectors)[order]
-        right = (free.shapes @ vectors[:, order]).T
+        right: Any = (free.shapes @ vectors[:, order]).T
         right[:pairs] *= 2.0
         coordinates = np.vstack([left.real, left.imag[:pairs]]).T
         return Modes(rates, coordinates, np.vstack([right.real, -right.imag[:pairs]]))

@@ -19,17 +19,12 @@ from vehiclemor.codegen.loop_types import (
     matrix,
     vector,
 )
-from vehiclemor.simulation.newton_loops import CONVERGED
-
-# Indices of what is reported of a run: its trust indicator, and the first sample at which that is
-# above 1, or the number of samples; how much that is.
-INDICATOR, LEFT, REPORTED = range(3)
 
 
 class Cells(NamedTuple):
     """A box of inputs in equal cells, with a polynomial in each."""
 
-    # The box is where all |input - centre| * scale <= 1 (INPUTS,); the largest is the indicator.
+    # The box is where all |input - centre| * scale <= 1 (INPUTS,).
     centres: Vector
     scales: Vector
     numbers: IntVector  # Number of cells along each input (INPUTS,), 1 for an input that rests.
@@ -65,26 +60,22 @@ def map_path(
     """Polynomials at every sample, outside of the box those of the nearest cell.
 
     Their kernel gives so many quantities at coordinates (inputs,) in a cell, from -1 to 1.  The
-    space holds quantities of all samples, then what is reported, see above, then scratch space
-    (inputs,): one array is sooner handed over than three.
+    space holds quantities of all samples, then scratch space (inputs,): one array is sooner handed
+    over than two.  Returns the first sample outside of the box, or the number of samples.
     """
     centres, scales, numbers, coefficients = cells
     samples, end = len(inputs), len(inputs) * quantities
-    table = matrix(space, 0, samples, quantities)
-    reported, x = vector(space, end, REPORTED), vector(space, end + REPORTED, len(centres))
-    largest, left = 0.0, samples
+    table, x = matrix(space, 0, samples, quantities), vector(space, end, len(centres))
+    left = samples
     for sample in range(samples):
-        indicator, cell = 0.0, 0
+        cell = 0
         for i in range(len(centres)):
             along = (inputs[sample, i] - centres[i]) * scales[i]
-            indicator = max(indicator, abs(along))
+            if abs(along) > 1.0:
+                left = min(left, sample)
             along = (along + 1.0) * (0.5 * numbers[i])
             index = int(min(max(along, 0.0), numbers[i] - 1.0))
             x[i] = 2.0 * (along - index) - 1.0
             cell = cell * numbers[i] + index
-        largest = max(largest, indicator)
-        if indicator > 1.0 and sample < left:
-            left = sample
         call_kernel(polynomials, 0, x, coefficients[cell], table[sample])
-    reported[INDICATOR], reported[LEFT] = largest, left
-    return CONVERGED
+    return left

@@ -116,7 +116,8 @@ class ReducedOrderModel(ShortRepr):
     ) -> Trajectory:
         """A run at the maneuver's output times.
 
-        Of a vehicle its error is estimated (`ErrorEstimate`): beyond a bound it is `untrusted`.
+        Of a vehicle or mechanism its error is estimated (`ErrorEstimate`): beyond a bound it is
+        `untrusted`.
 
         Parameters
         ----------

@@ -1,9 +1,10 @@
 """What a reduced model knows: how far a run goes in its training ranges.
 
-Errors of vehicles are estimated, see `error_estimate`; of other models this tells what it can.  All
-that can be exceeded is a range with a name: states or features along a run (`trust_of`), inputs
-as signals, initial speeds and durations (`InputRange`).  Each range gives how much of it a run uses
-and since when it is beyond; `trust_in` combines them in one trust.
+Errors of vehicles and mechanisms are estimated, see `error_estimate`; of structures, single states
+and models without error bounds this tells what it can.  All that can be exceeded is a range with a
+name: states or features along a run (`trust_of`), inputs as signals, initial speeds and durations
+(`InputRange`).  Each range gives how much of it a run uses and since when it is beyond; `trust_in`
+combines them in one trust.
 """
 
 from __future__ import annotations

@@ -200,6 +200,15 @@ class AlgebraicModel(Model):
         return self._solved(sampled, solver, tolerance)
 
     def _solved(self, sampled: Sampled, solver: str, tolerance: float) -> Trajectory:
+        run = self.solved_as_far(sampled, solver, tolerance)
+        if run.status == "ok":
+            return run
+        times, inputs, _ = sampled
+        self._check_reach(times, inputs, int(np.isfinite(run.coordinates[:, 0]).sum()))
+        raise ConvergenceError(f"{self.name}: {run.message} (newton)", run)
+
+    def solved_as_far(self, sampled: Sampled, solver: str, tolerance: float) -> Trajectory:
+        """Solution up to where there is none on the branch: from there on it has diverged."""
         check_positive("tolerance", tolerance)
         choice("solver", solver, SOLVERS)
         times, inputs, given = sampled
@@ -215,13 +224,9 @@ class AlgebraicModel(Model):
             self._ready_mechanism, given, iteration, solution, buffer
         )
         status, seconds = timed(run)
-        if not status:
-            return self.trajectory(times, inputs, path, solution.counts.tolist(), seconds)
-        sample = int(solution.counts[newton_loops.SAMPLE])
-        self._check_reach(times, inputs, sample)
-        failure = int(status), sample
-        failed = self.trajectory(times, inputs, path, solution.counts.tolist(), seconds, failure)
-        raise ConvergenceError(f"{self.name}: {failed.message} (newton)", failed)
+        counts = solution.counts.tolist()
+        failure = (status, counts[newton_loops.SAMPLE]) if status else None
+        return self.trajectory(times, inputs, path, counts, seconds, failure)
 
     def _solved_in_lanes(self, sampled: Sampled, iteration: Ready) -> Trajectory | None:
         """Solution with the samples in vector lanes, as many at least; none if it fails."""

@@ -112,7 +112,7 @@ class Trajectory(ShortRepr):
     maneuver
         Name of the input.
     error_estimate
-        Of a reduced vehicle, see `reduction.error_estimate.ErrorEstimate`; none of other runs.
+        Of a reduced vehicle or mechanism, see `reduction.error_estimate.ErrorEstimate`; else none.
     """
 
     times: np.ndarray

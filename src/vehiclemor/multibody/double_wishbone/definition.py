@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.exceptions import GeometryError
 from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.multibody.quantities import declared, equations_of
+from vehiclemor.multibody.quantities import ErrorBound, declared, equations_of
 
 # Hard points at the design position, left side.
 POINTS = (
@@ -80,6 +80,11 @@ DEFINITION = ModelDefinition(
     # Beyond what a steering does (wheels turn by 0.7 rad, racks move by 0.08 m), and before the
     # cusp of the lower limit: there the wheel has turned by 1.04 rad, and soon turns right round.
     stops={"zeta": 1.0, "s": 0.1},
+    # Published errors of its reduced model (paper, section 3.2).
+    error_bounds={
+        "spindle_y": ErrorBound("rms", 7.57e-5),
+        "second_euler_angle": ErrorBound("rms", 2.4e-5),
+    },
     tabled_outputs=("spindle_y", "second_euler_angle"),
     main_outputs=("second_euler_angle",),
 )

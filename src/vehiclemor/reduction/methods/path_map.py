@@ -26,10 +26,11 @@ from vehiclemor.codegen.operations import MOST_SIZE, Kernel, Listing, Value, pad
 from vehiclemor.exceptions import InputError, UnreachableError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import Method, OfflineCost, offline_cost
-from vehiclemor.reduction.map_loops import REPORTED, Cells
+from vehiclemor.reduction.map_loops import Cells
 from vehiclemor.reduction.reduced_system import ReducedMechanism
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
+from vehiclemor.reduction.trust import trust_of
 from vehiclemor.simulation.algebraic import AlgebraicModel, kinematic_loop
 from vehiclemor.simulation.checks import loop_array
 from vehiclemor.simulation.evaluation import By, address_of
@@ -83,7 +84,7 @@ class PathMapSettings(Settings):
     cells: int = Field(16, ge=1, description="equal cells along each input that moves in training")
     outside: Literal["extrapolate", "stop"] = Field(
         "extrapolate",
-        description="extrapolate: a run that leaves the inputs of training goes on, untrusted; "
+        description="extrapolate: a run that leaves the inputs of training goes on; "
         "stop: it has diverged",
     )
 
@@ -182,19 +183,17 @@ class PathMapModel(ReducedMechanism):
         """Polynomials at inputs (samples, inputs), also as the loop takes them."""
         model, samples = self.model, len(times)
         size = samples * len(self.columns)
-        space = np.empty(size + REPORTED + inputs.shape[1])
+        space = np.empty(size + inputs.shape[1])
         call = self._pool.taken(given, lambda: self._packed(given, len(space)))
         call.words[call.address("space")] = address_of_array(space)
-        _, seconds = timed(call)
+        left, seconds = timed(call)
         self._pool.give_back(given, call)
         table = space[:size].reshape(samples, -1)
-        indicator, left = space[size : size + REPORTED].tolist()
-        status, trust = "ok", Trust(indicator)
-        if left < samples:
-            left = int(left)
-            trust = Trust(indicator, float(times[left]), self._outside(inputs[left]))
-            status = "diverged" if self.stops else "untrusted"
-            table[left if self.stops else samples :] = np.nan
+        status, message = "ok", ""
+        if self.stops and left < samples:
+            status = "diverged"
+            message = f"{self._outside(inputs[left])}, from t = {times[left]:.4g} s on"
+            table[left:] = np.nan
         n = len(model.coordinates)
         return Trajectory.of(
             times=times,
@@ -205,11 +204,17 @@ class PathMapModel(ReducedMechanism):
             counts=dict.fromkeys(model.counts, 0),
             seconds=seconds,
             status=status,
-            message=trust.message,
-            trust=trust,
+            message=message,
             names=model.outputs,
             model=model,
         )
+
+    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust:
+        """How far inputs (samples, inputs) go in the ranges."""
+        del states
+        used = (inputs - self.cells.centres) * self.cells.scales
+        names = [f"input {name}" for name in self.model.inputs]
+        return trust_of(np.zeros(len(inputs)), used, names)
 
     def _outside(self, inputs: np.ndarray) -> str:
         return (
@@ -344,5 +349,4 @@ METHOD = Method(
     check=check,
     fit=fit,
     learns_from="inputs",
-    own_limits=True,
 )

@@ -114,42 +114,43 @@ def test_leaving_the_training_is_said_with_time_and_place(model, both, sign, col
         return inputs
 
     maneuver = replace(both, signal=leaving)
-    run, full = mapped(model, both).simulate(maneuver, START), model.simulate(maneuver)
+    reduced = mapped(model, both)
+    run, full = reduced.simulate(maneuver, START), model.simulate(maneuver)
     outside = np.abs(run.inputs[:, column]) > 1.01 * [0.12, 0.036][column]
     first = int(np.flatnonzero(outside)[0])
-    assert run.status == "untrusted"
-    assert run.trust.until == run.times[first]
-    assert run.trust.indicator == pytest.approx(1.25 / 1.01, rel=1e-4)
-    name = "z" if column == 0 else "s0"
-    place = f"{name} {run.inputs[first, column]:.5g} m"
-    for part in (f"t = {run.times[first]:.4g} s", place, "z -0.1212 to 0.1212 m"):
-        assert part in run.message
+    trust = reduced.trust(run.coordinates, run.inputs)
+    assert trust.indicator == pytest.approx(1.25 / 1.01, rel=1e-4)
+    assert f"input {model.inputs[column]} leaves its known range" in trust.reason
     errors = np.abs(run.coordinates - full.coordinates).max(axis=1)
     assert errors[~outside].max() < 1e-6
     # It goes on with the polynomials of the last cell, worse and worse.
     assert errors[~outside].max() < errors[outside].max() < 0.1
     stopped = mapped(model, both, outside="stop").simulate(maneuver, START)
     assert stopped.status == "diverged"
-    assert run.trust.reason in stopped.message
+    place = f"{model.inputs[column]} {run.inputs[first, column]:.5g} m"
+    for part in (f"t = {run.times[first]:.4g} s", place, "z -0.1212 to 0.1212 m"):
+        assert part in stopped.message
     np.testing.assert_array_equal(stopped.coordinates[:first], run.coordinates[:first])
     assert np.isnan(stopped.coordinates[first:]).all()
     assert np.isnan(stopped.outputs[first:]).all()
 
 
 def test_the_edge_of_training_is_known_and_beyond_it_nothing(model, nominal):
-    reduced = mapped(model, nominal)
-    run = reduced.simulate(nominal, START)
-    assert run.trust.indicator == pytest.approx(1.0 / 1.01, abs=1e-5)
-    assert (run.trust.until, run.trust.reason) == (np.inf, "")
-    assert reduced.simulate(nominal.perturbed(1.0, 1.01 - 1e-6), START).status == "ok"
-    assert reduced.simulate(nominal.perturbed(1.0, 1.01 + 1e-6), START).status == "untrusted"
+    reduced = mapped(model, nominal, outside="stop")
+
+    def end(maneuver):
+        run = reduced.simulate(maneuver, START)
+        return run.status, reduced.trust(run.coordinates, run.inputs).indicator
+
+    assert end(nominal) == ("ok", pytest.approx(1.0 / 1.01, abs=1e-5))
+    for amplitude, status in ((1.01 - 1e-6, "ok"), (1.01 + 1e-6, "diverged")):
+        found, indicator = end(nominal.perturbed(1.0, amplitude))
+        assert (found, indicator > 1.0) == (status, status == "diverged")
     # Another rack than in training, however little it moves.
     still = np.arange(nominal.samples) >= 500
     aside = travelling(lambda t: (0.05 * np.sin(t), 1e-6 * still), nominal)
-    moved = reduced.simulate(aside, START)
-    assert moved.status == "untrusted"
-    assert "s0 1e-06 m" in moved.message
-    assert moved.trust.until == 5.0
+    assert end(aside)[0] == "diverged"
+    assert "s0 1e-06 m" in reduced.simulate(aside, START).message
 
 
 def test_wrong_training_and_inputs_are_refused(model, nominal):
