@@ -186,9 +186,10 @@ class ErrorModel:
         order = np.argsort(rates.imag <= 0.0, kind="stable")
         order = order[rates.imag[order] >= 0.0]
         pairs = int((rates.imag > 0.0).sum())
-        rates, left = rates[order], np.zeros((len(order), len(self.shape.indices)), dtype=complex)
+        rates = rates[order]
+        left: Any = np.zeros((len(order), len(self.shape.indices)), dtype=complex)
         left[:, free.indices] = np.linalg.inv(vectors)[order]
-        right: Any = (free.shapes @ vectors[:, order]).T
+        right = (free.shapes @ vectors[:, order]).T
         right[:pairs] *= 2.0
         coordinates = np.vstack([left.real, left.imag[:pairs]]).T
         return Modes(rates, coordinates, np.vstack([right.real, -right.imag[:pairs]]))
