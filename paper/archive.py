@@ -18,6 +18,7 @@ README = """vehiclemor {version}: stored results of all studies
 
 studies/*.nc       one dataset a study: errors, histories, seconds, counts, status, with units
 in_use.nc          reduced models in use: steps, batches, exports
+mesh_sizes.nc      full and reduced truck over the mesh
 control.nc          models in control: optimal plans, loops, rollouts
 tables/*.csv       the same without histories: a row for each point of a grid
 *.json             benchmarks of kernels and loops; the full order beside other tools

@@ -28,6 +28,7 @@ from number_tables import (
     operations,
     peers,
     published,
+    sizes,
     steps,
     studies,
 )
@@ -72,6 +73,7 @@ def sources(results: Path) -> Iterator[tuple[str, str, Callable[[], Iterator[Ent
     for name in ("in_use", "other_steering", "control"):
         file = f"{name}.nc"
         yield file, f"python paper/{name}.py", partial(of_file, partial(named_values, name), file)
+    yield "mesh_sizes.nc", "python paper/mesh_sizes.py", partial(of_file, sizes, "mesh_sizes.nc")
     yield "peers.json", "tox -e peers", partial(of_file, peers, "peers.json")
     yield "steps.json", "python benchmarks/steps.py", partial(of_file, steps, "steps.json")
     for name, make in studies():

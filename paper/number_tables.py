@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from mesh_sizes import size_rows
 
 import vehiclemor as vm
 from vehiclemor.registry import names
 from vehiclemor.report.comparison import stored_rows
 from vehiclemor.report.frames import frame
 from vehiclemor.report.published import load_published, rms_numbers
-from vehiclemor.report.sizes import size_rows
 from vehiclemor.report.unseen import count_rows, protocol_rows
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
@@ -296,7 +296,6 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
     yield "equation-order", orders
     yield "figure-14-spread", partial(spread, "figure-14-spread")
     yield "truck-ranks", partial(measure, "truck.ranks", "worst_relative_error")
-    yield "size", sizes
     for kind, model in product(("predictive", "contenders"), names("model")):
         yield f"{kind}-{model}", protocol
     for model in VEHICLES:

@@ -29,14 +29,15 @@ PAPER = Path(__file__).parent
 STYLE = str(PAPER / "figures.mplstyle")
 CLAIMS = PAPER / "claims.json"
 BENCHMARKS = "peers", "steps"
+SCRIPTS = "other_steering", "mesh_sizes"
 
 
 def stored(results: Path, name: str) -> Any:
     """A dataset of the results folder, or what a script or benchmark has written there."""
     if name in BENCHMARKS:
         return json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
-    if name == "other_steering":
-        return xr.load_dataset(results / "other_steering.nc")
+    if name in SCRIPTS:
+        return xr.load_dataset(results / f"{name}.nc")
     return xr.load_dataset(results / "studies" / f"{name}.nc")
 
 

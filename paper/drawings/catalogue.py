@@ -45,7 +45,7 @@ FIGURES: Mapping[str, Entry] = {
     ),
     "unseen-inputs": Entry(vehicles.figure_unseen, ["unseen-inputs", "unseen-inputs-ranks"]),
     "pareto": Entry(fields.figure_pareto, PROTOCOLS),
-    "size": Entry(fields.figure_size, ["size"]),
+    "size": Entry(fields.figure_size, ["mesh_sizes"]),
     "coverage": Entry(coverage.figure_coverage, ["other_steering"]),
     "estimate": Entry(coverage.figure_estimate, ["other_steering"]),
     "peers": Entry(fields.figure_peers, ["peers"]),

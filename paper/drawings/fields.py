@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from mesh_sizes import FULL, KINDS, growth, size_rows
 
 from drawings import look
-from vehiclemor.report.figures.costs import figure_size as figure_of_sizes
-from vehiclemor.report.figures.theme import tick_decades
-from vehiclemor.report.labels import declared
+from vehiclemor.report.figures.theme import THIN, Style, panels, tick_decades
+from vehiclemor.report.labels import declared, raised
 from vehiclemor.report.unseen import method_rows, protocol_of
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
@@ -64,12 +64,68 @@ def _draw_row(axis: Any, row: Mapping[str, Any]) -> None:
         axis.plot(1e3 * row["seconds"], row["score"], label="chosen by validation", **ring)
 
 
+# Of meshes of one kind; offsets of names of vehicles from their marks, in points.
+LOOKS: tuple[Style, ...] = (
+    {"color": "#0072B2", "marker": "o"},
+    {"color": "#D55E00", "marker": "s"},
+    {"color": "#CC79A7", "marker": "^"},
+)
+OFFSETS = (4, 4), (-16, -13), (4, -17)
+NAMES = {"double_wishbone": "suspension", "independent_suspension_vehicle": "14-DOF"}
+NAMES |= {"high_fidelity_vehicle": "high-fidelity"}
+
+
 def figure_size(results: look.Results) -> Figure:
-    """CPU time of a whole run over the number of coordinates, and what reduction gains."""
-    figure = figure_of_sizes(results["size"])
-    figure.set_size_inches(look.TWO, 2.8)
+    """CPU time of a run over the number of coordinates, and how many times reduction gains.
+
+    The three models of the paper stand beside the truck.  Hollow marks: the reduced model, the
+    first of the study.
+    """
+    dataset = results["mesh_sizes"]
+    figure, axes = panels(1, 2, (look.TWO, 2.8))
+    left, right = axes[0]
+    n, kinds = dataset["coordinates_of_mesh"].values, dataset["kind"].values
+    full = dataset["seconds_median"].sel(label=FULL).values
+    name = str(dataset["label"].values[1])
+    reduced = dataset["seconds_median"].sel(label=name).values
+    meshes = [kind for kind in dict.fromkeys(kinds.tolist()) if kind != "vehicle"]
+    for kind, line in zip(meshes, LOOKS, strict=False):
+        of_kind, word = kinds == kind, KINDS.get(kind, (kind, ""))[0]
+        sizes, times, reduced_times = n[of_kind], full[of_kind], reduced[of_kind]
+        exponent = growth(dataset, kind, FULL)
+        slope = raised(f": n^{exponent:.1f}") if np.isfinite(exponent) else ""
+        left.plot(sizes, times, label=f"{word}, full{slope}", **line)
+        hollow: Style = line | {"markerfacecolor": "none", "linestyle": "--"}
+        left.plot(sizes, reduced_times, label=f"{word}, {name}", **hollow)
+        right.plot(sizes, times / reduced_times, label=f"{word}, the same mesh", **line)
+    cars = kinds == "vehicle"
+    black: Style = {"color": "black", "linestyle": "none", "marker": "D", "markersize": 4}
+    left.plot(n[cars], full[cars], label="the paper's models, full", **black)
+    left.plot(n[cars], reduced[cars], markerfacecolor="none", label="reduced", **black)
+    right.plot(n[cars], full[cars] / reduced[cars], label="the paper's models", **black)
+    for index in np.flatnonzero(cars):
+        car = str(dataset["mesh"].values[index])
+        at = n[index], full[index] / reduced[index]
+        text = NAMES.get(car, car)
+        # So that neither marks nor the line of no gain cross a name.
+        beside = OFFSETS[sum(n[cars] < n[index]) % len(OFFSETS)]
+        right.annotate(text, at, beside, textcoords="offset points", fontsize=7)
+    rivals = [row for row in size_rows(dataset) if row["label"] == name]
+    for group, marker in (("motion", "x"), ("strain", "+")):
+        at = [(row["coordinates"], row[f"gain_{group}"]) for row in rivals]
+        style: Style = {"linestyle": "none", "marker": marker, "color": "#009E73"}
+        label = f"cheapest mesh of equal error, {group}"
+        right.plot(*zip(*at, strict=True), label=label, markersize=7, **style)
+    right.axhline(1.0, **THIN)
     # Room for the names of the vehicles.
-    figure.axes[1].set_ylim(bottom=0.2)
+    right.set_ylim(0.2, 2.0 * float(np.nanmax(full / reduced)))
+    for axis in (left, right):
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        axis.set_xlabel("coordinates of the full model")
+        axis.legend(fontsize=6.5)
+    left.set_title("(a) CPU time of a whole run in s", loc="left")
+    right.set_title("(b) times that the reduced model is faster", loc="left")
     return figure
 
 

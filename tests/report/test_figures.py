@@ -11,11 +11,10 @@ from matplotlib.image import imread
 
 from tests.report.figure_texts import checked, texts_of, varied
 from vehiclemor.exceptions import InputError
-from vehiclemor.report.figures.costs import figure_pareto, figure_size
+from vehiclemor.report.figures.costs import figure_pareto
 from vehiclemor.report.figures.errors import figure_errors
 from vehiclemor.report.figures.result_plot import draw, pictures_of, shown_outputs
 from vehiclemor.report.figures.theme import panels, save_figure, styled
-from vehiclemor.report.sizes import size_rows
 from vehiclemor.study.run import run_studies
 
 PARETO = "predictive-double_wishbone"
@@ -51,38 +50,6 @@ def unseen_travels(small_protocol, tmp_path_factory):
     return found.assign_attrs(study=PARETO)
 
 
-def sized():
-    """Times and errors of three meshes of shells, two of beams and a vehicle."""
-    kinds = ["elements_per_bay"] * 2 + ["shell_size"] * 3 + ["vehicle"]
-    meshes = [f"{kind} {place}" for place, kind in enumerate(kinds[:-1], 1)] + ["tricycle"]
-    n = np.array([200.0, 400.0, 1000.0, 4000.0, 16000.0, 10.0])
-    seconds = np.column_stack([1e-3 * n, np.full(6, 0.05)])
-    errors = np.array([0.2, 0.2, 0.1, 0.02, 0.0, np.nan])
-    errors = np.stack([errors, errors + 1e-3], axis=1)[..., None] * [1.0, 2.0]
-    table = {
-        "coordinates_of_mesh": ("mesh", n),
-        "seconds_median": (("mesh", "label"), seconds),
-        "effective_rank": (("mesh", "label"), np.full((6, 2), 40.0)),
-        "offline_seconds": (("mesh", "label"), np.full((6, 2), 2.0)),
-        "relative_error": (("mesh", "label", "group"), errors),
-    }
-    labels = {"mesh": meshes, "label": ["full order", "Craig-Bampton"]}
-    labels |= {"group": ["motion", "strain"], "kind": ("mesh", kinds)}
-    return xr.Dataset(table, labels, {"study": "size"})
-
-
-def test_a_reduced_model_is_set_beside_the_cheapest_mesh_that_is_as_accurate():
-    rows = {row["mesh"]: row for row in size_rows(sized())}
-    assert rows["shells, 4 m"]["gain_mesh"] == pytest.approx(80.0)
-    # A coarser mesh is as accurate: refining has gained nothing.
-    assert rows["beams, 2 a bay"]["rival_motion"] == "beams, 1 a bay"
-    assert rows["beams, 2 a bay"]["gain_motion"] == pytest.approx(4.0)
-    assert rows["shells, 5 m"]["rival_strain"] == "shells, 5 m"
-    assert rows["shells, 5 m"]["growth_full"] == pytest.approx(1.0)
-    assert rows["shells, 5 m"]["break_even"] == pytest.approx(2.0 / (16.0 - 0.05))
-    assert rows["tricycle"]["rival_motion"] == ""
-
-
 @pytest.fixture(scope="session")
 def drawn(results, unseen_travels):
     """Every figure of the paper's studies, and one of each other kind, drawn."""
@@ -92,7 +59,6 @@ def drawn(results, unseen_travels):
             figures |= {f"{study}-{kind}": draw(dataset, kind) for kind in pictures_of(dataset)}
         figures["map"] = figure_errors(grid_of("pod", "replay"), outputs=OUTPUTS)
         figures["pareto"] = figure_pareto(unseen_travels)
-        figures["size"] = figure_size(sized())
         return {name: checked(figure) for name, figure in figures.items()}
 
 
@@ -111,9 +77,6 @@ def test_exponents_are_superscripts(drawn):
     for name, figure in drawn.items():
         for text, _ in texts_of(figure):
             assert not re.search(r"\^[^{]", text.get_text()), (name, text)
-    legend = [text.get_text() for text in drawn["size"].axes[0].get_legend().get_texts()]
-    # Of two small meshes of beams no growth is known.
-    assert {"shells, full: n$^{1.0}$", "beams, full"} <= set(legend)
 
 
 def test_lines_differ_in_grey_too(drawn):

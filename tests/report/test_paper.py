@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 import regenerate
-from drawings import coverage
+import xarray as xr
+from drawings import coverage, fields
 from drawings.catalogue import FIGURES
+from mesh_sizes import size_rows
 from numbers_by_name import load
 from regenerate import PAPER, STYLE
 
@@ -118,6 +120,47 @@ def test_an_estimate_stands_over_its_error_and_what_it_tells_wrongly_is_marked(o
     for axis in figure.axes:
         rightly, warned, undetected, *_ = (line.get_xydata().tolist() for line in axis.lines)
         assert (rightly, warned, undetected) == ([], [], [[3.0, 1.5]])
+
+
+def sized():
+    """Times and errors of three meshes of shells, two of beams and a vehicle."""
+    kinds = ["elements_per_bay"] * 2 + ["shell_size"] * 3 + ["vehicle"]
+    meshes = [f"{kind} {place}" for place, kind in enumerate(kinds[:-1], 1)] + ["tricycle"]
+    n = np.array([200.0, 400.0, 1000.0, 4000.0, 16000.0, 10.0])
+    seconds = np.column_stack([1e-3 * n, np.full(6, 0.05)])
+    errors = np.array([0.2, 0.2, 0.1, 0.02, 0.0, np.nan])
+    errors = np.stack([errors, errors + 1e-3], axis=1)[..., None] * [1.0, 2.0]
+    table = {
+        "coordinates_of_mesh": ("mesh", n),
+        "seconds_median": (("mesh", "label"), seconds),
+        "effective_rank": (("mesh", "label"), np.full((6, 2), 40.0)),
+        "offline_seconds": (("mesh", "label"), np.full((6, 2), 2.0)),
+        "relative_error": (("mesh", "label", "group"), errors),
+    }
+    labels = {"mesh": meshes, "label": ["full order", "Craig-Bampton"]}
+    labels |= {"group": ["motion", "strain"], "kind": ("mesh", kinds)}
+    return xr.Dataset(table, labels)
+
+
+def test_a_reduced_model_is_set_beside_the_cheapest_mesh_that_is_as_accurate():
+    rows = {row["mesh"]: row for row in size_rows(sized())}
+    assert rows["shells, 4 m"]["gain_mesh"] == pytest.approx(80.0)
+    # A coarser mesh is as accurate: refining has gained nothing.
+    assert rows["beams, 2 a bay"]["rival_motion"] == "beams, 1 a bay"
+    assert rows["beams, 2 a bay"]["gain_motion"] == pytest.approx(4.0)
+    assert rows["shells, 5 m"]["rival_strain"] == "shells, 5 m"
+    assert rows["shells, 5 m"]["growth_full"] == pytest.approx(1.0)
+    assert rows["shells, 5 m"]["break_even"] == pytest.approx(2.0 / (16.0 - 0.05))
+    assert rows["tricycle"]["rival_motion"] == ""
+
+
+def test_growth_over_meshes_stands_in_the_legend():
+    with styled(STYLE):
+        figure = fields.figure_size({"mesh_sizes": sized()})
+        checked(figure)
+    legend = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    # Of two small meshes of beams no growth is known.
+    assert {"shells, full: n$^{1.0}$", "beams, full"} <= set(legend)
 
 
 def test_every_picture_of_the_text_is_there():

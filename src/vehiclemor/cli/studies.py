@@ -56,9 +56,6 @@ def run(
     with shown_progress() as runs:
         datasets = run_studies(study, results, jobs, scheduler, seed)
     for name, dataset in datasets.items():
-        if "status" not in dataset:
-            print(f"{name}: {dataset.sizes['mesh']} meshes; {dataset.encoding['source']}")
-            continue
         sizes = f"{dataset['status'].size} grid points, {runs[name]} runs"
         counts = counted_ends(dataset)
         print(wrapped(f"{name}: {sizes}: {counts}; {dataset.encoding['source']}", 0, 2))

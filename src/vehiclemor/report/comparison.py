@@ -28,7 +28,6 @@ from vehiclemor.report.printed_numbers import (
 )
 from vehiclemor.report.published import Claim, Number, load_published
 from vehiclemor.report.result_selection import result_kind
-from vehiclemor.report.sizes import size_rows
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
@@ -182,12 +181,8 @@ def study_comparison(
 
 def result_rows(dataset: xr.Dataset) -> Sequence[Row]:
     """Rows of one study, by what it is."""
-    match result_kind(dataset):
-        case "size study":
-            return list(size_rows(dataset))
-        case "protocol":
-            return protocol_rows(dataset)
-    return grid_rows(dataset)
+    is_protocol = result_kind(dataset) == "protocol"
+    return protocol_rows(dataset) if is_protocol else grid_rows(dataset)
 
 
 def timing_of(model: str, folder: Path) -> xr.Dataset:

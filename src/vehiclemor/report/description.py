@@ -23,7 +23,6 @@ from vehiclemor.study.plans.study_file import (
     GridFile,
     ProtocolEntry,
     ProtocolFile,
-    SizeFile,
     StudyFile,
 )
 from vehiclemor.study.plans.study_runs import values
@@ -33,8 +32,7 @@ Description = dict[str, Any]
 # Name -> what its tables are of -> class that reads such a file.
 SCHEMAS: dict[str, dict[str, type[BaseModel]]] = {
     "study-schema": {
-        f"keys of {schema.kind}": schema
-        for schema in (GridFile, ProtocolFile, SizeFile, CollectionFile)
+        f"keys of {schema.kind}": schema for schema in (GridFile, ProtocolFile, CollectionFile)
     },
     "parameter-schema": {"keys": ParameterFile},
 }
@@ -207,7 +205,8 @@ def _study(name: str) -> Description:
             for member, content in load_studies(name).items()
         ]
         return {**head, "runs": sum(row["runs"] for row in rows), "studies": rows}
-    return {**head, "model": study.model, **_runs(study), "methods": _methods(study)}
+    runs = _grid(study) if isinstance(study, GridFile) else _sets(study)
+    return {**head, "model": study.model, **runs, "methods": _methods(study)}
 
 
 def _methods(study: StudyFile) -> list[Description]:
@@ -220,15 +219,6 @@ def _methods(study: StudyFile) -> list[Description]:
             row |= {"role": entry.role, "candidates": len(entry.candidates)}
         rows.append(row)
     return rows
-
-
-def _runs(study: StudyFile) -> Description:
-    """What the methods of a study are run on."""
-    if isinstance(study, GridFile):
-        return _grid(study)
-    if isinstance(study, ProtocolFile):
-        return _sets(study)
-    return _meshes(study)
 
 
 def _grid(study: GridFile) -> Description:
@@ -268,17 +258,6 @@ def _sets(study: ProtocolFile) -> Description:
             {"output": output, "measure": b.measure, "bound": b.bound, "reason": b.reason}
             for output, b in study.bounds.items()
         ],
-    }
-
-
-def _meshes(study: SizeFile) -> Description:
-    """What a size study runs, and on which meshes."""
-    return {
-        "maneuver": study.maneuver,
-        "training": study.training,
-        "runs": study.points,
-        "meshes": [_listed(mesh) for mesh in study.size.meshes],
-        "models beside": study.size.beside,
     }
 
 

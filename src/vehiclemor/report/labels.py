@@ -70,7 +70,6 @@ class LabelFile(FileSchema):
     outputs: dict[str, Label]
     methods: dict[str, MethodLook]
     columns: dict[str, Column]
-    sizes: dict[str, dict[str, Column]]
 
 
 @cache

@@ -28,10 +28,8 @@ KINDS: tuple[str, ...] = get_args(Kind)
 MOST_NAMED = 12
 
 
-def result_kind(dataset: xr.Dataset) -> Literal["size study", "protocol", "grid", "other"]:
+def result_kind(dataset: xr.Dataset) -> Literal["protocol", "grid", "other"]:
     """What a result is of; `other` is a timing, or a run without errors and outputs."""
-    if "mesh" in dataset.dims:
-        return "size study"
     if "scenario_set" in dataset.coords:
         return "protocol"
     return "grid" if dataset.sizes.get("output") else "other"

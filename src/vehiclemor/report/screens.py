@@ -23,9 +23,8 @@ from vehiclemor.report.findings import (
     counted,
 )
 from vehiclemor.report.frames import ERRORS
-from vehiclemor.report.labels import ERROR, Column, column, declared, main_outputs, of_kind
+from vehiclemor.report.labels import ERROR, Column, column, main_outputs, of_kind
 from vehiclemor.report.printing import Table, format_value, wrapped
-from vehiclemor.report.sizes import EXPLAINED, KIND, growth_text
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 Row = dict[str, Any]
@@ -235,16 +234,10 @@ def study_parts(rows: pd.DataFrame) -> list[Part]:
     """Grids, then protocols."""
     records: list[Row] = rows.to_dict("records")
     grids = [row for row in records if row["kind"] == ERRORS]
-    sized = [row for row in records if row["kind"] == KIND]
-    unseen = [row for row in records if row["kind"] not in (ERRORS, KIND)]
+    unseen = [row for row in records if row["kind"] != ERRORS]
     parts: list[Part] = []
     for group in _groups(grids, "study").values():
         parts += _grid_parts(group)
-    for study, group in _groups(sized, "study").items():
-        title = f"{study}: what a reduced model gains"
-        parts.append(Table(group, declared().sizes["costs"], title, below=growth_text(group)))
-        compared = [row for row in group if not math.isnan(row["error_motion"])]
-        parts.append(Table(compared, declared().sizes["rivals"], below=EXPLAINED))
     if unseen:
         parts += _unseen_parts(unseen)
     return parts

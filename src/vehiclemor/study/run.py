@@ -21,8 +21,7 @@ from vehiclemor.study.plans.loading import content_hash, studies_and_files
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol, validation_keys
 from vehiclemor.study.plans.results import combined, grid_digest
-from vehiclemor.study.plans.size import run_size
-from vehiclemor.study.plans.study_file import MOST_SEED, ProtocolFile, SizeFile, StudyFile
+from vehiclemor.study.plans.study_file import MOST_SEED, ProtocolFile, StudyFile
 from vehiclemor.study.store import combined_path, read_run, result_path, run_path, stored
 from vehiclemor.study.workers import Engine, Workers, cluster
 
@@ -79,10 +78,6 @@ def _samples(definition: StudyFile) -> bool:
 
 
 def _plan(name: str, path: Path, definition: StudyFile, seed: int | None) -> Plan:
-    if isinstance(definition, SizeFile):
-        run = partial(run_size, name, definition)
-        # Its runs are timed together.
-        return Plan(name, definition, lambda folder, *_: run(folder), keys=tuple)
     if isinstance(definition, ProtocolFile):
         own_seed = seed if definition.drawn else None
         protocol = load_protocol(str(path), own_seed, name)
@@ -158,8 +153,6 @@ def status_of(study: str, folder: Path, seed: int | None = None) -> dict[str, St
 def _status(plan: Plan, folder: Path) -> StudyStatus:
     result = result_path(folder, plan.name, content_hash(plan.definition))
     keys = plan.keys()
-    if not keys:
-        return StudyStatus(1, done=int(result is not None), result=result)
     status = StudyStatus(len(keys), result=result, later=plan.later)
     examples: dict[tuple[str, str], tuple[str, str]] = {}
     for key in keys:

@@ -1,4 +1,4 @@
-"""What runs cost: methods of a protocol by error and time, and the times over the model's size."""
+"""What runs cost: methods of a protocol by error and time."""
 
 import json
 import textwrap
@@ -12,11 +12,8 @@ from matplotlib.figure import Figure
 
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.theme import Style
-from vehiclemor.report.labels import raised
-from vehiclemor.report.sizes import KINDS, growth, size_rows
 from vehiclemor.report.unseen import method_rows, protocol_of
 from vehiclemor.study.plans.protocol import FULL_ORDER
-from vehiclemor.study.plans.size import FULL
 
 # Letters of a title in a line.
 TITLE = 60
@@ -26,15 +23,6 @@ GREYS: list[Style] = [
     for line, marker in (("-", "o"), ("--", "*"), (":", "X"))
     for color in ("#000000", "#777777", "#AAAAAA", "#444444")
 ]
-# Of meshes of one kind; and offsets of names from their marks, in points.
-LOOKS: tuple[Style, ...] = (
-    {"color": "#0072B2", "marker": "o"},
-    {"color": "#D55E00", "marker": "s"},
-    {"color": "#CC79A7", "marker": "^"},
-)
-OFFSETS = (4, 4), (-16, -13), (4, -17)
-VEHICLES = {"double_wishbone": "suspension", "independent_suspension_vehicle": "14-DOF"}
-VEHICLES |= {"high_fidelity_vehicle": "high-fidelity"}
 
 
 def figure_pareto(dataset: xr.Dataset) -> Figure:
@@ -82,56 +70,4 @@ def figure_pareto(dataset: xr.Dataset) -> Figure:
     figure.legend(loc="outside right upper", fontsize=7, markerscale=0.7)
     # The legend stands beside the axes, whose title can't be wrapped by itself.
     axis.set_title(textwrap.fill(str(dataset.attrs["title"]), TITLE))
-    return figure
-
-
-def figure_size(dataset: xr.Dataset) -> Figure:
-    """CPU time of a run over the number of coordinates, and how many times reduction gains.
-
-    The three models of the paper stand beside the truck.  Hollow marks: the reduced model, the
-    first of the study.
-    """
-    figure, axes = theme.panels(1, 2, (7.2, 3.6))
-    left, right = axes[0]
-    n, kinds = dataset["coordinates_of_mesh"].values, dataset["kind"].values
-    full = dataset["seconds_median"].sel(label=FULL).values
-    name = str(dataset["label"].values[1])
-    reduced = dataset["seconds_median"].sel(label=name).values
-    meshes = [kind for kind in dict.fromkeys(kinds.tolist()) if kind != "vehicle"]
-    for kind, look in zip(meshes, LOOKS, strict=False):
-        of_kind, word = kinds == kind, KINDS.get(kind, (kind, ""))[0]
-        sizes, times, reduced_times = n[of_kind], full[of_kind], reduced[of_kind]
-        exponent = growth(dataset, kind, FULL)
-        slope = raised(f": n^{exponent:.1f}") if np.isfinite(exponent) else ""
-        left.plot(sizes, times, label=f"{word}, full{slope}", **look)
-        hollow: Style = look | {"markerfacecolor": "none", "linestyle": "--"}
-        left.plot(sizes, reduced_times, label=f"{word}, {name}", **hollow)
-        right.plot(sizes, times / reduced_times, label=f"{word}, the same mesh", **look)
-    cars = kinds == "vehicle"
-    black: Style = {"color": "black", "linestyle": "none", "marker": "D", "markersize": 4}
-    left.plot(n[cars], full[cars], label="the paper's models, full", **black)
-    left.plot(n[cars], reduced[cars], markerfacecolor="none", label="reduced", **black)
-    right.plot(n[cars], full[cars] / reduced[cars], label="the paper's models", **black)
-    for index in np.flatnonzero(cars):
-        car = str(dataset["mesh"].values[index])
-        at = n[index], full[index] / reduced[index]
-        text = VEHICLES.get(car, car)
-        # So that neither marks nor the line of no gain cross a name.
-        beside = OFFSETS[sum(n[cars] < n[index]) % len(OFFSETS)]
-        right.annotate(text, at, beside, textcoords="offset points", fontsize=7)
-    rivals = [row for row in size_rows(dataset) if row["label"] == name]
-    for group, marker in (("motion", "x"), ("strain", "+")):
-        at = [(row["coordinates"], row[f"gain_{group}"]) for row in rivals]
-        style: Style = {"linestyle": "none", "marker": marker, "color": "#009E73"}
-        label = f"cheapest mesh of equal error, {group}"
-        right.plot(*zip(*at, strict=True), label=label, markersize=7, **style)
-    right.axhline(1.0, **theme.THIN)
-    right.set_ylim(0.5, 2.0 * float(np.nanmax(full / reduced)))
-    for axis in (left, right):
-        axis.set_xscale("log")
-        axis.set_yscale("log")
-        axis.set_xlabel("coordinates of the full model")
-        axis.legend(fontsize=6.5)
-    left.set_title("(a) CPU time of a whole run in s", loc="left")
-    right.set_title("(b) times that the reduced model is faster", loc="left")
     return figure

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from vehiclemor.exceptions import InputError
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
-from vehiclemor.report.figures.costs import figure_pareto, figure_size
+from vehiclemor.report.figures.costs import figure_pareto
 from vehiclemor.report.figures.errors import figure_errors
 from vehiclemor.report.figures.handling import (
     figure_frequency_response,
@@ -46,17 +46,13 @@ PICTURES = {
     "sine_with_dwell": Picture("Steering and yaw rate", figure_sine_with_dwell),
     "errors": Picture("RMS errors", lambda data: figure_errors(data, outputs=shown_outputs(data))),
     "pareto": Picture("Worst error over bound, over time", figure_pareto),
-    "size": Picture("Times over the size of the model", figure_size),
 }
 
 
 def pictures_of(dataset: xr.Dataset) -> list[str]:
     """Kinds of pictures that the result of a study has the data for."""
-    match result_kind(dataset):
-        case "size study":
-            return ["size"]
-        case "protocol":
-            return ["pareto"]
+    if result_kind(dataset) == "protocol":
+        return ["pareto"]
     kinds = ["errors"]
     if dataset.sizes.get("time"):
         kinds.append("histories")
@@ -93,7 +89,7 @@ def figure_of(dataset: xr.Dataset, kind: str) -> Figure:
         case "protocol":
             text = "a protocol has no grid to draw over; vehiclemor figures --only draws it"
             raise InputError(text)
-        case "size study" | "other":
+        case "other":
             raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     dataset = by_method(dataset)
     figure = PICTURES[kind].draw(dataset)

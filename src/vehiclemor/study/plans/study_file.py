@@ -1,4 +1,4 @@
-"""Schemas of study files, `data/studies/*.toml`: grids, protocols, size studies and collections.
+"""Schemas of study files, `data/studies/*.toml`: grids, protocols and collections.
 
 A key that only one of them has decides which schema reads a file, see `schema_of`.
 """
@@ -20,7 +20,6 @@ from vehiclemor.study.plans.study_runs import (
     Group,
     Limit,
     Sampling,
-    Size,
     list_of,
     table_of,
     values,
@@ -315,21 +314,6 @@ class ProtocolFile(StudyOfModel):
         return self
 
 
-class SizeFile(StudyOfModel):
-    """A size study: what full and reduced runs of a structure cost on each of its meshes."""
-
-    kind = "a size study"
-
-    maneuver: str = Field(description="registered name")
-    training: str = Field(description="name of the maneuver that is trained on")
-    size: Size = Field(description="meshes, and how they are run")
-
-    @property
-    def points(self) -> int:
-        """Number of runs of all methods, and of full order."""
-        return len(self.size.meshes) * (len(self.methods) + 1)
-
-
 class CollectionFile(FileSchema):
     """A collection of studies."""
 
@@ -339,9 +323,9 @@ class CollectionFile(FileSchema):
     studies: list[str] = Field(min_length=1, description="names of studies, or TOML files")
 
 
-StudyFile = GridFile | ProtocolFile | SizeFile
+StudyFile = GridFile | ProtocolFile
 # The key that makes a file a study of a kind; without any of these it is a grid.
-SCHEMAS = {"studies": CollectionFile, "size": SizeFile, "bounds": ProtocolFile}
+SCHEMAS = {"studies": CollectionFile, "bounds": ProtocolFile}
 
 
 def schema_of(content: Mapping[str, Any]) -> type[StudyFile | CollectionFile]:
