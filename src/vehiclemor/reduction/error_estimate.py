@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -25,10 +25,10 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
-# Of a first look and of a second one, where the first finds an error in bounds that is not small:
-# time in s between nodes, at last a tenth of the period of wheel hop, and how far corrections are
+# Of looks, each where the one before finds an error in bounds that is not small: time in s between
+# nodes, at last a tenth of the period of wheel hop; the most passes, and how far corrections are
 # settled.
-LOOKS, SMALL = ((0.04, 1e-3), (0.01, 1e-4)), 0.5
+LOOKS, SMALL = ((0.04, 12, 1e-3), (0.02, 12, 1e-4), (0.01, 12, 1e-4)), 0.5
 FEWEST_NODES = 8
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
@@ -172,14 +172,14 @@ def judged(
     if not known or run.status not in WITHOUT_COMPLAINT:
         return run
     began, loops, estimate = time.thread_time(), run.seconds, None
-    for spacing, settled in LOOKS:
+    for spacing, *passes in LOOKS:
         apart = maneuver.duration / (maneuver.samples - 1)
         parts = math.ceil(apart / spacing - 1e-6)
         finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
         nodes = slice(0, finer.samples_to_stop, max(int(parts * spacing / apart + 1e-6), 1))
         if len(finer.times[nodes]) < FEWEST_NODES:
             return run
-        estimate = error_estimate(finer, nodes, model.start(start), known, settled)
+        estimate = error_estimate(finer, nodes, model.start(start), known, passes)
         if estimate.in_bounds < SMALL:
             break
     assert estimate is not None
@@ -193,21 +193,21 @@ def error_estimate(
     nodes: slice,
     start: np.ndarray,
     bounds: Mapping[str, ErrorBound],
-    settled: float,
+    passes: Sequence[float],
 ) -> ErrorEstimate:
     """Errors of a run that has states, at some of its output times, equidistant ones.
 
-    The start (n,) is that of the full model; corrections are settled so far, see `error_model`.
+    The start (n,) is that of the full model; of passes see `LOOKS`.
     """
     from vehiclemor.reduction.error_model import error_model
 
     model, times = run.model, run.times[nodes]
-    states, inputs = (np.ascontiguousarray(part[nodes]) for part in (run.states, run.inputs))
+    states, inputs = run.states[nodes].copy(), run.inputs[nodes].copy()
     corrected, is_settled = None, False
     if np.isfinite(states).all():
         step = float(times[1] - times[0])
         errors_of = error_model(model, states, float(times[-1]))
-        corrected, is_settled = errors_of.corrected(step, states, inputs, start, settled)
+        corrected, is_settled = errors_of.corrected(step, states, inputs, start, passes)
     return ErrorEstimate(times, model, inputs, states, corrected, bounds, is_settled)
 
 
