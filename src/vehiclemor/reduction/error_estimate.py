@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -27,10 +27,10 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
-# Of a first look and of a second one, where the first finds an error in bounds that is not small:
-# time in s between nodes, at last a tenth of the period of wheel hop, and how far corrections are
+# Of looks, each where the one before finds an error in bounds that is not small: time in s between
+# nodes, at last a tenth of the period of wheel hop; the most passes, and how far corrections are
 # settled.
-LOOKS, SMALL = ((0.04, 1e-3), (0.01, 1e-4)), 0.5
+LOOKS, SMALL = ((0.04, 12, 1e-3), (0.02, 12, 1e-4), (0.01, 12, 1e-4)), 0.5
 FEWEST_NODES = 8
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
@@ -160,25 +160,38 @@ def judged(
     known = model.definition.error_bounds if bounds is None else bounds
     if not known or run.status not in WITHOUT_COMPLAINT:
         return run
-    began, loops, estimate = time.thread_time(), run.seconds, None
-    is_mechanism = isinstance(model, AlgebraicModel)
-    if is_mechanism:
-        errors_of, reached = constraint_errors(run, maneuver)
-        estimate = ErrorEstimate(run.times, model, errors_of, known, reached)
-    for spacing, settled in () if is_mechanism else LOOKS:
-        apart = maneuver.duration / (maneuver.samples - 1)
+    began, loops = time.thread_time(), run.seconds
+    if isinstance(model, AlgebraicModel):
+        errors_of, is_reached = constraint_errors(run, maneuver)
+        estimate = ErrorEstimate(run.times, model, errors_of, known, is_reached)
+    else:
+        estimate = _looked(run, simulate, (maneuver, start), known)
+    if estimate is None:
+        return run
+    judged = run.judged(estimate.trust())
+    seconds = loops + time.thread_time() - began
+    return Trajectory.of(**judged.__dict__ | {"error_estimate": estimate, "seconds": seconds})
+
+
+def _looked(
+    run: Trajectory,
+    simulate: Callable[[Excitation, Start], Trajectory],
+    given: tuple[Excitation, Start],
+    bounds: Mapping[str, ErrorBound],
+) -> ErrorEstimate | None:
+    """Estimate for a vehicle's run by the first look that is fine enough; none if it is short."""
+    (maneuver, start), estimate = given, None
+    apart = maneuver.duration / (maneuver.samples - 1)
+    for spacing, *passes in LOOKS:
         parts = math.ceil(apart / spacing - 1e-6)
         finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
         nodes = slice(0, finer.samples_to_stop, max(int(parts * spacing / apart + 1e-6), 1))
         if len(finer.times[nodes]) < FEWEST_NODES:
-            return run
-        estimate = error_estimate(finer, nodes, model.start(start), known, settled)
+            return None
+        estimate = error_estimate(finer, nodes, run.model.start(start), bounds, passes)
         if estimate.in_bounds < SMALL:
             break
-    assert estimate is not None
-    judged = run.judged(estimate.trust())
-    seconds = loops + time.thread_time() - began
-    return Trajectory.of(**judged.__dict__ | {"error_estimate": estimate, "seconds": seconds})
+    return estimate
 
 
 def error_estimate(
@@ -186,21 +199,21 @@ def error_estimate(
     nodes: slice,
     start: np.ndarray,
     bounds: Mapping[str, ErrorBound],
-    settled: float,
+    passes: Sequence[float],
 ) -> ErrorEstimate:
     """Errors of a run that has states, at some of its output times, equidistant ones.
 
-    The start (n,) is that of the full model; corrections are settled so far, see `error_model`.
+    The start (n,) is that of the full model; of passes see `LOOKS`.
     """
     from vehiclemor.reduction.error_model import error_model
 
     model, times = run.model, run.times[nodes]
-    states, inputs = (np.ascontiguousarray(part[nodes]) for part in (run.states, run.inputs))
+    states, inputs = run.states[nodes].copy(), run.inputs[nodes].copy()
     corrected, is_settled = None, False
     if np.isfinite(states).all():
         step = float(times[1] - times[0])
         errors_of = error_model(model, states, float(times[-1]))
-        corrected, is_settled = errors_of.corrected(step, states, inputs, start, settled)
+        corrected, is_settled = errors_of.corrected(step, states, inputs, start, passes)
     errors = partial(_errors_of_states, model, inputs, states, corrected)
     return ErrorEstimate(times, model, errors, bounds, is_settled)
 

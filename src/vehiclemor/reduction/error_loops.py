@@ -57,7 +57,7 @@ class ModesOfErrors(NamedTuple):
 
     Slow (modal coordinates,) is one for those that start with an error; what the others add to
     heading and place while they decay follows from the start's deviation by `settling` (n, 3).  The
-    correction (2 c, n) meets violations of constraints; velocity (3, n) gives psi', U, V.
+    correction, in blocks too, meets violations of constraints; velocity (3, n) gives psi', U, V.
     """
 
     coordinates: Cube
@@ -65,7 +65,7 @@ class ModesOfErrors(NamedTuple):
     weights: Matrix
     slow: Vector
     settling: Matrix
-    correction: Matrix
+    correction: Cube
     velocity: Matrix
 
 
@@ -85,7 +85,8 @@ class Scratch(NamedTuple):
     """Room for all nodes: states, their rates, violations, shapes, slopes of the path, motions.
 
     Then in modes, filled up, what drives errors, and the errors; further for a change of these, a
-    shape (filled up), the ranges of its coordinates (n,), what a start adds to heading and place.
+    shape, what meets violations (both filled up), the ranges of its coordinates (n,), and what a
+    start adds to heading and place (3,).
     """
 
     states: Matrix
@@ -98,6 +99,7 @@ class Scratch(NamedTuple):
     errors: Matrix
     change: Vector
     moved: Vector
+    met: Vector
     scale: Vector
     settled: Vector
 
@@ -126,7 +128,7 @@ def corrected_run(
         if nodes - end < LANES:
             end = nodes
         first = begin + 1 if begin else 0
-        guess(begin, first, end, modes.shapes, scratch)
+        guess(begin, first, end, modes, scratch)
         change = 0.0
         for _ in range(passes.most):
             full_rates(first, end, inputs, shape, equations, scratch)
@@ -279,15 +281,18 @@ def place(step, start, shape, scratch, result):
         turn(state, shape, math.cos(state[heading]), math.sin(state[heading]), result[i])
 
 
-def guess(begin, first, end, blocks, scratch):
-    """The error at the beginning of a window is a first guess of that at its other nodes."""
-    known, moved = scratch.errors[begin], scratch.moved
-    product(blocks, known, moved)
+def guess(begin, first, end, modes, scratch):
+    """At first what drives the errors is guessed to stay as it is at the beginning of a window."""
+    moved = scratch.moved
     for i in range(first, end):
         errors, into = scratch.errors[i], scratch.shapes[i]
-        for k in range(len(known)):
-            errors[k] = known[k]
-        for j in range(len(into)):
+        sources, known = scratch.sources[i], scratch.sources[begin]
+        for k in range(len(errors)):
+            sources[k] = known[k] if begin else 0.0
+            errors[k] = errors[k] if i == 0 else 0.0
+        propagate(i, modes, scratch)
+        product(modes.shapes, errors, moved)
+        for j in range(into.shape[0]):
             into[j] += moved[j]
 
 
@@ -370,11 +375,10 @@ def correct(i, shape, modes, scratch):
     rates, violations, change = scratch.rates[i], scratch.violations[i], scratch.change
     moved, into, largest = scratch.moved, scratch.shapes[i], 0.0
     product(modes.shapes, change, moved)
-    for k in range(len(violations)):
-        amount, row = violations[k], modes.correction[k]
-        for j in range(len(into)):
-            moved[j] -= amount * row[j]
+    if len(violations):
+        product(modes.correction, violations, scratch.met)
     for j in range(len(into)):
+        moved[j] -= scratch.met[j]
         into[j] += moved[j]
         largest = max(largest, abs(moved[j]) / scratch.scale[j])
         if moved[j] != moved[j]:

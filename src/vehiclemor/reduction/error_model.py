@@ -14,27 +14,29 @@ method with a frozen Jacobian.  Heading and position of the corrected shape are 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.loops import Ready, loops, ready
+from vehiclemor.codegen.loops import Prepared, Ready, loops, ready
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.reduction.error_loops import FullEquations, ModesOfErrors, Passes, Scratch, Shape
 from vehiclemor.reduction.vehicle.shape import RANK, Linearisation, VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import address_of, at_samples
+from vehiclemor.simulation.workspaces import Pool
 
 # Speeds (m/s) of linearisations are multiples of this one.
 SPEEDS = 2.5
 # Modes start with an error whose rate times the time between nodes is no larger; the others have
 # decayed before it matters.
 FOLLOWED = 8.0
-# Nodes in a window, and the most passes that it takes; least range of a coordinate of the shape, in
-# which changes are measured (m, rad, m/s, rad/s).
-WINDOW, MOST_PASSES, LEAST_RANGE = 9, 12, 1e-3
+# Nodes in a window; least range of a coordinate of the shape, in which changes are measured (m,
+# rad, m/s, rad/s).
+WINDOW, LEAST_RANGE = 9, 1e-3
 # Step of differences; magnitude of a mode's rate times the step below which weights are series.
 DIFFERENCE, SERIES = 1e-6, 1e-3
 
@@ -42,9 +44,7 @@ DIFFERENCE, SERIES = 1e-6, 1e-3
 def error_model(model: DynamicModel, states: np.ndarray, duration: float) -> ErrorModel:
     """What corrects a run of a vehicle model, with states (nodes, n) over so many s."""
     way = np.hypot(*np.diff(states[:, model.planar[:2]], axis=0).T).sum()
-    key = model.kernel_hash, model.inputs, model.constants.tobytes()
-    alike = Alike(key, model)
-    return _at_speed(alike, SPEEDS * max(round(float(way) / duration / SPEEDS), 1))
+    return _at_speed(_alike(model), SPEEDS * max(round(float(way) / duration / SPEEDS), 1))
 
 
 @dataclass(frozen=True)
@@ -55,15 +55,20 @@ class Alike:
     model: DynamicModel = field(compare=False)
 
 
+@lru_cache(maxsize=64)
+def _alike(model: DynamicModel) -> Alike:
+    return Alike((model.kernel_hash, model.inputs, model.constants.tobytes()), model)
+
+
 @lru_cache(maxsize=256)
 def _at_speed(alike: Alike, speed: float) -> ErrorModel:
-    return ErrorModel(_shape(alike), speed)
+    return ErrorModel(*_shape(alike), speed)
 
 
-# Its derivatives serve all speeds.
+# Its derivatives serve all speeds, and so do the arrays of its runs.
 @lru_cache(maxsize=64)
-def _shape(alike: Alike) -> VehicleShape:
-    return VehicleShape(alike.model)
+def _shape(alike: Alike) -> tuple[VehicleShape, Pool[Space]]:
+    return VehicleShape(alike.model), Pool()
 
 
 @lru_cache(maxsize=256)
@@ -76,7 +81,7 @@ def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
             in_blocks(modes.shapes),
             errors.weights(step),
             *errors.starts(step),
-            errors.free.correction,
+            in_blocks(errors.free.correction),
             np.ascontiguousarray(errors.linearised.velocity_a),
         )
     )
@@ -87,6 +92,7 @@ class ErrorModel:
     """Modes of a vehicle's shape at straight running, in which errors are propagated."""
 
     shape: VehicleShape
+    pool: Pool[Space]
     speed: float  # Of straight running in m/s.
 
     def corrected(
@@ -95,26 +101,38 @@ class ErrorModel:
         states: np.ndarray,
         inputs: np.ndarray,
         start: np.ndarray,
-        settled: float,
+        passes: Sequence[float],
     ) -> tuple[np.ndarray | None, bool]:
         """States (nodes, n) of the full model along a run, none if they can't be followed.
 
         Given are states of the run and inputs (nodes, inputs) at nodes that are a step in s apart,
-        and the start (n,) of the full model.  The truth value tells whether all changes were small
+        and the start (n,) of the full model; the most passes, and the change that ends them, in
+        ranges of the coordinates.  The truth value tells whether all changes were small
         enough in the end to be settled.
         """
-        nodes, (n, count) = len(states), self.modes.coordinates.shape
-        filled, shape = _filled(count), _filled(n)
-        widths = 2 * [states.shape[1]] + [len(self.free.correction), n, n, 3] + 2 * [filled]
-        rooms: list[Any] = [np.empty((nodes, columns)) for columns in widths]
-        scratch = Scratch(*rooms, *(np.zeros(size) for size in (filled, shape, n, 3)))
-        of_errors = _modes_of_errors(self, step)
-        passes, result = Passes(WINDOW, MOST_PASSES, settled, LEAST_RANGE), np.empty_like(states)
-        loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
-        unsettled = loop(
-            step, states, inputs, start, *self._bundles, of_errors, passes, scratch, result
-        )
+        kind = step, len(states), *passes
+        space = self.pool.taken(kind, lambda: self._space(step, len(states), passes))
+        space.call.give("modes", _modes_of_errors(self, step))
+        np.copyto(space.run, states)
+        np.copyto(space.inputs, inputs)
+        np.copyto(space.start, start)
+        unsettled, result = space.call(), space.result.copy()
+        self.pool.give_back(kind, space)
         return (None if unsettled < 0 else result), unsettled == 0
+
+    def _space(self, step: float, nodes: int, passes: Sequence[float]) -> Space:
+        """Arrays of a run, and the loop that uses them."""
+        (n, count), model = self.modes.coordinates.shape, self.shape.model
+        filled, shape, states = _filled(count), _filled(n), len(model.definition.states)
+        widths = states, states, len(self.free.correction), n, n, 3, filled, filled
+        rooms: list[Any] = [np.empty((nodes, columns)) for columns in widths]
+        scratch = Scratch(*rooms, *(np.zeros(size) for size in (filled, shape, shape, n, 3)))
+        run, result = np.empty((2, nodes, states))
+        inputs, start = np.empty((nodes, len(model.inputs))), np.empty(states)
+        limits, of_errors = Passes(WINDOW, *passes, LEAST_RANGE), _modes_of_errors(self, step)
+        loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
+        of_run = step, run, inputs, start, *self._bundles, of_errors, limits, scratch, result
+        return Space(run, inputs, start, result, loop.prepared(*of_run))
 
     @cached_property
     def linearised(self) -> Linearisation:
@@ -211,11 +229,23 @@ def in_blocks(matrix: np.ndarray) -> np.ndarray:
     rows, columns = matrix.shape
     filled = np.zeros((rows, _filled(columns)))
     filled[:, :columns] = matrix
-    return np.ascontiguousarray(filled.reshape(rows, -1, LANES).swapaxes(0, 1))
+    return np.ascontiguousarray(
+        filled.reshape(rows, _filled(columns) // LANES, LANES).swapaxes(0, 1)
+    )
 
 
 def _filled(columns: int) -> int:
     return -(-columns // LANES) * LANES
+
+
+class Space(NamedTuple):
+    """Arrays of a run at its nodes, its start, the result, and the loop that uses them."""
+
+    run: np.ndarray
+    inputs: np.ndarray
+    start: np.ndarray
+    result: np.ndarray
+    call: Prepared
 
 
 class Free(NamedTuple):
