@@ -102,12 +102,11 @@ def errors(dataset: xr.Dataset) -> Variables:
 
 
 def integrated(dataset: xr.Dataset) -> Variables:
-    """Steps, time of the loop in us, and largest distance from the reference in mm."""
+    """Time of the loop in us, and largest distance from the reference in mm."""
     off = [
         dataset["max_error"].sel(output=f"{axis}_position") for axis in ("longitudinal", "lateral")
     ]
     return {
-        "steps": dataset["steps"],
         "us": 1e6 * dataset["seconds"],
         "mm": 1e3 * (off[0] ** 2 + off[1] ** 2) ** 0.5,
     }
@@ -250,22 +249,13 @@ def peers(cases: dict[str, Any]) -> Iterator[Entry]:
 
 
 def steps(vehicles: dict[str, Any]) -> Iterator[Entry]:
-    """Costs of a step of exported C, the longest one within bounds, its time; 0: there is none."""
+    """Instructions of a step of exported C, time of the fastest one within bounds; 0: none."""
     study = SimpleNamespace(**runpy.run_path(str(STEPS)))
-    units = {"nanoseconds": "ns", "code": "B", "stack": "B"}
     for vehicle, part in vehicles.items():
-        for row in part["costs"]:
-            head = "steps", vehicle, row["model"], row["integrator"], row["precision"]
-            yield from ((slug(*head, name), row[name], unit) for name, unit in units.items())
         for row in part.get("arm", {}).get("rows", ()):
             head = "steps", vehicle, row["model"], row["integrator"], row["processor"]
             yield slug(*head, "instructions"), row["instructions"], "1"
             yield from ((slug(*head, name), row[name], "B") for name in ("code", "stack"))
-        for row in study.reached(part):
-            at = f"v{row['speed']:g}", f"within{row['level']:g}"
-            head = "steps", vehicle, row["model"], row["integrator"], *at
-            yield slug(*head, "step"), row["step"], "s"
-            yield slug(*head, "least"), row["least"], "1"
         for speed, level in product(study.SPEEDS, study.LEVELS):
             head, times = ("steps", vehicle, f"v{speed:g}", f"within{level:g}"), {}
             for model in dict.fromkeys(row["model"] for row in part["costs"]):

@@ -200,7 +200,7 @@ def test_studies_run_afresh_give_the_numbers(results):
                 expected = pytest.approx(known[name]["value"], rel=1e-2, abs=nothing)
                 assert float(value) == expected, name
                 compared += 1
-    assert compared > 30
+    assert compared > 20, compared
 
 
 def test_an_archive_is_the_results_folder_again(tmp_path, capsys):
