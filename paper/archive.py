@@ -1,6 +1,6 @@
 """Pack the stored results of all studies into one archive, ready for a repository with a DOI.
 
-Usage: python paper/archive.py --results DIR --out vehiclemor-results-1.0.0.zip
+Usage: python paper/archive.py --results DIR --out vehiclemor-results.zip
 """
 
 import argparse

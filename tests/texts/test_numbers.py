@@ -3,12 +3,15 @@
 import json
 import re
 import sys
+from configparser import ConfigParser
 
 import measured_numbers
 import numbers_by_name
 import pytest
 import xarray as xr
 from numbers_by_name import load, render, shown
+
+from vehiclemor.study.plans.loading import studies_and_files
 
 NUMBERS = load()
 
@@ -23,6 +26,21 @@ def test_texts_hold_their_numbers():
 def test_the_file_holds_what_texts_ask_for():
     # Written anew by `paper/measured_numbers.py`, which also drops what no text asks for.
     assert measured_numbers.asked(measured_numbers.ROOT) == set(NUMBERS)
+
+
+def test_one_command_measures_every_number_anew():
+    text = (measured_numbers.ROOT / "tox.ini").read_text(encoding="utf-8")
+    tox = ConfigParser(interpolation=None)
+    tox.read_string(text)
+    (order,) = re.findall(r"#   tox -e (\S+)", text)
+    renewed = "".join(tox[f"testenv:{name}"]["commands"] for name in order.split(","))
+    done = {f"python {script}" for script in re.findall(r"python (\S+\.py)", renewed)}
+    done |= {"", "vehiclemor compare paper"} | {f"tox -e {name}" for name in order.split(",")}
+    for study in re.findall(r"vehiclemor run (\S+)", renewed):
+        done |= {f"vehiclemor run {name}" for name in studies_and_files(study)}
+    # Logs are not part of the suite.
+    needed = {entry["command"] for entry in NUMBERS.values() if "logs-" not in entry["command"]}
+    assert needed <= done
 
 
 def test_readme_is_short_and_keeps_its_commands():
