@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -30,7 +30,7 @@ from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajector
 # Of looks, each where the one before finds an error in bounds that is not small: time in s between
 # nodes, at last a tenth of the period of wheel hop; the most passes, and how far corrections are
 # settled.
-LOOKS, SMALL = ((0.04, 12, 1e-3), (0.02, 12, 1e-4), (0.01, 12, 1e-4)), 0.5
+LOOKS, SMALL = ((0.04, (12, 1e-3)), (0.02, (12, 1e-4)), (0.01, (12, 1e-4))), 0.5
 FEWEST_NODES = 8
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
@@ -182,7 +182,7 @@ def _looked(
     """Estimate for a vehicle's run by the first look that is fine enough; none if it is short."""
     (maneuver, start), estimate = given, None
     apart = maneuver.duration / (maneuver.samples - 1)
-    for spacing, *passes in LOOKS:
+    for spacing, passes in LOOKS:
         parts = math.ceil(apart / spacing - 1e-6)
         finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
         nodes = slice(0, finer.samples_to_stop, max(int(parts * spacing / apart + 1e-6), 1))
@@ -199,7 +199,7 @@ def error_estimate(
     nodes: slice,
     start: np.ndarray,
     bounds: Mapping[str, ErrorBound],
-    passes: Sequence[float],
+    passes: tuple[int, float],
 ) -> ErrorEstimate:
     """Errors of a run that has states, at some of its output times, equidistant ones.
 

@@ -14,7 +14,6 @@ method with a frozen Jacobian.  Heading and position of the corrected shape are 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -101,7 +100,7 @@ class ErrorModel:
         states: np.ndarray,
         inputs: np.ndarray,
         start: np.ndarray,
-        passes: Sequence[float],
+        passes: tuple[int, float],
     ) -> tuple[np.ndarray | None, bool]:
         """States (nodes, n) of the full model along a run, none if they can't be followed.
 
@@ -120,7 +119,7 @@ class ErrorModel:
         self.pool.give_back(kind, space)
         return (None if unsettled < 0 else result), unsettled == 0
 
-    def _space(self, step: float, nodes: int, passes: Sequence[float]) -> Space:
+    def _space(self, step: float, nodes: int, passes: tuple[int, float]) -> Space:
         """Arrays of a run, and the loop that uses them."""
         (n, count), model = self.modes.coordinates.shape, self.shape.model
         filled, shape, states = _filled(count), _filled(n), len(model.definition.states)
