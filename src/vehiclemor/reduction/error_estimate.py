@@ -1,7 +1,4 @@
-"""How far a reduced run is from that of the full model, estimated after the run.
-
-What a start that violates constraints does in its first tenth of a second is not seen.
-"""
+"""How far a reduced run is from that of the full model, estimated after the run."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.exceptions import InputError
+from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction.constraint_error import constraint_errors
@@ -30,8 +27,12 @@ from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajector
 # Of looks, each where the one before finds an error in bounds that is not small: time in s between
 # nodes, at last a tenth of the period of wheel hop; the most passes, and how far corrections are
 # settled.
-LOOKS, SMALL = ((0.04, (12, 1e-3)), (0.02, (12, 1e-4)), (0.01, (12, 1e-4))), 0.5
+FINER = 12, 1e-4
+LOOKS, SMALL = ((0.04, (12, 1e-3)), (0.02, FINER), (0.01, FINER), (0.005, FINER)), 0.4
 FEWEST_NODES = 8
+# Violations of constraints and their rates that are none (m, m/s); time in s in which those of a
+# start decay, ten time constants of their stabilisation.
+HELD, SETTLED = 1e-6, 0.2
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
 
@@ -188,7 +189,7 @@ def _looked(
         nodes = slice(0, finer.samples_to_stop, max(int(parts * spacing / apart + 1e-6), 1))
         if len(finer.times[nodes]) < FEWEST_NODES:
             return None
-        estimate = error_estimate(finer, nodes, run.model.start(start), bounds, passes)
+        estimate = error_estimate(finer, nodes, given, bounds, passes)
         if estimate.in_bounds < SMALL:
             break
     return estimate
@@ -197,25 +198,52 @@ def _looked(
 def error_estimate(
     run: Trajectory,
     nodes: slice,
-    start: np.ndarray,
+    given: tuple[Excitation, Start],
     bounds: Mapping[str, ErrorBound],
     passes: tuple[int, float],
 ) -> ErrorEstimate:
     """Errors of a run that has states, at some of its output times, equidistant ones.
 
-    The start (n,) is that of the full model; of passes see `LOOKS`.
+    The maneuver and the start are given; of passes see `LOOKS`.
     """
     from vehiclemor.reduction.error_model import error_model
 
     model, times = run.model, run.times[nodes]
     states, inputs = run.states[nodes].copy(), run.inputs[nodes].copy()
     corrected, is_settled = None, False
-    if np.isfinite(states).all():
-        step = float(times[1] - times[0])
+    begun = _begun(model, given, times, inputs[0])
+    if begun is not None and np.isfinite(states).all():
+        first, step = len(begun) - 1, float(times[1] - times[0])
         errors_of = error_model(model, states, float(times[-1]))
-        corrected, is_settled = errors_of.corrected(step, states, inputs, start, passes)
+        rest = step, states[first:], inputs[first:], begun[-1], (*passes, not first)
+        corrected, is_settled = errors_of.corrected(*rest)
+        if corrected is not None and first:
+            corrected = np.concatenate([begun[:-1], corrected])
     errors = partial(_errors_of_states, model, inputs, states, corrected)
     return ErrorEstimate(times, model, errors, bounds, is_settled)
+
+
+def _begun(
+    model: DynamicModel, given: tuple[Excitation, Start], times: np.ndarray, inputs: np.ndarray
+) -> np.ndarray | None:
+    """States (some first nodes, n) of the full model, none if it fails: its start alone.
+
+    Where that violates the constraints, the full model runs until they hold: no linearisation
+    knows how it comes there.
+    """
+    maneuver, start = given
+    state = model.start(start)
+    if not model.definition.constraints:
+        return state[None]
+    if max(np.abs(part).max() for part in model.violations(state, inputs)) < HELD:
+        return state[None]
+    nodes = min(int(times.searchsorted(SETTLED)) + 1, len(times) - FEWEST_NODES)
+    if nodes < 2:
+        return state[None]
+    try:
+        return model.simulate(maneuver, state, times[:nodes]).states
+    except ConvergenceError:
+        return None
 
 
 def _errors_of_states(

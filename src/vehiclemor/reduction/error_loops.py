@@ -72,13 +72,15 @@ class ModesOfErrors(NamedTuple):
 class Passes(NamedTuple):
     """Nodes of a window, passes that are made of it at most, and the change that ends them.
 
-    Changes of the shape are measured in the ranges of its coordinates, at least in `least`.
+    Changes of the shape are measured in the ranges of its coordinates, at least in `least`.  One if
+    the first node is the beginning of the run, whose state a method may record as it was given.
     """
 
     window: Int
     most: Int
     settled: Float
     least: Float
+    is_beginning: Int
 
 
 class Scratch(NamedTuple):
@@ -155,10 +157,11 @@ def begin_with(run, start, step, shape, modes, passes, scratch):
     nodes, n = shapes.shape
     for i in range(nodes):
         shape_of(run[i], shape, scratch.states[i], shapes[i])
+    if passes.is_beginning:
+        for j in range(n):
+            near = 4.0 * shapes[1, j] - 6.0 * shapes[2, j]
+            shapes[0, j] = near + 4.0 * shapes[3, j] - shapes[4, j]
     for j in range(n):
-        # A method may record the start itself, through which its own motion does not pass.
-        near = 4.0 * shapes[1, j] - 6.0 * shapes[2, j]
-        shapes[0, j] = near + 4.0 * shapes[3, j] - shapes[4, j]
         moved[j] = scale[j] = shapes[1, j]
     for i in range(2, nodes):
         for j in range(n):

@@ -100,14 +100,14 @@ class ErrorModel:
         states: np.ndarray,
         inputs: np.ndarray,
         start: np.ndarray,
-        passes: tuple[int, float],
+        passes: tuple[int, float, bool],
     ) -> tuple[np.ndarray | None, bool]:
         """States (nodes, n) of the full model along a run, none if they can't be followed.
 
         Given are states of the run and inputs (nodes, inputs) at nodes that are a step in s apart,
-        and the start (n,) of the full model; the most passes, and the change that ends them, in
-        ranges of the coordinates.  The truth value tells whether all changes were small
-        enough in the end to be settled.
+        and the start (n,) of the full model; the most passes, the change that ends them, in ranges
+        of the coordinates, and whether the run begins at the first node.  The truth value tells
+        whether all changes were small enough in the end to be settled.
         """
         kind = step, len(states), *passes
         space = self.pool.taken(kind, lambda: self._space(step, len(states), passes))
@@ -119,7 +119,7 @@ class ErrorModel:
         self.pool.give_back(kind, space)
         return (None if unsettled < 0 else result), unsettled == 0
 
-    def _space(self, step: float, nodes: int, passes: tuple[int, float]) -> Space:
+    def _space(self, step: float, nodes: int, passes: tuple[int, float, bool]) -> Space:
         """Arrays of a run, and the loop that uses them."""
         (n, count), model = self.modes.coordinates.shape, self.shape.model
         filled, shape, states = _filled(count), _filled(n), len(model.definition.states)
@@ -128,7 +128,9 @@ class ErrorModel:
         scratch = Scratch(*rooms, *(np.zeros(size) for size in (filled, shape, shape, n, 3)))
         run, result = np.empty((2, nodes, states))
         inputs, start = np.empty((nodes, len(model.inputs))), np.empty(states)
-        limits, of_errors = Passes(WINDOW, *passes, LEAST_RANGE), _modes_of_errors(self, step)
+        most, settled, is_beginning = passes
+        limits = Passes(WINDOW, most, settled, LEAST_RANGE, int(is_beginning))
+        of_errors = _modes_of_errors(self, step)
         loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
         of_run = step, run, inputs, start, *self._bundles, of_errors, limits, scratch, result
         return Space(run, inputs, start, result, loop.prepared(*of_run))
