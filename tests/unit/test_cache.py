@@ -105,10 +105,12 @@ def given_away(path: Path) -> None:
     os.chown(path, 12345, -1)
 
 
+needs_modes = pytest.mark.skipif(os.name != "posix", reason="files have no modes of POSIX")
 WRITABLE = [lambda path, mode=mode: path.chmod(mode) for mode in (0o777, 0o720, 0o702)]
 FOREIGN = pytest.param(given_away, marks=needs_root)
 
 
+@needs_modes
 @pytest.mark.parametrize("change", [*WRITABLE, FOREIGN])
 def test_a_file_that_others_can_write_is_made_again(folder, fetch, made, caplog, change):
     fetch()
@@ -122,6 +124,7 @@ def test_a_file_that_others_can_write_is_made_again(folder, fetch, made, caplog,
     assert len(made) == 2
 
 
+@needs_modes
 @pytest.mark.parametrize("change", [*WRITABLE, FOREIGN])
 def test_a_folder_that_others_can_write_is_not_used(folder, fetch, caplog, change):
     folder.mkdir()
@@ -159,6 +162,7 @@ PLANTED = [
 ]
 
 
+@needs_modes
 @pytest.mark.parametrize("plant", PLANTED)
 def test_what_others_may_have_planted_on_the_way_is_not_read(folder, fetch, made, caplog, plant):
     fetch(content=b"foreign content")

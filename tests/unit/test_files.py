@@ -11,6 +11,9 @@ from vehiclemor.exceptions import FileError, VehiclemorError
 from vehiclemor.exporting import fmu
 from vehiclemor.files import write_text
 
+if os.name != "posix":
+    pytest.skip("pipes, sockets and devices are those of POSIX", allow_module_level=True)
+
 MODEL = "double_wishbone"
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -14,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader
 from vehiclemor.codegen.operations import COMPARISONS, uses
 from vehiclemor.exporting.ros2 import solve_function
 from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
-from vehiclemor.exporting.systems import SIGNATURES, TANGENTS, TOOL, ExportedSystem
+from vehiclemor.exporting.systems import SIGNATURES, TANGENTS, TOOL, CSettings, ExportedSystem
 
 SOURCES = Path(__file__).parent / "c_sources"
 SELECT = """\
@@ -55,14 +54,6 @@ INTEGRATORS = {
     "ros2": ("linearly implicit method of order 2, with the Jacobian at the first start", 4, 0),
 }
 SIGNATURES_IN_C = SIGNATURES | TANGENTS | {"solve": ("x", "r", "k")}
-
-
-class CSettings(NamedTuple):
-    """How a system is written: step size of its integrator in s, integrator and precision."""
-
-    step: float
-    integrator: str = "rk4"
-    precision: str = "double"
 
 
 def c_files(system: ExportedSystem, settings: CSettings) -> dict[str, str]:

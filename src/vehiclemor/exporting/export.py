@@ -15,7 +15,7 @@ from vehiclemor.inputs.columns import listed
 from vehiclemor.registry import choice
 
 if TYPE_CHECKING:
-    from vehiclemor.exporting.systems import ExportedSystem
+    from vehiclemor.exporting.systems import CSettings, ExportedSystem
     from vehiclemor.reduction.reduced_model import ReducedOrderModel
     from vehiclemor.simulation.model import Model
 
@@ -99,14 +99,9 @@ def export(
         If an argument is wrong, the method can't be exported, something is there already, a package
         is missing, or the C compiler fails.  Then nothing is written.
     """
-    choice("target", to, TARGETS)
-    step = within("step", number("step", step), STEPS, " s")
-    choice("integrator", integrator, Integrator.__args__)
-    choice("precision", precision, Precision.__args__)
-    if to not in STEPPED and integrator != "rk4":
-        raise InputError(f"integrator is a choice for {', '.join(STEPPED)}, not for {to}")
-    if to not in FILES and precision != "double":
-        raise InputError(f"precision is a choice for {', '.join(FILES)}, not for {to}")
+    from vehiclemor.exporting.systems import CSettings
+
+    step = _checked_step(to, step, integrator, precision)
     if out is not None and to not in ENDINGS:
         raise InputError(f"out: an export to {to} is an object, no file")
     if isinstance(model, str):
@@ -121,21 +116,37 @@ def export(
         path = destination(system.name, to, out, overwrite)
     if len(system.table) and to in ("casadi", "sympy"):
         raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
-    if to == "c":
-        from vehiclemor.exporting.c import CSettings, c_files
+    settings = CSettings(step, integrator, precision)
+    return _exported(system, to, path, settings)
 
-        settings = CSettings(step, integrator, precision)
+
+def _checked_step(to: str, step: Any, integrator: str, precision: str) -> float:
+    """The step in s; `InputError` if it or what goes with it is wrong."""
+    choice("target", to, TARGETS)
+    choice("integrator", integrator, Integrator.__args__)
+    choice("precision", precision, Precision.__args__)
+    if to not in STEPPED and integrator != "rk4":
+        raise InputError(f"integrator is a choice for {', '.join(STEPPED)}, not for {to}")
+    if to not in FILES and precision != "double":
+        raise InputError(f"precision is a choice for {', '.join(FILES)}, not for {to}")
+    return within("step", number("step", step), STEPS, " s")
+
+
+def _exported(system: ExportedSystem, to: str, path: Any, settings: CSettings) -> Any:
+    """What is written to a path, or the object."""
+    if to == "c":
+        from vehiclemor.exporting.c import c_files
+
         return _write_folder(path, c_files(system, settings))
     if to == "fmu":
-        from vehiclemor.exporting.c import CSettings
         from vehiclemor.exporting.fmu import fmu_files, write_archive
 
-        files = fmu_files(system, CSettings(step, integrator, precision))
+        files = fmu_files(system, settings)
         return write_whole(path, lambda temporary: write_archive(files, temporary))
     if to == "rollouts":
         from vehiclemor.exporting.rollouts import Rollouts
 
-        return Rollouts(system, step, integrator)
+        return Rollouts(system, settings.step, settings.integrator)
     from vehiclemor.exporting.libraries import OBJECTS
 
     exported = OBJECTS[to](system)

@@ -24,11 +24,10 @@ from vehiclemor.exporting.c import (
     SOURCES,
     STEPPER,
     TANGENT,
-    CSettings,
     c_files,
     written,
 )
-from vehiclemor.exporting.systems import ExportedSystem
+from vehiclemor.exporting.systems import CSettings, ExportedSystem
 
 _LOG = logging.getLogger("vehiclemor")
 # Platform -> folder of its binaries, and ending of its shared libraries.

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.metadata import version
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,6 +48,14 @@ STEPS = 7
 CORRECTION = Quantity(
     "last_correction", "1", "largest of the last Newton step (rad or m): large where out of reach"
 )
+
+
+class CSettings(NamedTuple):
+    """How a system is written: step size of its integrator in s, integrator and precision."""
+
+    step: float
+    integrator: str = "rk4"
+    precision: str = "double"
 
 
 @dataclass(frozen=True, eq=False)

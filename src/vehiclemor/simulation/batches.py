@@ -107,13 +107,7 @@ def simulate_many(
     """
     from joblib import cpu_count
 
-    given = build(model) if isinstance(model, str) else model
-    full = getattr(given, "model", given)
-    if not isinstance(full, Model):
-        raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
-    is_list = isinstance(signals, Sequence) and all(isinstance(s, Excitation) for s in signals)
-    if given is full and is_list:
-        given = full = full.driving([name for signal in signals for name in signal.inputs])
+    given, full = _driven(model, signals)
     runs, names = _count_of(signals, full), _names(full, outputs)
     kept, rows = _kept_times(times, signals)
     begins = _starts_of(starts, runs, full)
@@ -142,6 +136,18 @@ def simulate_many(
     return _dataset(full, list(names), kept, values, found).assign_attrs(
         _about(given, full, signals)
     )
+
+
+def _driven(model: Any, signals: Sequence[Excitation]) -> tuple[Any, Model]:
+    """What is to run, and its full model; a full one is driven by the inputs of all signals."""
+    given = build(model) if isinstance(model, str) else model
+    full = getattr(given, "model", given)
+    if not isinstance(full, Model):
+        raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
+    is_list = isinstance(signals, Sequence) and all(isinstance(s, Excitation) for s in signals)
+    if given is full and is_list:
+        given = full = full.driving([name for signal in signals for name in signal.inputs])
+    return given, full
 
 
 def _about(given: Any, full: Model, signals: Sequence[Excitation]) -> dict[str, Any]:

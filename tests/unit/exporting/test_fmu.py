@@ -13,9 +13,10 @@ import pytest
 import vehiclemor as vm
 from tests.unit.exporting.programs import in_use, relative, runge_kutta, steering
 from vehiclemor.exporting import fmu
-from vehiclemor.exporting.c import START_ALONE, CSettings, c_files
+from vehiclemor.exporting.c import START_ALONE, c_files
 from vehiclemor.exporting.export import system_of
 from vehiclemor.exporting.fmu import variables_of
+from vehiclemor.exporting.systems import CSettings
 from vehiclemor.simulation.evaluation import hoisted_constants
 
 fmpy = pytest.importorskip("fmpy")
