@@ -24,11 +24,12 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
-# Of looks, each where the one before finds an error in bounds that is not small: time in s between
-# nodes, at last a tenth of the period of wheel hop; the most passes, and how far corrections are
-# settled.
+# Of looks: time in s between nodes, at last a twentieth of the period of wheel hop; the most
+# passes, and how far corrections are settled.  The last one is that which finds a small error, or
+# one within the bounds that is nearly that of the look before.
 FINER = 12, 1e-4
-LOOKS, SMALL = ((0.04, (12, 1e-3)), (0.02, FINER), (0.01, FINER), (0.005, FINER)), 0.4
+LOOKS = (0.04, (12, 1e-3)), (0.02, FINER), (0.01, FINER), (0.005, FINER)
+SMALL, NEARLY = 0.4, 0.1
 FEWEST_NODES = 8
 # Violations of constraints and their rates that are none (m, m/s); time in s in which those of a
 # start decay, ten time constants of their stabilisation.
@@ -181,7 +182,7 @@ def _looked(
     bounds: Mapping[str, ErrorBound],
 ) -> ErrorEstimate | None:
     """Estimate for a vehicle's run by the first look that is fine enough; none if it is short."""
-    (maneuver, start), estimate = given, None
+    (maneuver, start), estimate, error = given, None, math.nan
     apart = maneuver.duration / (maneuver.samples - 1)
     for spacing, passes in LOOKS:
         parts = math.ceil(apart / spacing - 1e-6)
@@ -190,7 +191,9 @@ def _looked(
         if len(finer.times[nodes]) < FEWEST_NODES:
             return None
         estimate = error_estimate(finer, nodes, given, bounds, passes)
-        if estimate.in_bounds < SMALL:
+        before, error = error, estimate.in_bounds
+        is_within = RESERVE * error < 1.0 and math.isclose(before, error, rel_tol=NEARLY)
+        if error < SMALL or is_within:
             break
     return estimate
 
