@@ -104,6 +104,17 @@ def test_what_can_not_be_followed_is_not_trusted():
     assert run.trust.indicator > 10.0
 
 
+def test_a_start_that_violates_constraints_is_followed_by_the_full_model():
+    rom = shipped("high_fidelity_vehicle")
+    bent = rom.model.start()
+    bent[rom.model.definition.states.index("beta_FR")] += 0.2  # rad, a tie rod
+    maneuver = registered("rack_lane_change")
+    run, full = rom.simulate(maneuver, start=bent), rom.model.simulate(maneuver, bent)
+    true = in_bounds(load_protocol("predictive-high_fidelity_vehicle"), run, full)
+    assert true > 2.0
+    assert run.error_estimate.in_bounds == pytest.approx(true, rel=0.1)
+
+
 def test_bounds_are_those_of_the_studies():
     for name in fixed_protocols():
         protocol = load_protocol(name)
