@@ -289,4 +289,5 @@ def studies() -> Iterator[tuple[str, Callable[[xr.Dataset], Iterator[Entry]]]]:
     for kind, model in product(("predictive", "contenders"), names("model")):
         yield f"{kind}-{model}", protocol
     for model in VEHICLES:
+        yield f"predictive-{model}-2", protocol
         yield f"logs-{model}", protocol
