@@ -108,6 +108,10 @@ class Rollouts(ShortRepr):
         )
         return results[:runs]
 
+    def __getstate__(self) -> dict[str, Any]:
+        """None: machine code has addresses, which a copy must not share."""
+        raise InputError("rollouts can't be copied: export the model in each process")
+
     def _array(self, given: Any, name: str) -> np.ndarray:
         try:
             array = real_array(given)

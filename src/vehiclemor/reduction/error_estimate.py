@@ -121,8 +121,10 @@ class ErrorEstimate(ShortRepr):
 
 def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBound]:
     """Bounds by output, see `ReducedOrderModel.simulate`; `InputError` if one is wrong."""
-    if not isinstance(bounds, Mapping):
+    if not isinstance(bounds, Mapping) or not bounds:
         raise InputError(f"bounds is {quoted(bounds)}, not bounds by output")
+    if not estimates(model):
+        raise InputError(f"bounds: errors of {model.name} are not estimated")
     checked = {}
     for name, value in bounds.items():
         pair: Any = value if isinstance(value, tuple | list) else ("max", value)
@@ -181,7 +183,7 @@ def _looked(
     given: tuple[Excitation, Start],
     bounds: Mapping[str, ErrorBound],
 ) -> ErrorEstimate | None:
-    """Estimate for a vehicle's run by the first look that is fine enough; none if it is short."""
+    """Estimate for a vehicle's run by the first look that is fine enough, none if there is none."""
     (maneuver, start), estimate, error = given, None, math.nan
     apart = maneuver.duration / (maneuver.samples - 1)
     for spacing, passes in LOOKS:
@@ -189,7 +191,7 @@ def _looked(
         finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
         nodes = slice(0, finer.samples_to_stop, max(int(parts * spacing / apart + 1e-6), 1))
         if len(finer.times[nodes]) < FEWEST_NODES:
-            return None
+            continue
         estimate = error_estimate(finer, nodes, given, bounds, passes)
         before, error = error, estimate.in_bounds
         is_within = RESERVE * error < 1.0 and math.isclose(before, error, rel_tol=NEARLY)

@@ -1,5 +1,7 @@
 """Rollouts, many runs at once by fixed steps: the numbers of runs that are stepped one by one."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -61,3 +63,4 @@ def test_rollouts_refuse_what_does_not_fit():
     refused(lambda: rollouts(state, inputs, 0.0), "period")
     refused(lambda: vm.export("double_wishbone", "rollouts"), "no states")
     refused(lambda: vm.export(model, "rollouts", precision="single"), "precision")
+    refused(lambda: pickle.dumps(rollouts), "copied")

@@ -77,9 +77,12 @@ def test_a_run_is_judged_by_the_bounds_that_are_given():
     assert "the estimated error of yaw_rate is 1." in strict.message
     assert 0.0 < strict.trust.until < run.times[-1]
     assert rom.simulate(bounds={"yaw_rate": ("rms", 0.9 * largest)}).status == "ok"
-    for wrong in ({"yow": 1.0}, {"yaw": 0.0}, {"yaw": ("mean", 1.0)}, 3.0):
+    for wrong in ({"yow": 1.0}, {"yaw": 0.0}, {"yaw": ("mean", 1.0)}, 3.0, {}):
         with pytest.raises(InputError):
             rom.simulate(bounds=wrong)
+    truck = vm.reduce("flexible_truck", "craig_bampton")
+    with pytest.raises(InputError, match="not estimated"):
+        truck.simulate(bounds={"driver_acceleration": 1.0})
 
 
 def test_it_can_be_left_out():
@@ -112,6 +115,20 @@ def test_a_start_that_violates_constraints_is_followed_by_the_full_model():
     run, full = rom.simulate(maneuver, start=bent), rom.model.simulate(maneuver, bent)
     true = in_bounds(load_protocol("predictive-high_fidelity_vehicle"), run, full)
     assert true > 2.0
+    assert run.error_estimate.in_bounds == pytest.approx(true, rel=0.1)
+
+
+@pytest.mark.parametrize("length", [0.05, 0.2])
+def test_a_short_run_is_judged(length):
+    rom = shipped("high_fidelity_vehicle")
+    high = rom.model.start()
+    high[rom.model.definition.states.index("z")] += 0.1
+    straight = {"inputs": ["s"], "hold": "cubic", "output_step": 0.005}
+    signal = vm.Signal.from_samples([0.0, length], np.zeros((2, 1)), **straight)
+    run, full = rom.simulate(signal, high), rom.model.simulate(signal, high)
+    true = in_bounds(load_protocol("predictive-high_fidelity_vehicle"), run, full)
+    assert true > 2.0
+    assert run.status == "untrusted"
     assert run.error_estimate.in_bounds == pytest.approx(true, rel=0.1)
 
 

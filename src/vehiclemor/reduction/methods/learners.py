@@ -143,7 +143,7 @@ def with_kernels(data: TrainingData, settings: GaussianProcessSettings) -> Learn
 
 def with_network(data: TrainingData, settings: NeuralNetworkSettings) -> LearnedModel:
     """A linear step, and the network of scikit-learn on what it leaves."""
-    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.exceptions import ConvergenceWarning, DataConversionWarning
     from sklearn.neural_network import MLPRegressor
 
     network = MLPRegressor(
@@ -156,6 +156,8 @@ def with_network(data: TrainingData, settings: NeuralNetworkSettings) -> Learned
     with warnings.catch_warnings():
         # The number of epochs is a setting: validation judges what they have reached.
         warnings.simplefilter("ignore", ConvergenceWarning)
+        # Of a single coordinate, which is a column all the same.
+        warnings.simplefilter("ignore", DataConversionWarning)
         return data.with_residual(network, slice(None))
 
 
