@@ -384,7 +384,7 @@ def load(path: Any) -> ReducedOrderModel:
 
 
 def rom(model: str) -> ReducedOrderModel:
-    """The reduced model of a car or a suspension that ships with the package.
+    """The reduced model of a car, a suspension or a truck that ships with the package.
 
     It is the one that the model's protocol has chosen for unseen inputs, see `compare()`;
     `InputError` if none ships for a model of this name.
