@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tests.models import MODELS
-from tests.reducing import fitted
 from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
 from vehiclemor.reduction.methods.full_order import FullOrderMechanism
 from vehiclemor.registry import component
@@ -94,53 +93,6 @@ def test_runs_are_bitwise_repeatable_and_do_not_depend_on_the_sampling(model, no
     np.testing.assert_allclose(coarse.outputs, full.outputs[::50], rtol=0, atol=1e-13)
 
 
-TIMES = np.array([0.0, 0.5])
-
-
-@pytest.mark.parametrize(
-    ("call", "arguments", "named"),
-    [
-        ("solve_path", (TIMES, np.array([[0.0, 0.0], [0.1, np.nan]])), r"s0 .* t = 0\.5 s"),
-        *(
-            ("solve_path", (TIMES, np.zeros(shape)), "inputs")
-            for shape in ((2,), (2, 1), (2, 3), (5, 2), (0, 2))
-        ),
-        *(
-            ("solve_path", (wrong, np.zeros((2, 2))), "times")
-            for wrong in ([[0.0, 1.0]], [0.0, np.nan], "abc", None)
-        ),
-        *(
-            (call, arguments, named)
-            for call in ("residual", "jacobian")
-            for *arguments, named in (
-                (np.zeros(7), np.zeros(2), r"\bq\b.*\(8,\)"),
-                (np.zeros(8), np.zeros(3), r"\bu\b.*\(2,\)"),
-                (np.full(8, np.inf), np.zeros(2), r"q\[0\]"),
-                (np.zeros(8), np.array([0.0, np.nan]), r"u\[1\]"),
-            )
-        ),
-    ],
-)
-def test_wrong_arguments_are_named(model, call, arguments, named):
-    with pytest.raises(InputError, match=named):
-        getattr(model, call)(*arguments)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "named"),
-    [
-        *(({"tolerance": t}, "tolerance") for t in (0.0, -1.0, np.nan, np.inf, "x")),
-        *(({"start": start}, "start") for start in (np.zeros(8), [0.0] * 8)),
-        ({"start": "dropped"}, "'dropped'"),
-        ({"solver": "newtno"}, "'newtno'"),
-        ({"maneuver": component("maneuver", "lane_change")}, "delta"),
-    ],
-)
-def test_what_is_of_no_mechanism_is_refused(model, nominal, wrong, named):
-    with pytest.raises(InputError, match=named):
-        model.simulate(**({"maneuver": nominal} | wrong))
-
-
 @pytest.fixture(scope="module", params=MODELS)
 def each_model(request):
     return build(request.param)
@@ -188,13 +140,3 @@ def test_times_and_starts_that_are_none_are_refused(each_model, argument, values
     for wrong in values:
         with pytest.raises(InputError, match=named):
             each_model.simulate(maneuver, **{argument: wrong})
-
-
-def test_a_reduced_mechanism_that_diverges_tells_its_counts(model, nominal):
-    reduced = fitted(model, nominal, "pod", rank=3)
-    run = reduced.simulate(nominal.perturbed(amplitude=4.0), "equilibrium")
-    assert run.status == "diverged"
-    solved = int(np.isfinite(run.coordinates[:, 0]).sum())
-    assert solved > 100
-    assert run.counts["iterations"] >= solved + 50
-    assert run.counts["jacobian_evaluations"] == run.counts["iterations"]

@@ -173,19 +173,6 @@ def test_similar_cars_share_all_but_their_numbers(solver, monkeypatch):
         np.testing.assert_allclose(alone.outputs / scale, exact.outputs / scale, atol=1e-3)
 
 
-def test_points_are_parameters_by_run():
-    model = vm.model(WISHBONE)
-    name = next(n for n, q in model.definition.parameters.items() if q.size == 3)
-    point = np.asarray(model.parameters[name])
-    points = [point.tolist(), (point + 1e-3).tolist()]
-    signals = vm.many_signals(TIMES, np.zeros((2, 41, 2)))
-    found = vm.simulate_many(model, signals, parameters={name: points})
-    listed = vm.simulate_many(model, signals, parameters=[{name: p} for p in points])
-    np.testing.assert_array_equal(found["values"], listed["values"])
-    other = vm.model(WISHBONE, parameters={name: points[1]}).simulate(signals[1])
-    np.testing.assert_array_equal(found["values"][1], other.outputs)
-
-
 STATE = [0.0] * 27
 
 

@@ -1,7 +1,6 @@
 """Histories of runs: labelled, made when they are read, the same however they are read."""
 
 import pickle
-import time
 from dataclasses import replace
 from functools import cache
 
@@ -10,14 +9,12 @@ import pytest
 
 import vehiclemor as vm
 from tests.models import CAR, FIDELITY, VEHICLES
-from vehiclemor.error_measures import max_abs, rms, signal_range
 from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.registry import component
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.control_periods import whole_space
-from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.system import Solver
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS, trajectory_dataset
 from vehiclemor.study.result import variables
@@ -56,23 +53,6 @@ def test_speeds_and_counts_of_a_dynamic_model_are_written():
     assert str(speed["speed_unit"].item()) == "m/s"
     assert {count: int(dataset[count]) for count in DYNAMIC_COUNTS} == run.counts
     assert not set(dataset.variables) & (set(ALGEBRAIC_COUNTS) - set(DYNAMIC_COUNTS))
-
-
-def test_measures_of_an_error():
-    error = np.array([[3.0, 0.0], [-4.0, 1.0]])
-    assert rms(error) == pytest.approx([np.sqrt(12.5), np.sqrt(0.5)])
-    assert list(max_abs(error)) == [4.0, 1.0]
-    assert list(signal_range(error)) == [7.0, 1.0]
-    assert np.isnan(rms(np.array([[1.0], [np.nan]]))).all()
-
-
-def test_the_clock_does_not_run_while_others_have_the_processor():
-    assert run_timer.clock is time.thread_time
-
-
-def test_the_clock_is_read_around_a_run(monkeypatch):
-    monkeypatch.setattr(run_timer, "clock", iter((2.0, 7.0)).__next__)
-    assert timed(lambda: "done") == ("done", 5.0)
 
 
 def test_stored_seconds_name_their_clock(model, full):
@@ -117,11 +97,6 @@ def test_copies_hold_the_same_histories():
     for copy in (pickle.loads(pickle.dumps(kept)), replace(kept, remark="seen")):  # noqa: S301
         np.testing.assert_array_equal(copy.states, kept.states)
         np.testing.assert_allclose(copy["pitch"], kept["pitch"], rtol=1e-11)
-
-
-def test_a_run_is_no_sequence():
-    with pytest.raises(TypeError):
-        list(run("independent_suspension_vehicle"))
 
 
 RUNS = [(CAR, "lane_change"), (CAR, "step_steer")]

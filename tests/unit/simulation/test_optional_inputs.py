@@ -12,7 +12,6 @@ from vehiclemor.simulation.trajectory import Trajectory
 CAR = "independent_suspension_vehicle"
 BRAKES = tuple(f"brake_torque_{wheel}" for wheel in WHEELS)
 FRICTIONS = tuple(f"friction_{wheel}" for wheel in WHEELS)
-TIMES = np.linspace(0.0, 3.0, 151)
 
 
 def braking(torque: float, duration: float = 3.0, **columns: float) -> vm.Signal:
@@ -193,14 +192,6 @@ def test_a_run_that_stops_where_the_full_order_drives_on_has_failed():
 def test_methods_say_what_they_cannot_learn_from(reduced, words):
     with pytest.raises(InputError, match=words):
         reduced()
-
-
-def test_what_a_run_drives_is_no_parameter_of_it():
-    slippery = car(friction_FL=0.4)
-    run = slippery.simulate(braking(100.0, friction_FL=1.0))
-    np.testing.assert_allclose(run.states, car().simulate(braking(100.0)).states, 1e-6, 1e-6)
-    result = vm.simulate(slippery, maneuver=braking(100.0, friction_FL=1.0))
-    assert result["status"] == "ok"
 
 
 def test_amplitudes_leave_friction_as_it_is(tmp_path):

@@ -1,20 +1,15 @@
 """Structures: runs are those of other integrators and of textbook formulas; static states stand."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import root
-from scipy.sparse import csc_array, eye_array, random_array
+from scipy.sparse import csc_array
 from scipy.sparse.linalg import spsolve
 
 import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
-from vehiclemor.simulation.structures.model import Periods, relative_error, wrong_matrices
-from vehiclemor.simulation.structures.sparse_loops import solve
-from vehiclemor.simulation.structures.system import DAMPED, blocks_of, factored, weights_of
+from vehiclemor.simulation.structures.model import Periods, relative_error
 
 TRUCK, HEIGHTS = "flexible_truck", ("road_FL", "road_FR", "road_RL", "road_RR")
 # Nothing takes energy away, and the tire, which is one-sided and damped, is gone.
@@ -86,55 +81,7 @@ def test_a_run_is_that_of_another_integrator_and_of_second_order(chain):
             assert remark == f"off the ground for a time: A (first at {lifted:.4g} s)"
 
 
-def test_each_step_is_the_textbooks_with_all_matrices_dense(chain):
-    model, h, steps = chain(rate=4000.0), 2e-3, 60
-    m, c, k, b, law, (rest, held) = dense(model)
-    inputs = whole(signal(0.06), model).at(h * np.arange(steps + 1))
-    # Chung and Hulbert's parameters for a spectral radius of 0.8 at infinity.
-    a_m, a_f = 0.6 / 1.8, 0.8 / 1.8
-    gamma, beta = 0.5 - a_m + a_f, 0.25 * (1.0 - a_m + a_f) ** 2
-    q, v, a = np.zeros((3, model.size))
-    force = law(rest, 0.0 * rest, inputs[0]) - held
-    for u in inputs[1:]:
-
-        def at_the_end(a_next, q=q, v=v, a=a):
-            q_next = q + h * v + h**2 * ((0.5 - beta) * a + beta * a_next)
-            return q_next, v + h * ((1.0 - gamma) * a + gamma * a_next)
-
-        def residual(a_next, q=q, v=v, a=a, force=force, u=u, at_the_end=at_the_end):
-            q_next, v_next = at_the_end(a_next)
-            f = (1.0 - a_f) * (law(rest + b.T @ q_next, b.T @ v_next, u) - held) + a_f * force
-            moved, rate = (1.0 - a_f) * q_next + a_f * q, (1.0 - a_f) * v_next + a_f * v
-            return m @ ((1.0 - a_m) * a_next + a_m * a) + c @ rate + k @ moved - b @ f
-
-        a_next = root(residual, a, tol=1e-13).x
-        (q, v), a = at_the_end(a_next), a_next
-        force = law(rest + b.T @ q, b.T @ v, u) - held
-    state = np.zeros((3, model.size))
-    assert model.system.integrate(state, inputs, h, 1)[3] == 0
-    for found, expected in zip(state, (q, v, a), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-8 * np.abs(expected).max())
-
-
 # Matrices
-
-
-def test_blocks_of_factors_solve_as_another_solver_does(truck):
-    rng = np.random.default_rng(4)
-    sparse = random_array((150, 150), density=0.03, rng=rng)
-    shells = vm.model(TRUCK, {"shell_size": 0.5}).system.structure
-    _, (of_mass, _, of_stiffness) = weights_of(1e-3, shells.damping_time, DAMPED)
-    for matrix in (
-        csc_array(sparse @ sparse.T + eye_array(150)),
-        csc_array(of_mass * shells.mass + of_stiffness * shells.stiffness),
-    ):
-        order = np.argsort(factored(matrix, "MMD_AT_PLUS_A").perm_c)
-        factor, b = factored(matrix[order][:, order]), rng.standard_normal(matrix.shape[0])
-        x, blocks = b[order], blocks_of(factor.L)
-        assert np.diff(blocks.columns).max() > 3
-        solve(blocks, 1.0 / factor.U.diagonal(), x, np.empty_like(x))
-        expected = spsolve(matrix, b)[order]
-        np.testing.assert_allclose(x, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
 def test_a_static_state_is_that_of_a_direct_solution(chain, truck):
@@ -229,17 +176,6 @@ def test_wrong_input_is_told_in_one_line(chain, wrong, words):
         chain().simulate(**given)
 
 
-def test_a_road_alike_on_both_sides_needs_no_shorter_steps():
-    heights = np.repeat(np.sin(np.linspace(0.0, np.pi, 101))[:, None] ** 2, 4, axis=1)
-    names, times = [f"road_{w}" for w in ("FL", "FR", "RL", "RR")], np.linspace(0.0, 1.0, 101)
-    steps = []
-    for lower in (0.0, 1e-3):
-        u = 0.02 * heights * (1.0 - lower * np.array([0.0, 1.0, 0.0, 1.0]))
-        given = vm.Signal.from_samples(times, u, "cubic", inputs=names, output_step=0.01)
-        steps.append(vm.model(TRUCK).run(given).counts["steps"])
-    assert steps[0] <= steps[1]
-
-
 def test_steps_are_judged_between_output_times_that_are_far_apart(chain):
     model, given = chain(), vm.Signal.from_function(bump(0.02), 2.0, inputs=["z"], output_step=2.0)
     fine = vm.Signal.from_function(bump(0.02), 2.0, inputs=["z"], output_step=0.01)
@@ -250,20 +186,3 @@ def test_steps_are_judged_between_output_times_that_are_far_apart(chain):
 def test_a_tolerance_that_no_step_meets_is_told(chain):
     assert "of an output's range" in chain().run(signal(), tolerance=1e-12).remark
     assert chain().run(signal(), tolerance=1e-2).remark == ""
-
-
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        ({"mass": lambda m: m[:-1]}, "mass has shape"),
-        ({"stiffness": lambda m: m * np.nan}, "stiffness has an entry that is not finite"),
-        ({"ports": lambda m: m[:, :1]}, "ports has shape"),
-    ],
-)
-def test_matrices_that_do_not_fit_are_one_line(chain, change, text):
-    structure = chain().system.structure
-    (name, changed), *_ = change.items()
-    wrong = dataclasses.replace(structure, **{name: changed(getattr(structure, name))})
-    law, outputs = chain().system.law, len(chain().outputs)
-    assert text in wrong_matrices(wrong, law.static.shape[1], outputs)
-    assert wrong_matrices(structure, law.static.shape[1], outputs) == ""

@@ -88,15 +88,6 @@ def test_a_tighter_tolerance_gives_a_smaller_error(model, solver):
     assert errors[-1] < 1e-7
 
 
-def test_rosenbrock_steps_are_not_limited_by_stiffness(standard):
-    stiff = standard(rate=1e6)
-    end = np.array([8.0])
-    soft = integrate(standard(), DRIVEN, "rodas4", 1e-5, end)
-    found = integrate(stiff, DRIVEN, "rodas4", 1e-5, end)
-    assert found.states[0, TRACKED] == pytest.approx(math.cos(8.0), abs=1e-6)
-    assert found.counts["steps"] < 4 * soft.counts["steps"]
-
-
 @pytest.mark.parametrize("solver", STIFF)
 def test_a_stiff_transient_is_damped_at_once(standard, solver):
     # Decay by exp(-1e8): a method that is stable but not L-stable would carry the distance on.
@@ -160,19 +151,6 @@ def test_the_calls_that_are_counted_are_those_that_are_made(solver):
     assert len(made) == run.counts[0] > 50
 
 
-@pytest.mark.parametrize("solver", INTEGRATORS)
-def test_the_calls_that_are_counted_are_the_calls_that_are_allowed(model, monkeypatch, solver):
-    monkeypatch.setattr(catalogue, "MOST_CALLS", 10)
-    # Limits of a run are kept for further runs.
-    catalogue.control_of.cache_clear()
-    found = integrate(model, DRIVEN, solver, 1e-9, DRIVEN.times)
-    catalogue.control_of.cache_clear()
-    assert found.status == "diverged"
-    assert "more than 100000 evaluations of the right-hand side in 1 s" in found.message
-    # A step is finished that was begun.
-    assert 10 < found.counts["rhs_calls"] <= 30
-
-
 def test_calls_are_limited_in_each_second_however_long_the_run(monkeypatch):
     monkeypatch.setattr(catalogue, "MOST_CALLS", 500)
     catalogue.control_of.cache_clear()
@@ -208,17 +186,6 @@ def windows(edges, mean, rows) -> ControlPeriods:
 
 
 REDUCED = [name for name in INTEGRATORS if not frozen(name)]
-
-
-@pytest.mark.parametrize("solver", REDUCED)
-def test_windows_that_hold_the_solution_do_not_change_it(model, solver):
-    rng, times = np.random.default_rng(7), np.linspace(0.0, 8.0, 33)
-    turned = [np.linalg.qr(rng.normal(size=(4, 4)))[0] for _ in range(3)]
-    space = windows([0.0, 1.3, 4.0, 8.0], rng.normal(size=(3, 4)), turned)
-    found = model.integrate(DRIVEN, model.start(), space, Solver(solver, 1e-9, times))
-    assert found.status == "ok"
-    np.testing.assert_allclose(found.states[:, ANGLE], np.cos(times), atol=1e-7)
-    np.testing.assert_allclose(found.states[:, ANGULAR_SPEED], -np.sin(times), atol=1e-7)
 
 
 @pytest.mark.parametrize("solver", REDUCED)
