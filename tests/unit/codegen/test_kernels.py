@@ -14,10 +14,10 @@ from tests.unit.programs import run
 from vehiclemor.codegen import cache
 from vehiclemor.codegen import kernels as module
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.lowering import Batch, kernels_of, schedule
+from vehiclemor.codegen.lowering import kernels_of
 from vehiclemor.codegen.operations import COUNTED, Kernel
 from vehiclemor.multibody.double_wishbone.definition import DEFINITION
-from vehiclemor.symbolic.program import Function, Program, assemble
+from vehiclemor.symbolic.program import Program, assemble
 from vehiclemor.symbolic.tape import Tape
 
 x, y, p = sp.symbols("x y p", real=True)
@@ -56,14 +56,6 @@ def program_of(expression: sp.Expr) -> Program:
 def test_operation_counts_of_expressions_counted_by_hand(expression, expected):
     counts = kernels_of(program_of(expression))["f"].counts
     assert counts == dict.fromkeys(COUNTED, 0) | expected | {"total": sum(expected.values())}
-
-
-def test_each_angle_of_the_model_is_evaluated_once(model):
-    for name in ("residual", "residual_jacobian", "newton_step"):
-        assert model.operation_counts[name]["trigonometric"] == 2 * 7
-    # The eighth pivot is the rack's, which is 1.
-    assert model.operation_counts["newton_step"]["divide"] == 7
-    assert model.operation_counts["residual_jacobian"]["divide"] == 0
 
 
 def test_kernels_are_the_specified_residual_and_its_derivatives(model, program, points, rng):
@@ -118,19 +110,6 @@ def product(x, u, constants, result):
 
 
 DOUBLE, PRODUCT = times(2.0), kernel(product, columns=2)
-
-
-def test_the_same_quantity_of_all_wheels_stands_side_by_side_in_one_batch():
-    a, b, slips, angles, assignments = *sp.symbols("a b"), [], [], []
-    for wheel in range(4):
-        x, slip, angle = (sp.Symbol(f"{name}{wheel}") for name in ("x", "slip", "angle"))
-        # What common subexpressions leave behind: signs and orders of operands differ.
-        assignments += [(slip, a - x if wheel % 2 else a + x), (angle, b / (x * x + 1))]
-        slips, angles = [*slips, slip], [*angles, angle]
-    results = tuple(sp.atan(s) * sp.atan(t) for s, t in zip(slips, angles, strict=True))
-    steps = schedule(Function(tuple(assignments), results, (4,)))
-    (batch,) = [step for step in steps if isinstance(step, Batch)]
-    assert {batch.arguments[:4], batch.arguments[4:]} == {tuple(slips), tuple(angles)}
 
 
 @pytest.fixture
@@ -202,12 +181,3 @@ def test_the_identity_of_the_compiler_names_versions_and_processor(monkeypatch):
             patch.setattr(where, name, changed)
             assert identity() != before
     assert identity() == before
-
-
-def test_what_is_missing_has_no_address():
-    kernels = Kernels([DOUBLE])
-    assert "triple" not in kernels
-    assert kernels.address("triple") == 0
-    _, _, code = module._machine.__wrapped__(kernels.sources["double"])
-    with pytest.raises(ImportError, match="triple"):
-        code.address("triple")

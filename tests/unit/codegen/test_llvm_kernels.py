@@ -61,17 +61,6 @@ def test_functions_and_powers_keep_their_values():
     np.testing.assert_allclose(found.ravel(), expected, rtol=1e-14)
 
 
-@pytest.mark.parametrize("count", [2, 3, 8, 11])
-@pytest.mark.parametrize("function", [sp.sin, sp.atan])
-def test_batches_with_and_without_padding(count, function):
-    symbols = sp.symbols(f"a:{count}", real=True)
-    results = [function(s) + p for s in symbols]
-    program = assemble(Tape(), {"q": symbols}, [p], {"f": (results, (count,))})
-    values = dict(zip(symbols, np.linspace(-40.0, 55.0, count), strict=True)) | {p: 0.25}
-    expected = run(program, "f", values)
-    np.testing.assert_allclose(result_of(program, values), expected, rtol=1e-13, atol=1e-15)
-
-
 def test_arrays_of_another_kind_are_refused():
     def first(x, result):
         result[0] = x[0]

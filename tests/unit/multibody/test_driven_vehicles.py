@@ -9,9 +9,7 @@ from tests.models import CAR, FIDELITY
 from tests.oracles import high_fidelity_vehicle as fidelity_oracle
 from tests.oracles import vehicle_lagrange as oracle
 from tests.oracles.projected_simulation import projected_state
-from vehiclemor.inputs.driving import BRAKING, MASS, RADIUS
 from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, WHEELS
-from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 
@@ -121,43 +119,6 @@ def test_energy_changes_by_the_work_of_inputs_and_slip(car):
     # It brakes by more than a tenth of its energy.
     assert stored[0] - stored[-1] > 0.1 * stored[0]
     assert stored[-1] - stored[0] == pytest.approx(state[28], abs=1e-6 * stored[0])
-
-
-@pytest.mark.parametrize(("speed", "limit"), [(20.0, 14e-3), (5.0, 3.5e-3)])
-def test_a_step_of_runge_kutta_is_limited_by_wheel_slip(speed, limit):
-    """The classical formula of order 4 at straight running; slip stiffens as the car slows."""
-    model = build(CAR, overrides={"initial_speed": speed})
-    eigenvalues = np.linalg.eigvals(model.jacobian(model.start(), [0.0]))
-
-    def growth(step: float) -> float:
-        z = step * eigenvalues[np.abs(eigenvalues) > 1e-3]
-        return np.abs(1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24).max()
-
-    assert growth(0.95 * limit) < 1.0 < growth(1.05 * limit)
-
-
-def test_torques_of_zero_keep_the_lane_of_the_high_fidelity_vehicle(fidelity):
-    """With torques its tires are combined: the lane change moves by less than a millimetre."""
-    lane_change = component("maneuver", "rack_lane_change")
-    times = np.linspace(0.0, 10.0, 101)
-    steered = build(FIDELITY).simulate(lane_change, times=times)
-    torques = fidelity.simulate(lane_change, times=times)
-    moved = steered["lateral_position"] - torques["lateral_position"]
-    assert 1e-5 < np.abs(moved).max() < 1e-3
-
-
-@pytest.mark.parametrize("amplitude", [1.0, 0.8 / 0.3])
-def test_brakes_slow_the_mass_and_the_spinning_wheels(amplitude):
-    fast = vm.model(CAR, {"initial_speed": 30.0})
-    run = fast.simulate(vm.maneuver("straight_braking", amplitude=amplitude))
-    p = fast.parameters.values()
-    spinning = 4 * p["spin_inertia"] / RADIUS**2
-    mass = p["sprung_mass"] + 4 * p["unsprung_mass"] + spinning
-    speed = np.interp([1.7, 3.7], run.times, run["longitudinal_speed"])
-    # The loaded radius of a wheel changes with its load, by some percent.
-    deceleration = (speed[0] - speed[1]) / 2.0
-    assert deceleration == pytest.approx(MASS * BRAKING * amplitude / mass, rel=0.03)
-    assert (run["pitch"][50:100] > -1e-6).all()
 
 
 def test_locked_wheels_use_the_friction_that_there_is():
