@@ -132,20 +132,6 @@ def test_single_precision_is_single_everywhere_and_as_accurate(drivers, kind, in
         subprocess.run([*command, source], cwd=single.parent, check=True)
 
 
-def test_the_header_names_sizes_step_and_integrator(drivers):
-    options = {"integrator": "ros2", "step": 0.02, "precision": "single", "outputs": ("yaw_rate",)}
-    model, driver = drivers(CAR, "full", **options)
-    header = (driver.parent / "vehiclemor_model.h").read_text()
-    defined = dict(re.findall(r"#define VEHICLEMOR_(\w+) (\S+)$", header, re.MULTILINE))
-    assert {"INTEGRATOR": '"ros2"', "STEP": "0.02", "INPUTS": "1"}.items() <= defined.items()
-    assert int(defined["STATES"]) == len(model.states)
-    assert int(defined["OUTPUTS"]) == 1
-    # Rates, two stages and a shifted state.
-    assert int(defined["SCRATCH"]) == 4 * len(model.states)
-    assert "typedef float" in header
-    assert "vehiclemor_solve" in header
-
-
 @pytest.mark.parametrize("kind", ["full", "reduced"])
 def test_the_suspension_needs_no_states(drivers, kind):
     model, driver = drivers("double_wishbone", kind)

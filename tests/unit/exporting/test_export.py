@@ -1,10 +1,7 @@
 """Exported systems give the model's numbers over the values of other libraries; refusals."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-import sympy as sp
 
 import vehiclemor as vm
 from tests.models import CAR
@@ -56,15 +53,6 @@ def test_casadi(name, kind, rng, tmp_path):
     assert (kept(states.T, inputs.T, parameters)[0].full() == found[0].full()).all()
 
 
-@pytest.mark.parametrize("name", ["independent_suspension_vehicle", "high_fidelity_vehicle"])
-def test_a_full_model_tells_the_parameters_of_its_function(name):
-    pytest.importorskip("casadi")
-    model = vm.model(name)
-    x, u = model.start(), [0.01, *[0.0] * (len(model.inputs) - 1)]
-    rates = vm.export(model, "casadi")(x, u, model.parameter_values)[0].full().ravel()
-    np.testing.assert_allclose(rates, model.rhs(x, u), rtol=1e-10, atol=1e-9)
-
-
 def test_jax_over_a_batch_and_by_tables(rng):
     jax = pytest.importorskip("jax")
     jax.config.update("jax_enable_x64", True)
@@ -78,25 +66,6 @@ def test_jax_over_a_batch_and_by_tables(rng):
     ends = [0, -1]
     _, outputs = jax.vmap(vm.export(model, "jax"))(np.zeros((2, 0)), inputs)
     assert np.abs(np.asarray(outputs)[:, :-1] - run.outputs[ends]).max() < 1e-13
-
-
-def test_sympy(rng):
-    model = in_use("independent_suspension_vehicle", "full")
-    states, inputs = around(model, rng)
-    expressions = vm.export(model, "sympy")
-    assert [symbol.name for symbol in expressions.x] == list(model.states)
-    values = system_of(model).values
-    found = []
-    for results in (expressions.derivative, expressions.outputs):
-        function = sp.lambdify(
-            [expressions.x, expressions.u, expressions.p],
-            results,
-            modules="math",
-            cse=lambda _, results=results: (expressions.assignments, [*results]),
-        )
-        rows = [function(x, u, values) for x, u in zip(states, inputs, strict=True)]
-        found.append(np.array(rows))
-    agree(found, states, model, inputs)
 
 
 @pytest.mark.parametrize(
@@ -152,30 +121,3 @@ def test_nothing_is_replaced_unasked(tmp_path, monkeypatch, capsys):
     assert main([*command, "--overwrite"]) == 0
     assert {path.name: path.read_text() for path in folder.iterdir()} == written
     assert [path.name for path in tmp_path.iterdir()] == [folder.name]
-
-
-def test_what_is_not_ours_is_never_replaced(tmp_path):
-    letter = tmp_path / "mine" / "letter.txt"
-    letter.parent.mkdir()
-    letter.write_text("dear")
-    for to in ("c", "fmu"):
-        with pytest.raises(vm.VehiclemorError, match="mine"):
-            vm.export(CAR, to, letter.parent, overwrite=True)
-    assert letter.read_text() == "dear"
-
-
-def test_a_failure_on_the_way_leaves_what_was_there(tmp_path, monkeypatch):
-    path = vm.export(vm.rom(CAR), "c", tmp_path / "car")
-    before = {file.name: file.read_text() for file in path.iterdir()}
-    write = Path.write_text
-
-    def full(path, *given, **further):
-        if path.suffix == ".h":
-            raise OSError(28, "No space left on device")
-        return write(path, *given, **further)
-
-    monkeypatch.setattr(Path, "write_text", full)
-    with pytest.raises(vm.VehiclemorError, match="No space left"):
-        vm.export(CAR, "c", path, overwrite=True)
-    assert {file.name: file.read_text() for file in path.iterdir()} == before
-    assert list(tmp_path.iterdir()) == [path]

@@ -1,7 +1,6 @@
 """Functional mock-up units, through FMPy: its checker, both interfaces, derivatives, states."""
 
 import shutil
-import subprocess
 from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
@@ -13,11 +12,6 @@ import pytest
 import vehiclemor as vm
 from tests.unit.exporting.programs import in_use, relative, runge_kutta, steering
 from vehiclemor.exporting import fmu
-from vehiclemor.exporting.c import START_ALONE, c_files
-from vehiclemor.exporting.export import system_of
-from vehiclemor.exporting.fmu import variables_of
-from vehiclemor.exporting.systems import CSettings
-from vehiclemor.simulation.evaluation import hoisted_constants
 
 fmpy = pytest.importorskip("fmpy")
 validate_fmu = pytest.importorskip("fmpy.validation").validate_fmu
@@ -232,36 +226,6 @@ def test_a_parameter_that_is_set_is_the_parameter(started):
     assert np.abs(found - model.rhs(unit.get(states), [0.0])).max() > 0.1
 
 
-@pytest.mark.parametrize("name", ["independent_suspension_vehicle", "high_fidelity_vehicle"])
-def test_parameters_are_those_that_rates_or_outputs_change_with(name, rng):
-    model = vm.model(name)
-    moved = model.start() + 1e-3 * rng.standard_normal(len(model.start()))
-    u, system = 0.01 * rng.standard_normal(len(model.inputs)), system_of(model)
-
-    def found(values):
-        constants, rows = hoisted_constants(model.equations, values, ()), []
-        # At rest slips have other parameters.
-        for x in (moved, 1e-3 * moved):
-            for kernel in ("derivative", "outputs"):
-                rows.append(np.empty(model.equations.shapes[kernel]))
-                model.kernels.call(kernel, x, u, constants, rows[-1])
-        return np.concatenate(rows)
-
-    own, acting = found(system.values), set()
-    for i, q in enumerate(system.parameters):
-        values = system.values.copy()
-        values[i] += 0.01 * max(abs(values[i]), 1.0)
-        if not np.array_equal(found(values), own):
-            acting.add(f"parameter.{q.name}")
-    listed = [v.name for v in variables_of(system).values() if v.causality == "parameter"]
-    # Where on the axis of the rear arms their pivot lies is in the equations, and cancels.
-    assert set(listed) - acting <= {"parameter.rear_arm_pivot.y"}
-    assert acting <= set(listed)
-    assert "parameter.initial_speed" not in acting
-    header = c_files(system, CSettings(STEP))["vehiclemor_model.h"]
-    assert header.count(START_ALONE) == len(system.parameters) - len(listed) > 0
-
-
 def test_what_is_refused_leaves_all_as_it_was(started):
     _, unit = started(*CASES[0])
     state = next(name for name in unit.number if name.startswith("state."))
@@ -287,17 +251,6 @@ def test_a_state_that_was_kept_is_gone_back_to(started, case):
         unit.slave.setFMUstate(state)
     assert np.array_equal(*ends)
     unit.slave.freeFMUstate(state)
-
-
-def test_declarations_are_those_of_the_standards_header(units, tmp_path):
-    _, path = units(*CASES[1])
-    with ZipFile(path) as archive:
-        archive.extractall(tmp_path)
-    headers = Path(fmpy.__file__).parent / "c-code"
-    options = ["-std=c11", "-Wall", "-Werror", "-fsyntax-only", "-DFMI2_HEADER"]
-    source = tmp_path / "sources" / "vehiclemor_fmi2.c"
-    command = ["cc", *options, f"-I{headers}", source]
-    subprocess.run(command, check=True)
 
 
 def test_a_path_map_has_neither_states_nor_rates(tmp_path):
