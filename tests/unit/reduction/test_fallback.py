@@ -4,11 +4,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.fallback import FallbackModel
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods.full_order import FullOrderSystem
@@ -78,33 +76,6 @@ def test_a_reduced_run_that_fails_without_a_warning_is_trusted_nowhere():
     run = guarded(LeavesAt(3.0, status="diverged", told=False)).simulate(STEER, "dropped")
     np.testing.assert_array_equal(run.outputs, whole().outputs)
     assert run.remark.startswith("full_order did the run: why, from t = 0 s on")
-
-
-def test_warnings_of_the_full_order_stay():
-    class Doubtful(FullOrderSystem):
-        def simulate(self, *given):
-            return super().simulate(*given).judged(Trust(3.0, 4.0, "an arm is beyond"))
-
-    full = Doubtful(model(), "dopri5", TOLERANCE)
-    run = replace(guarded(LeavesAt(2.0)), full=full).simulate(STEER, "dropped")
-    assert run.status == "untrusted"
-    assert "an arm is beyond" in run.message
-
-
-@pytest.mark.parametrize(
-    "settings", [{"safe_solver": "rodas4", "safe_tolerance": 1e-5}, {"fallback": "rodas4"}]
-)
-def test_guarded_has_a_fallback_by_either_name(settings):
-    method = component("method", "guarded")
-    chosen = validated(method, "ode", settings)
-    assert chosen.fallback == "rodas4"
-    assert chosen.fallback_tolerance == settings.get("safe_tolerance", 1e-4)
-
-
-def test_wrong_fallbacks_are_refused():
-    for method, wrong in (("slow_manifold", "euler"), ("guarded", "none")):
-        with pytest.raises(InputError, match=f"{method}: fallback"):
-            validated(component("method", method), "ode", {"fallback": wrong})
 
 
 def test_settings_reach_both_models():

@@ -66,31 +66,6 @@ def test_fixed_basis_is_pod_with_one_control_period(model, nominal):
     np.testing.assert_array_equal(runs[0].coordinates, runs[1].coordinates)
 
 
-def test_offline_cost_counts_the_training_simulations(model, nominal):
-    few, many = (fitted(model, nominal, "pod", snapshots=n).offline.evaluations for n in (5, 50))
-    # Every snapshot but the two at the design position takes at least two Newton iterations.
-    assert 2 * 8 <= few < many
-    assert fitted(model, nominal, "full_order").offline.evaluations == 0
-
-
-@pytest.mark.parametrize(
-    ("method", "settings", "words"),
-    [
-        ("pod", {"rank": 9, "snapshots": 20}, "rank 9 .* 8 coordinates"),
-        ("pod", {"rank": 6, "snapshots": 5}, "rank 6 .* snapshots 5"),
-        ("fixed_basis", {"rank": 9}, "rank 9 .* 8 coordinates"),
-        ("pod", {"reversed_coordinates": "theta"}, "'theta'"),
-        ("pod", {"rank": 0}, "rank is 0"),
-        ("pod", {"control_period": 0}, "control_period is 0"),
-        ("pod", {"test_space": "petrov"}, "least_squares, galerkin"),
-        ("pod", {"ranks": 3}, "'ranks'"),
-    ],
-)
-def test_wrong_settings_are_named(model, nominal, method, settings, words):
-    with pytest.raises(InputError, match=words):
-        fitted(model, nominal, method, **settings)
-
-
 def test_iteration_that_fails_is_a_result(model, nominal):
     reduced = fitted(model, nominal, "pod", "nominal", rank=3, test_space="galerkin")
     broken = tuple(np.zeros_like(test) for test in reduced.tests)
@@ -99,16 +74,6 @@ def test_iteration_that_fails_is_a_result(model, nominal):
     assert "singular at t = 0 s" in run.message
     assert np.isnan(run.coordinates).all()
     assert np.isnan(run.outputs[:, 0]).all()
-
-
-def test_a_run_has_the_histories_of_its_trajectory(model, nominal):
-    [run] = training_runs(model, nominal)
-    recorded = run.recorded()
-    for name in ("times", "inputs", "states", "outputs"):
-        np.testing.assert_array_equal(getattr(run, name), getattr(recorded, name))
-    assert run.outputs is run.outputs
-    with pytest.raises(AttributeError, match="rank"):
-        _ = run.rank
 
 
 def test_snapshots_of_several_runs_are_put_side_by_side(model, nominal):
@@ -178,15 +143,6 @@ def test_replay_weighs_each_input_by_its_range_in_training():
     replay = vm.reduce("double_wishbone", "replay", training=training)
     first = replay.model.simulate(training[0])
     np.testing.assert_array_equal(replay.simulate(moved(0.07, 0.01)).states, first.states)
-
-
-def test_replay_saves_runs_of_other_online_parameters(tmp_path):
-    runs = DIFFERENT["flexible_truck"]
-    replay = vm.reduce("flexible_truck", "replay", training=runs)
-    again = vm.load(replay.save(tmp_path / "truck.nc"))
-    for rom in (replay, again):
-        run = rom.for_parameters({"payload": 5e3}).simulate(runs[1].maneuver)
-        np.testing.assert_array_equal(run.outputs, reference_run(rom.model, runs[1]).outputs)
 
 
 @given(size=st.floats(0.0, 3.0), sample=st.integers(0, 9), column=st.integers(0, 1))
@@ -271,14 +227,3 @@ def test_wrong_preset_is_caught_too():
         validated(declared(mine={"rank": 0}), "ode", {}, "mine")
     with pytest.raises(InputError, match="'mime'; did you mean mine"):
         validated(declared(mine={}), "ode", {}, "mime")
-
-
-@given(rank=st.integers(1, 10**9), period=st.floats(1e-9, 1e9))
-def test_allowed_numbers_pass_with_their_declared_type(rank, period):
-    settings = validated(declared(), "ode", {"rank": float(rank), "period": period})
-    assert settings.rank == rank
-    assert type(settings.rank) is int
-    assert settings.period == period
-    assert type(settings.period) is float
-    assert type(validated(declared(), "ode", {"period": 2}).period) is float
-    assert validated(declared(), "ode", {"rank": np.int64(rank)}).rank == rank

@@ -3,7 +3,6 @@
 import copy
 import pickle
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +10,6 @@ import pytest
 import vehiclemor as vm
 from tests.models import CAR, WISHBONE
 from vehiclemor.exceptions import ConvergenceError, InputError
-from vehiclemor.inputs.maneuver import Maneuver, smooth
-from vehiclemor.registry import component
-from vehiclemor.simulation.integrators.catalogue import MOST_CALLS
-from vehiclemor.study.scenario import Scenario
 
 
 @pytest.fixture(scope="module")
@@ -55,27 +50,6 @@ def test_the_full_model_answers_as_the_model_itself(full):
     np.testing.assert_array_equal(full.outputs(path, inputs), rows)
 
 
-def test_the_order_of_named_columns_changes_no_trust():
-    t = np.linspace(0.0, 2.0, 101)
-    u = np.column_stack([0.1 * np.sin(t), 0.01 * np.cos(t)])
-    trained = vm.reduce(WISHBONE, "fixed_basis", training=[vm.Signal.from_samples(t, 1.01 * u)])
-    steered = np.column_stack([0.0 * t, 0.02 * np.sin(t)])
-    named = trained.inputs[::-1]
-    one = trained.simulate(vm.Signal.from_samples(t, steered))
-    other = trained.simulate(vm.Signal.from_samples(t, steered[:, ::-1], inputs=named))
-    assert one.trust == other.trust
-    assert one.trust.indicator > 1.5
-    first = vm.Signal.from_samples(t, u[:, 0], inputs=trained.inputs[:1])
-    whole = vm.Signal.from_samples(t, np.column_stack([u[:, 0], 0.0 * t]))
-    assert trained.simulate(first).trust == trained.simulate(whole).trust
-    again = vm.reduce(
-        WISHBONE,
-        "fixed_basis",
-        training=[vm.Signal.from_samples(t, 1.01 * u[:, ::-1], inputs=named)],
-    )
-    np.testing.assert_array_equal(again.input_range.largest, trained.input_range.largest)
-
-
 def test_a_run_is_a_dataset_when_asked(linear):
     run = linear.simulate("step_steer", start="dropped")
     dataset = linear.dataset(run)
@@ -101,32 +75,6 @@ def test_a_state_is_that_of_its_inputs():
     first, other, again = (rom.state("equilibrium", [s, 0.0, 0.0]) for s in (0.0, 0.01, 0.0))
     np.testing.assert_array_equal(again, first)
     assert np.abs(other - first).max() > 1e-3
-
-
-def test_a_loop_may_go_on_for_ever(linear):
-    state, u = linear.state(), np.zeros(1)
-    for _ in range(MOST_CALLS // 3):
-        state = linear.step(state, u, 1e-3)
-    assert state[linear.states.index("X")] == pytest.approx(MOST_CALLS // 3 * 20e-3, rel=1e-6)
-
-
-def test_runs_of_all_methods_are_judged_by_their_error(full, linear):
-    wider = component("maneuver", "lane_change").perturbed(1.0, 1.3)
-    pod = vm.reduce(full.model, "pod", training="lane_change")
-    assert pod.simulate("lane_change").status == "ok"
-    run = pod.simulate(wider)
-    assert run.status == "untrusted"
-    assert "the estimated error of" in run.message
-    assert linear.simulate(wider).status == "untrusted"
-    # What reads no training knows no range.
-    assert linear.trust(linear.state(), [0.1]).reason == ""
-
-
-def test_nothing_is_trusted_where_the_full_model_means_nothing(full):
-    upright, lying = full.state(), full.state()
-    lying[full.states.index("phi")] = 1.4
-    assert full.trust(upright, [0.0]).reason == ""
-    assert "the model holds" in full.trust(lying, [0.0]).reason
 
 
 @pytest.mark.parametrize("delta", [1e10, -1.1])
@@ -156,39 +104,6 @@ def test_a_copy_of_a_used_model_is_the_same(request, name):
         for found, expected in zip(answers(copied), known, strict=True):
             np.testing.assert_array_equal(found, expected)
         assert copied.input_range.longest == rom.input_range.longest
-
-
-def lifted_wheel():
-    def signal(times, _, __):
-        return np.stack([0.1 * times, 0.0 * times], axis=1)
-
-    return Maneuver("lift", "", signal, ("z", "s0"), 1.0, 11, smooth)
-
-
-def test_training_is_a_name_or_what_is_handed_in(full, wishbone):
-    car, own = full.model, Scenario(component("maneuver", "lane_change"), "equilibrium")
-    assert len(wishbone.training) == 1
-    assert wishbone.training[0].maneuver.name == "travel_and_rack"
-    # A method that does not compete in the protocol.
-    assert vm.reduce(car, "pod").training == (own,)
-    assert vm.reduce(car, "pod", training=[own.maneuver]).training == (own,)
-    dropped = Scenario(own.maneuver, "dropped", 21.0)
-    assert vm.reduce(car, "pod", training=[dropped]).training == (dropped,)
-    assert vm.reduce(wishbone.model, "path_map", training=[lifted_wheel()], cells=2).training
-
-
-STEERED = component("maneuver", "lane_change")
-# Method, what is wrong.
-WRONG: list[tuple[str, dict[str, Any]]] = [
-    *(("pod", {"training": training}) for training in ("matched", [], [STEERED], [3])),
-    *(("podd", {}), ("pod", {"ranc": 3}), ("slow_manifold", {})),
-]
-
-
-@pytest.mark.parametrize(("method", "given"), WRONG)
-def test_what_cannot_be_reduced_is_refused(method, given):
-    with pytest.raises(InputError):
-        vm.reduce(WISHBONE, method, **given)
 
 
 BAD_STEPS = [

@@ -11,7 +11,6 @@ import vehiclemor as vm
 from tests.models import TRUCK
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.projection.structural import ReducedStructure, modes_within
-from vehiclemor.registry import component, names
 from vehiclemor.simulation.structures.model import relative_error
 
 HEIGHTS = ("road_FL", "road_FR", "road_RL", "road_RR")
@@ -41,11 +40,6 @@ def model(chain):
 @cache
 def truck():
     return vm.model(TRUCK)
-
-
-def learns_nothing(name):
-    method = component("method", name)
-    return method.learns_from == "nothing" and "structural" in method.settings
 
 
 def error_of(rom, given, full=None):
@@ -86,17 +80,6 @@ def test_frequencies_come_down_to_those_of_the_full_structure(model):
     assert errors[0] > 2.0 * errors[1] > 4.0 * errors[2]
     assert errors[-1] < 1e-7
     assert rom.reduced.order == model.size
-
-
-def test_modes_of_the_truck_are_those_of_dense_matrices():
-    structure, law = truck().system.structure, truck().system.law
-    rom = vm.reduce(truck(), "modal_truncation", training=[bumps()], highest=15.0)
-    exact = squares(structure, law, truck())
-    kept = exact < (2.0 * np.pi * 15.0) ** 2
-    assert rom.reduced.order == kept.sum() > 10
-    first = rom.reduced.periods.systems[0]
-    found = squares(first.structure, first.law, truck())
-    np.testing.assert_allclose(found, exact[kept], rtol=1e-6, atol=1e-6)
 
 
 def test_more_vectors_of_pod_are_better_until_they_are_all(model):
@@ -255,26 +238,6 @@ def test_quick_roads_are_not_trusted_however_small_they_are(method, settings):
     assert rom.simulate(corrugated(3.0, 0.01)).status == "ok"
     run = rom.simulate(corrugated(100.0, 1e-4))
     assert (run.status, "64 to 128 Hz" in run.message) == ("untrusted", True)
-
-
-@pytest.mark.parametrize("method", [m for m in names("method") if learns_nothing(m)])
-def test_training_that_is_never_read_changes_no_status(method):
-    found = []
-    for training in (ROAD, ROAD.perturbed(amplitude=5.0)):
-        rom = vm.reduce(truck(), method, training=[training], **SHORT)
-        run = rom.simulate(vm.road("D", 1))
-        found.append((run.status, run.message, run.outputs.tobytes()))
-        dataset = vm.simulate(truck(), method, maneuver=ROAD, training=training, **SHORT)
-        found[-1] += (dataset["remark"].item(),)
-    assert found[0] == found[1]
-    assert found[0][0] == "ok"
-
-
-def test_parameters_that_change_the_structure_ask_for_a_new_fit():
-    rom, given = vm.reduce(truck(), "krylov", training=[ROAD], **SHORT), {"rail_thickness": 4e-3}
-    thin = vm.reduce(vm.model(TRUCK, given), "krylov", training=[ROAD], **SHORT)
-    again = rom.for_parameters(given)
-    np.testing.assert_array_equal(again.simulate(ROAD).outputs, thin.simulate(ROAD).outputs)
 
 
 def test_bases_of_control_periods_are_not_trusted_on_another_road():

@@ -90,19 +90,6 @@ def test_single_track_corners_as_the_linearised_vehicle(shape):
     assert turn == pytest.approx(steady_turn(shape), rel=1e-6)
 
 
-def test_single_track_at_another_speed_is_that_vehicle_condensed(shape):
-    faster = vm.model(shape.model.name, {"initial_speed": 30.0})
-    (own, _), (far, _) = single_track(faster, 30.0), single_track(shape.model, 30.0)
-    np.testing.assert_allclose(own, far, rtol=1e-3, atol=1e-3)
-
-
-def test_steering_without_its_derivatives_drives_lateral_modes_alone(shape):
-    linear, (lateral, _) = shape.linearised, lateral_modes(shape)
-    drive = sum(np.linalg.matrix_power(linear.a, j) @ b for j, b in enumerate(linear.b.T))
-    gap = drive - lateral.right @ lateral.input_matrix
-    assert np.linalg.norm(gap) < 1e-6 * np.linalg.norm(drive)
-
-
 def test_static_correction_keeps_steady_cornering(shape):
     kept, follow = truncated(shape, *lateral_modes(shape), ModalVehicleSettings(fastest=20.0))
     moved = follow[:, 0] - kept.right @ np.linalg.solve(kept.rates, kept.input_matrix)

@@ -65,14 +65,6 @@ def test_error_falls_with_the_cells_at_the_order_of_the_polynomials(model, both,
     assert np.log2(coarse / fine) == pytest.approx(degree + 1, abs=0.8)
 
 
-def test_edges_and_corners_of_all_cells_are_as_exact_as_their_insides(model, both):
-    reduced = mapped(model, both, cells=3, degree=8)
-    lines = [np.linspace(low, high, 7) for low, high in reduced.ranges]
-    grid = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, 2)
-    edges = replace(both, signal=lambda *_: grid, samples=len(grid))
-    assert largest_error(model, reduced, edges) < 1e-8
-
-
 def test_coordinates_depend_on_the_inputs_alone(model, both):
     reduced = mapped(model, both)
     rng = np.random.default_rng(5)
@@ -86,12 +78,6 @@ def test_coordinates_depend_on_the_inputs_alone(model, both):
     np.testing.assert_array_equal(mixed.coordinates, first.coordinates[order])
     # No equation is solved.
     assert set(first.counts.values()) == {0}
-
-
-@pytest.mark.parametrize("samples", [1, 2, 63, 1000])
-def test_every_number_of_samples_is_computed(model, both, samples):
-    short = replace(both, duration=2.0, samples=samples)
-    assert largest_error(model, mapped(model, both), short) < 1e-6
 
 
 def test_an_input_that_rests_costs_nothing(model, nominal, both):

@@ -8,17 +8,12 @@ import pytest
 
 from vehiclemor.inputs.signal import Signal
 from vehiclemor.inputs.steering import lane_change, rack_lane_change, straight_ahead
-from vehiclemor.multibody.quantities import FIALA, WHEELS
+from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.methods import slow_manifold
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
-from vehiclemor.reduction.vehicle.axle_forces import Tire, WheelState, add_fiala
-from vehiclemor.reduction.vehicle.features import feature_columns
-from vehiclemor.reduction.vehicle.fitting import _sensitivities, improved, targets_of
 from vehiclemor.reduction.vehicle.linear_modes import slow_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.reduction.vehicle.slow_features import SlowFeatures
-from vehiclemor.reduction.vehicle.vehicle_inputs import VehicleInputs
 from vehiclemor.simulation.build import build
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.scenario import Scenario, start_of, training_run
@@ -67,40 +62,12 @@ def errors(reduced, maneuver, start="equilibrium"):
     return dict(zip(model.outputs, largest, strict=True))
 
 
-def test_a_shape_with_place_and_heading_is_the_state(car):
-    states = car.simulate(LANE_CHANGES[car.name]).states[::100]
-    shape = VehicleShape(car)
-    again = shape.states(shape.of(states), states[:, car.planar])
-    names = (*car.coordinates, *car.speeds)
-    kept = [i for i, n in enumerate(names) if not (n.startswith("gamma") and "dot" not in n)]
-    np.testing.assert_allclose(again[:, kept], states[:, kept], rtol=0, atol=1e-12)
-
-
 def test_the_mirror_image_of_a_vehicle_is_the_vehicle(car):
     shape = VehicleShape(car)
     image, linear = shape.mirror, shape.linearised
     np.testing.assert_array_equal(image @ image, np.eye(len(image)))
     np.testing.assert_allclose(image @ linear.a @ image, linear.a, atol=1e-9 * abs(linear.a).max())
     np.testing.assert_allclose(image @ linear.b, -linear.b, atol=1e-9 * abs(linear.b).max())
-
-
-def test_rates_of_the_shape_do_not_know_place_and_heading(car):
-    maneuver = LANE_CHANGES[car.name]
-    run, shape = car.simulate(maneuver), VehicleShape(car)
-    rows = slice(60, 200, 20)
-    shapes, u = shape.of(run.states[rows]), np.ascontiguousarray(run.inputs[rows])
-    rates, motion = shape.rates(shapes, u)
-    # The same by the full equations at another heading: chain rule of the rotation.
-    moved = shape.states(shapes, np.tile([100.0, -7.0, 2.0], (len(shapes), 1)))
-    step = 1e-6
-    there = car.rhs_at(moved, u)
-    ahead = shape.of(moved + step * there)
-    np.testing.assert_allclose((ahead - shapes) / step, rates, rtol=1e-4, atol=1e-3)
-    x, y, heading = car.planar
-    cosine, sine = np.cos(2.0), np.sin(2.0)
-    np.testing.assert_allclose(there[:, heading], motion[:, 0], atol=1e-9)
-    np.testing.assert_allclose(there[:, x], motion[:, 1] * cosine - motion[:, 2] * sine, atol=1e-9)
-    np.testing.assert_allclose(there[:, y], motion[:, 1] * sine + motion[:, 2] * cosine, atol=1e-9)
 
 
 def test_slow_coordinates_obey_their_linear_equation_where_steering_is_small(car):
@@ -118,22 +85,6 @@ def test_slow_coordinates_obey_their_linear_equation_where_steering_is_small(car
         size = np.abs(linear[inner, j]).max()
         assert np.abs(rate - linear)[inner, j].max() < 0.05 * size
     assert np.abs(speed).max() < 1e-6
-
-
-def test_kernels_are_the_features_that_are_fitted(reduced):
-    rng, k = np.random.default_rng(1), reduced.features.states
-    y = rng.normal(size=(20, k + 3)) * reduced.error_scale / 3.0
-    u = rng.normal(size=(20, 1)) * 0.03
-    found = reduced.system.values_at("derivative", y, u, k + 3)
-    values = (
-        feature_columns(reduced.features, y[:, :k], u, reduced.parameters) @ reduced.coefficients
-    )
-    cosine, sine = np.cos(y[:, k]), np.sin(y[:, k])
-    forward, sideward = values[:, k + 1], values[:, k + 2]
-    expected = values.copy()
-    expected[:, k + 1] = forward * cosine - sideward * sine
-    expected[:, k + 2] = forward * sine + sideward * cosine
-    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-10)
 
 
 @pytest.mark.parametrize("start", ["equilibrium", "dropped"])
@@ -168,27 +119,6 @@ def _without_curvature(reduced):
     return c
 
 
-def test_beyond_their_training_range_the_arguments_of_nonlinear_terms_are_held(reduced):
-    k = reduced.features.states - 1
-    z = np.random.default_rng(2).normal(size=(50, k + 1)) * 1e3
-    z[:, 4:k], z[:, k] = 0.0, 5.0
-    columns = feature_columns(reduced.decoded_features, z, np.zeros((50, 1)), reduced.parameters)
-    # The lateral coordinates go on; there is the speed too.
-    assert np.count_nonzero(np.abs(columns).max(axis=0) > 5.0) == 4
-
-
-def test_heave_and_pitch_are_linear_in_straight_running(reduced):
-    shape, k = reduced.shape, 4
-    modes = slow_modes(shape, 45.0, 2)
-    z = np.zeros((3, 9))
-    z[:, k:8] = np.random.default_rng(4).normal(size=(3, 4))
-    columns = feature_columns(reduced.features, z, np.zeros((3, 1)), reduced.parameters)
-    rates = columns @ reduced.coefficients
-    forward = shape.speed + z[:, k:8] @ (shape.linearised.velocity_a[1] @ modes.right[:, k:])
-    np.testing.assert_allclose(rates[:, k:8], z[:, k:8] @ modes.rates[k:, k:].T, atol=1e-9)
-    np.testing.assert_allclose(rates[:, 10], forward, atol=1e-9)
-
-
 def test_a_dropped_car_is_right_at_a_speed_of_no_training_run(vehicle, reduced):
     start = start_at(20.5, "dropped")
     run, full = (model.simulate(straight_ahead, start) for model in (reduced, vehicle))
@@ -197,38 +127,6 @@ def test_a_dropped_car_is_right_at_a_speed_of_no_training_run(vehicle, reduced):
     for name in ("longitudinal_position", "pitch", "vertical_speed"):
         rms = np.sqrt(np.mean(wrong[:, vehicle.outputs.index(name)] ** 2))
         assert rms < bounds[name].bound
-
-
-def test_symmetric_modes_are_modes_that_steering_does_not_move(car):
-    shape = VehicleShape(car)
-    modes = slow_modes(shape, 45.0, 2)
-    k, a = modes.lateral, shape.linearised.a
-    assert len(modes.rates) == k + 4
-    left, right = modes.left[k:], modes.right[:, k:]
-    np.testing.assert_allclose(left @ a, modes.rates[k:, k:] @ left, atol=1e-4)
-    np.testing.assert_allclose(left @ right, np.eye(4), atol=1e-6)
-    assert np.abs(modes.input_matrix[k:]).max() < 1e-6 * np.abs(modes.input_matrix[:k]).max()
-
-
-def test_sensitivities_are_the_differences_of_runs(vehicle):
-    reduced = replace(fitted(vehicle, steps=0), solver="dopri5", tolerance=1e-9)
-    run = TrainingRun(vehicle, lane_change, "equilibrium")
-    target = targets_of(reduced, [run], [run.at(lane_change.times)])[0]
-    term, k = 16, reduced.features.states
-    free = [([term], 0), ([term], k)]
-    path = reduced.path(lane_change, "equilibrium")
-    weights = np.ones((len(target.compared), k + 3))
-    found = _sensitivities(reduced, target, path, free, weights)
-    for place, (_, column) in enumerate(free):
-        changed = reduced.coefficients.copy()
-        width = 1e-3 * np.abs(changed[:, column]).max()
-        changed[term, column] += width
-        other = replace(reduced, coefficients=changed).path(lane_change, "equilibrium")
-        difference = (other - path)[target.compared] / width
-        size = np.abs(difference).max(axis=0)
-        wrong = np.abs(found[:, :, place] - difference).max(axis=0)
-        # The variational equations are solved with the output times as steps.
-        assert np.all(wrong <= 0.05 * size + 1e-8)
 
 
 def test_the_fit_weighs_heading_by_the_bound_of_the_paper_unless_it_has_another(vehicle):
@@ -240,23 +138,6 @@ def test_the_fit_weighs_heading_by_the_bound_of_the_paper_unless_it_has_another(
         for given in ({}, {"heading_error": 1e-3})
     )
     assert not np.array_equal(usual, loose)
-
-
-def test_gauss_newton_steps_bring_reduced_runs_nearer_to_the_training_runs(vehicle):
-    rough = replace(fitted(vehicle, steps=0, ridge=1e-6), solver="dopri5", tolerance=1e-7)
-    runs = [TrainingRun(vehicle, lane_change.perturbed(1.0, a), "equilibrium") for a in (0.8, 1.2)]
-    targets = targets_of(rough, runs, [run.at(run.maneuver.times) for run in runs])
-    k = rough.features.states
-    better = improved(rough, targets, [(rough.features.blocks[0][0], k)], 2)
-
-    def heading_error(vehicle):
-        paths = [vehicle.path(t.run.maneuver, t.run.start) for t in targets]
-        return max(
-            float(np.abs(p[:, k] - t.states[:, k]).max())
-            for p, t in zip(paths, targets, strict=True)
-        )
-
-    assert heading_error(better) < 0.2 * heading_error(rough)
 
 
 @cache
@@ -280,26 +161,6 @@ def with_tires():
 
 def of(run, name):
     return run.outputs[:, high_fidelity().outputs.index(name)]
-
-
-def test_the_tires_are_those_of_the_vehicle():
-    case, car = scenario(0.9, 1.4, 20.5), high_fidelity()
-    run = car.simulate(case.maneuver, start_of(car, case))
-    parameters = {name: float(car.parameters[name]) for name in FIALA}
-    for wheel in WHEELS:
-        made = SlowFeatures(1, 0, VehicleInputs(()))
-        state = WheelState(made.z[0], made.z[1], None, None)
-        force, turning, _ = add_fiala(made, wheel, state, Tire(parameters, 1000.0))
-        made.line("force", 1000.0 * force)
-        made.line("turning", 1000.0 * turning)
-        terms = [("force",), ("turning",)]
-        slips = np.column_stack([np.tan(of(run, f"slip_angle_{wheel}")), of(run, f"Fz_{wheel}")])
-        columns = made.columns(terms, slips, np.zeros((len(slips), 0)))
-        moment = parameters["tire_width"] * columns[:, 1]
-        for given, name in ((columns[:, 0], "Fy"), (moment, "Mz")):
-            truth = of(run, f"{name}_{wheel}")
-            # What is left is the longitudinal slip of the free rolling wheel.
-            assert np.abs(given - truth).max() < 1e-3 * np.abs(truth).max()
 
 
 def test_states_in_which_its_tires_slide_are_beyond_its_training():

@@ -79,15 +79,6 @@ def test_projected_mechanics_keep_the_energy():
     assert np.ptp(energy) < 1e-5 * exchanged
 
 
-def test_basis_is_orthonormal_in_its_inner_product(model):
-    for formulation, inner_product in (("state", "energy"), ("coordinates", "range")):
-        reduced = fitted(model, formulation=formulation, inner_product=inner_product)
-        for k, basis in enumerate(reduced.bases[:6]):
-            rank = basis.rank
-            product = reduced.spaces.test_basis[k, :rank] @ reduced.spaces.trial_basis[k, :rank].T
-            np.testing.assert_allclose(product, np.eye(rank), atol=1e-9)
-
-
 def test_energy_weight_is_the_kinetic_energy(model):
     generator = np.random.default_rng(5)
     period = 0.5
@@ -104,13 +95,6 @@ def test_energy_weight_is_the_kinetic_energy(model):
         assert rates @ weight[:N, :N] @ rates * period**2 == pytest.approx(2.0 * kinetic, rel=1e-9)
 
 
-def test_range_weight_makes_every_moving_state_as_wide_as_the_others(model):
-    histories = np.random.default_rng(2).normal(size=(50, 2 * N)) * np.logspace(-3, 3, 2 * N)
-    weight = _weight(model, DynamicPodSettings(inner_product="range"), histories, [0.0, 1.0])
-    scaled = histories[:, :N] @ np.linalg.cholesky(weight)
-    np.testing.assert_allclose(np.ptp(scaled, axis=0), 1.0)
-
-
 def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
     reduced = fitted(model)
     whole = in_windows(STATE, [0.0, 25.0])
@@ -125,14 +109,6 @@ def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
     assert reduced.spectral_abscissa == reduced.spectral_abscissas.max()
 
 
-def test_a_tighter_rank_tolerance_drops_modes_of_noise(model):
-    kept, cut = (fitted(model, rank=8, rank_tolerance=tolerance) for tolerance in (0.0, 1e-6))
-    # Before steering begins the car runs straight: one direction, the rest is rounding.
-    assert (kept.bases[0].rank, cut.bases[0].rank) == (8, 1)
-    assert (kept.order, cut.order) == (8, max(basis.rank for basis in cut.bases))
-    assert cut.order > 1
-
-
 def test_divergence_is_recorded_with_its_time(model):
     reduced = fitted(model, "dropped", formulation="paired", inner_product="range")
     run = reduced.simulate(lane_change, "dropped")
@@ -142,21 +118,6 @@ def test_divergence_is_recorded_with_its_time(model):
     failed = ~np.isfinite(run.states).all(axis=1)
     assert failed.any()
     assert not np.isfinite(run.states[np.argmax(failed) :]).any()
-
-
-@pytest.mark.parametrize(
-    ("chosen", "words"),
-    [
-        ({"rank": 15, "snapshots": 20}, "rank 15 .* 14 coordinates"),
-        ({"rank": 29, "snapshots": 40, "formulation": "state"}, "rank 29 .* 28 states"),
-        ({"rank": 4, "snapshots": 3}, "rank 4 .* snapshots 3"),
-        ({"control_period": 1e-4}, "control_period"),
-        ({"formulation": "first order"}, "coordinates, state, paired"),
-    ],
-)
-def test_settings_that_do_not_fit_are_refused(model, chosen, words):
-    with pytest.raises(InputError, match=words):
-        fitted(model, **chosen)
 
 
 def test_windows_refuse_runs_of_different_durations(model):
@@ -211,17 +172,6 @@ def test_errors_grow_within_a_period_alone(car, maneuver, formulation):
     assert restarted[-1] < 0.01 * own[-1]
     # A period is 25 samples: what follows an edge is better than what comes before it.
     assert np.all(restarted[76::25] < 0.2 * restarted[75::25].max())
-
-
-def test_steps_begin_at_the_state_that_they_are_given(car, maneuver):
-    rom = vm.reduce(car, "pod", restart="full_model", formulation="state")
-    run, full = rom.reduced.simulate(maneuver, "equilibrium"), car.simulate(maneuver)
-    state = full.states[75]
-    for sample in range(75, 100):
-        u, ends = maneuver.at(run.times[[sample, sample + 1]])
-        state = rom.step(state, u, 0.02, run.times[sample], ends)
-        # Straight lines between the samples stand for the steering.
-        np.testing.assert_allclose(state, run.states[sample + 1], rtol=1e-3, atol=1e-3)
 
 
 @pytest.mark.parametrize("formulation", ["coordinates", "state"])
