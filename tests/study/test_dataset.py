@@ -195,18 +195,3 @@ def test_a_truck_has_payloads_and_the_matrices_of_its_structure(tmp_path):
     assert abs(matrices["outputs_force"] - structure.outputs[3]).max() == 0.0
     empty = vm.model("flexible_truck", {"payload": 0.0}).system.structure.mass
     assert abs(matrices["mass"] - 2000.0 * matrices["mass_by_payload"] - empty).max() < 1e-6
-
-
-def test_runs_of_a_driven_car_have_its_torques_and_friction(tmp_path):
-    before, test = CAR.split("validation", 1)
-    text = f"{before}validation{test.replace('lane_change', 'random_drive', 1)}"
-    study = small_study(tmp_path, text, "replay", model="independent_suspension_vehicle")
-    folder = vm.dataset(study, tmp_path / "data")
-    driven, coasting = read(folder / "validation.nc"), read(folder / "test.nc")
-    torques = vm.maneuver("random_drive").perturbed(1.3)
-    expected = dict(zip(torques.inputs, torques.at(torques.times).T, strict=True))
-    assert expected["brake_torque_FL"].max() > 0.0
-    for name in ("delta", "brake_torque_FL", "friction_RR"):
-        np.testing.assert_allclose(driven[name], expected[name], atol=1e-9)
-    assert (coasting["friction_RR"] == 1.0).all()
-    assert not coasting["brake_torque_FL"].any()

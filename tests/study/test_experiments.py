@@ -24,7 +24,6 @@ from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Scenario, speed_of
 
-HEAVY = (("sprung_mass", 1500.0), ("initial_speed", 25.0))
 MOVED = (("tie_rod_inner.z", -0.09),)
 
 
@@ -201,25 +200,6 @@ def test_one_fit_serves_all_solvers_tolerances_and_fallbacks(vehicle, fits):
     assert failed == Failure("diverged", "no fit")
 
 
-def test_a_bug_of_a_fit_is_not_kept_and_a_failure_is(vehicle, monkeypatch):
-    method, raised = component("method", "slow_manifold"), []
-
-    def fit(*given):
-        raised.append(given)
-        raise ZeroDivisionError if len(raised) < 3 else ConvergenceError("no fit")
-
-    broken = replace(method, fit=fit)
-    monkeypatch.setattr("vehiclemor.study.evaluate.component", lambda *_: broken)
-    wanted = experiment(vehicle, "slow_manifold", terms=1, steps=0)
-    found = [cached_fit(vehicle, wanted).status for _ in range(4)]
-    assert found == ["error", "error", "diverged", "diverged"]
-    assert len(raised) == 3
-
-
-def test_a_fit_for_a_model_of_another_kind_is_a_failure(vehicle):
-    assert isinstance(cached_fit(vehicle, experiment(vehicle, "path_map")), Failure)
-
-
 MODELS = {
     "independent_suspension_vehicle": "lane_change",
     "high_fidelity_vehicle": "rack_multisine",
@@ -245,24 +225,3 @@ def test_a_run_is_trusted_exactly_within_the_range(model, frequency, amplitude, 
     # Slower and clearly smaller than a training run.
     elif abs(amplitude) <= 1.0 and frequency <= 1.0:
         assert found.indicator <= 1.0
-
-
-@pytest.mark.parametrize(
-    ("method", "amplitude", "status"),
-    [
-        ("fixed_basis", 1.5, "untrusted"),
-        ("linear_single_track", 1.5, "untrusted"),
-        ("full_order", 1.5, "ok"),
-        ("replay", 1.5, "ok"),
-    ],
-)
-def test_no_reduced_vehicle_is_silent_where_it_is_wrong(method, amplitude, status):
-    model = build("independent_suspension_vehicle")
-    tests = (scenario(model.name, 1.0, amplitude),)
-    chosen = complete_settings(model, method)
-    training = (scenario(model.name, 1.0, 1.1),)
-    found = evaluate(make_experiment(model, method, chosen, training, tests, "errors"))
-    assert found["status"].item() == status
-    if status == "untrusted":
-        assert "the estimated error of" in found["message"].item()
-        assert found["trust_indicator"].item() > 1.0

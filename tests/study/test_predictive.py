@@ -1,28 +1,22 @@
 """The runner of protocols: nothing is chosen by what it is tested on."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from vehiclemor.reduction.methods import pod
 from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.screens import comparison_text
 from vehiclemor.report.unseen import method_rows, protocol_of, target_rows
-from vehiclemor.simulation.algebraic import AlgebraicModel
-from vehiclemor.study import evaluate, timing
-from vehiclemor.study.plans.choice import choose
+from vehiclemor.study import timing
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.study_file import SpeedTarget
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.scenario import training_run
 from vehiclemor.study.store import read_run
 
 OTHER_TEST = '[[test]]\nmaneuver = "sine_travel"\npoints = [[2.0, 0.3]]\n'
 OUTSIDE = '\n[[outside]]\nmaneuver = "sine_travel"\npoints = [[1.0, 1.5]]\n'
-TIMES = np.linspace(0.0, 10.0, 101)
 SECONDS = ("seconds", "seconds_lower", "seconds_upper")
 
 
@@ -96,44 +90,6 @@ def test_the_choice_does_not_read_the_test_set(done, tmp_path, protocol_text):
         np.testing.assert_array_equal(other[name], dataset[name])
     assert_same(files(folder, "validation"), files(tmp_path, "validation"))
     assert not set(files(folder, "test")) & set(files(tmp_path, "test"))
-
-
-def test_nothing_of_the_test_set_is_simulated_before_the_choice(
-    tmp_path, protocol_text, monkeypatch
-):
-    study = study_of(tmp_path, protocol_text + OUTSIDE)
-    protocol = load_protocol(str(tmp_path / "small0.toml"))
-    hidden = [s for key in ("test", "outside") for s in protocol.sets[key]]
-    inputs = {training_run(protocol.model, s).maneuver.at(TIMES).tobytes() for s in hidden}
-    seen, trained, simulate = [], [], AlgebraicModel.simulate
-    # What an earlier test has solved or fitted would not be again.
-    evaluate.cached_reference.cache_clear()
-    evaluate._FITS.clear()
-
-    def recorded(self, maneuver, *arguments, **named):
-        seen.append(maneuver.at(TIMES).tobytes() in inputs)
-        return simulate(self, maneuver, *arguments, **named)
-
-    def recorded_fit(model, training, settings, fit=pod.fit):
-        trained.extend(run.maneuver.at(TIMES).tobytes() for run in training)
-        return fit(model, training, settings)
-
-    def recorded_choice(results):
-        seen.append("choice")
-        return choose(results)
-
-    monkeypatch.setattr(AlgebraicModel, "simulate", recorded)
-    changed = replace(pod.FIXED_BASIS, fit=recorded_fit)
-    monkeypatch.setattr(pod, "FIXED_BASIS", changed)
-    monkeypatch.setattr("vehiclemor.study.plans.protocol_run.choose", recorded_choice)
-    monkeypatch.setattr("vehiclemor.study.plans.protocol_run._timed", no_timing)
-    run_studies(study, tmp_path)
-    last_choice = len(seen) - seen[::-1].index("choice")
-    assert False in seen[:last_choice]
-    assert True not in seen[:last_choice]
-    assert True in seen[last_choice:]
-    assert trained
-    assert not inputs & set(trained)
 
 
 def no_timing(_, rows, scenarios, *__):

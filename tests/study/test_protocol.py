@@ -183,32 +183,6 @@ def test_an_audit_draws_other_runs_and_stands_apart(protocol, tmp_path):
         vm.run_study("figure-12", seed=7, results=tmp_path)
 
 
-def test_runs_for_training_are_drawn_beside_the_listed_ones_whatever_the_audit(
-    tmp_path, protocol_text, protocol
-):
-    path = tmp_path / "drawn.toml"
-    boxes = 'boxes = [{ maneuver = "sine_travel", frequency = [0.7, 2.0] }]'
-    path.write_text(f"{protocol_text}\n[drawn_training]\nruns = 4\n{boxes}\n")
-    found = load_protocol(str(path))
-    training = found.sets["training"]
-    assert (len(training), training[:1]) == (5, protocol.sets["training"])
-    assert found.entries[-1].training == training
-    assert load_protocol(str(path), seed=7).sets["training"] == training
-    assert sampled_sets(found) == sampled_sets(protocol)
-
-
-def test_a_draw_fills_its_box_and_stays_inside(protocol):
-    runs = sampled_runs(protocol.model, Draw(runs=400, boxes=[BOX]), (1, 1, 0))
-    assert len({run.run_key for run in runs}) == 400
-    frequency = np.array([run.maneuver.frequency_factor for run in runs])
-    amplitude = np.array([run.maneuver.amplitude_factor for run in runs])
-    assert 0.7 <= frequency.min() <= frequency.max() <= 1.8
-    assert 0.5 <= np.abs(amplitude).min() <= np.abs(amplitude).max() <= 1.1
-    # Uniform: means and shares lie within five standard deviations.
-    assert abs(frequency.mean() - 1.25) < 5.0 * 1.1 / math.sqrt(12 * 400)
-    assert abs((amplitude > 0.0).mean() - 0.5) < 5.0 * 0.5 / 20.0
-
-
 def test_members_and_parameters_are_drawn_after_all_else(protocol):
     box = BOX.model_copy(update={"maneuver": "road_travel"})
     further = {"members": [3, 6], "parameters": {"tie_rod_inner.z": [0.1, 0.2], "a.b": [1.0, 1.0]}}

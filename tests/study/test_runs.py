@@ -30,7 +30,7 @@ from vehiclemor.exceptions import (
     MachineError,
     UnreachableError,
 )
-from vehiclemor.failure import Failure, attempt
+from vehiclemor.failure import Failure
 from vehiclemor.files import TEMPORARY, temporary_path
 from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.progress import listening
@@ -40,7 +40,7 @@ from vehiclemor.study import evaluate, store, timing, workers
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.run import run_studies
-from vehiclemor.study.workers import KILLED, TRIES, Done, batch_size
+from vehiclemor.study.workers import KILLED, TRIES, Done
 
 GRID = """
 training = "nominal"
@@ -139,13 +139,6 @@ def test_workers_end_with_a_run_and_one_that_is_killed_is_replaced(study, tmp_pa
     command = [sys.executable, "-c", "from vehiclemor.study.workers import begin; begin(0, '')"]
     command[-1] += "; import time; time.sleep(60)"
     assert subprocess.run(command, timeout=50, check=False).returncode == 1
-
-
-@pytest.mark.parametrize(("runs", "places"), [(0, 2), (5, 0), (155, 2), (100_000, 4)])
-def test_batches_are_neither_large_nor_so_many_that_sending_them_counts(runs, places):
-    size = batch_size([[None]] * runs, places)
-    assert 1 <= size <= workers.LARGEST
-    assert size == 1 or size * places * workers.EACH <= runs
 
 
 def test_the_number_of_threads_changes_no_bit():
@@ -273,14 +266,6 @@ def test_what_a_fit_raises_is_a_result_of_grids_and_protocols(
         assert set(rows["status"].sel(label=full).values.ravel()) == {"ok"}
 
 
-def test_what_is_wrong_with_a_file_ends_the_study():
-    def broken():
-        raise FileError("no such file")
-
-    with pytest.raises(FileError):
-        attempt(broken)
-
-
 @pytest.mark.parametrize("part", ["fit", "check", "errors"])
 def test_a_bug_ends_no_study_and_is_tried_again_by_the_next_run(run, monkeypatch, tmp_path, part):
     with monkeypatch.context() as patch:
@@ -355,27 +340,6 @@ def test_a_full_disk_is_called_so_whatever_the_library_says(run, monkeypatch, tm
         monkeypatch.setattr(os, name, read_only)
     monkeypatch.setattr("tempfile.TemporaryFile", read_only)
     assert run("pod") == ["ok", "ok"]
-
-
-def test_a_pool_never_holds_more_than_it_hands_on(monkeypatch):
-    monkeypatch.setattr(workers, "IDLE", 0.01)
-    running, most, idle = [], [], []
-
-    def submit(_, batch):
-        running.append((future := Future(), batch))
-        most.append(len(running))
-        return future
-
-    def end():
-        idle.append(len(running))
-        future, batch = running.pop(0)
-        future.set_result(Done(batch))
-
-    groups = [[number] for number in range(10)]
-    pool = SimpleNamespace(submit=submit)
-    found = list(workers.in_batches(pool, None, groups, 2, 3, idle=end))
-    assert sorted(key for done in found for key in done.finished) == [*range(10)]
-    assert (max(most), len(idle)) == (3, 5)
 
 
 def test_workers_that_are_killed_again_and_again_end_the_run(run, monkeypatch):
@@ -466,22 +430,3 @@ def test_what_ends_a_batch_is_one_line_or_tried_again(error, ends):
     with ends:
         (done,) = workers.on_cluster([[]], client=client)
         assert done == Done([], KILLED)
-
-
-def test_a_scheduler_without_workers_is_told(monkeypatch, caplog):
-    monkeypatch.setattr(workers, "IDLE", 0.01)
-    future: Future[Done] = Future()
-    looks = []
-
-    def nthreads():
-        """Workers, which come at the third look and end the run."""
-        looks.append(len(looks))
-        if len(looks) < 3:
-            return {}
-        future.set_result(Done([]))
-        return {"tcp://": 1}
-
-    pool = SimpleNamespace(submit=lambda *_: future, shutdown=lambda **_: None)
-    client = SimpleNamespace(get_executor=lambda **_: pool, nthreads=nthreads)
-    assert list(workers.on_cluster([[]], client=client)) == [Done([])]
-    assert ["no worker" in message for message in caplog.messages] == [True]

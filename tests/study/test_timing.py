@@ -5,7 +5,6 @@ from itertools import accumulate, count
 
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_info, threadpool_limits
 
 import vehiclemor as vm
 from vehiclemor.reduction.methods.full_order import FullOrder
@@ -15,7 +14,7 @@ from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study import timing
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.timing import as_new, called, timed_cases, timed_starts, timed_tests
+from vehiclemor.study.timing import called, timed_cases, timed_starts, timed_tests
 
 SETTINGS = {
     "pod_r3": ("pod", {"rank": 3}, "recommended"),
@@ -106,33 +105,6 @@ def test_the_first_input_warms_the_caches_and_the_median_of_the_others_counts(mo
     assert called(lambda _: ended, run, 4) == pytest.approx((3.0, 0.2, 7.0))
     monkeypatch.setattr(run_timer, "clock", count().__next__)
     assert called(lambda _: replace(ended, status="diverged"), run, 1).status == "diverged"
-
-
-@pytest.mark.parametrize(
-    "steering", [vm.maneuver("lane_change"), vm.Signal.from_samples([0.0, 1.0], [0.0, 0.01])]
-)
-def test_an_input_of_the_timing_pass_is_like_one_that_was_just_made(steering):
-    car = vm.rom("independent_suspension_vehicle")
-    new = as_new(steering)
-    np.testing.assert_array_equal(new.at(new.times), steering.at(steering.times))
-    first = car.simulate(steering)
-    assert steering.recorded_inputs[1] is steering.recorded_inputs[1]
-    assert new.recorded_inputs[1] is not steering.recorded_inputs[1]
-    np.testing.assert_array_equal(car.simulate(new).outputs, first.outputs)
-
-
-def test_linear_algebra_has_one_thread_while_runs_are_timed(monkeypatch):
-    threads, honest = set(), FullOrder.simulate
-
-    def simulate(self, maneuver, start):
-        pools = (pool for pool in threadpool_info() if pool["user_api"] == "blas")
-        threads.update(pool["num_threads"] for pool in pools)
-        return honest(self, maneuver, start)
-
-    monkeypatch.setattr(FullOrder, "simulate", simulate)
-    with threadpool_limits(2):
-        timed_tests(cases("strongest"), np.ones((1, 1), dtype=bool))
-    assert threads == {1}
 
 
 def test_what_was_measured_is_measured_again_only_if_it_has_changed(tmp_path):
