@@ -29,7 +29,6 @@ from vehiclemor.study import run as study_run
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.study.plans.protocol import load_protocol
 from vehiclemor.study.plans.study_file import GridFile
-from vehiclemor.toml_files import FileSchema
 
 
 @pytest.fixture
@@ -198,28 +197,6 @@ def test_a_study_shows_its_grid():
     runs = vm.describe("predictive-independent_suspension_vehicle")["runs"]
     assert f"{protocol.drawn.runs} drawn" in runs
     assert f"{sum(g.scenarios for g in protocol.validation)} validation" in runs
-
-
-@pytest.mark.parametrize("name", SCHEMAS)
-def test_the_schema_of_a_file_has_every_key(name):
-    shown = vm.describe(name)
-    parts = dict(SCHEMAS[name])
-    for schema in SCHEMAS[name].values():
-        for part in schema.model_json_schema().get("$defs", ()):
-            parts[part] = subclasses(FileSchema)[part]
-    for title, part in parts.items():
-        for row, (key, field) in zip(shown[title], part.model_fields.items(), strict=True):
-            assert row["name"] == key
-            assert row["meaning"] == (field.description or "")
-            assert (row["default"] == "required") is field.is_required()
-
-
-def subclasses(schema):
-    """Name -> class of a schema and all schemas that are derived from it."""
-    found = {schema.__name__: schema}
-    for derived in schema.__subclasses__():
-        found |= subclasses(derived)
-    return found
 
 
 STUDY = """

@@ -9,7 +9,6 @@ import pytest
 import vehiclemor as vm
 from tests.plugin.installation import installed, package, registered
 from vehiclemor.cli import main
-from vehiclemor.codegen.sources import plug_in_digest
 from vehiclemor.exceptions import InputError, VehiclemorError
 from vehiclemor.reduction.methods import pod, replay
 from vehiclemor.registry import component, names, unknown
@@ -216,18 +215,6 @@ def test_a_maneuver_that_breaks_is_named_with_its_line(plug_in, capsys, function
     assert ".py:2)" in message
 
 
-def test_processes_go_on_after_a_method_that_ends_its_own(tmp_path, capsys):
-    (tmp_path / "ending.py").write_text(
-        f"{REPLAY}METHOD = replace(METHOD, name='ending', fit=ends(SystemExit(0)))\n"
-    )
-    grid = "[grid]\nfrequency_factor = [0.9, 1.0]\n"
-    study = tmp_path / "mine.toml"
-    study.write_text(STUDY.replace("faulty", "ending") + grid)
-    with installed(package(tmp_path, ending="ending:METHOD")):
-        assert main(["run", str(study), "--jobs", "2", "--results", str(tmp_path / "results")]) == 1
-    assert "2 error, 2 ok" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -306,8 +293,3 @@ def test_plain_numbers_among_the_results_of_a_model(car):
     np.testing.assert_array_equal(model.rhs([0, 0, 1, 2], 0.0), [1, 2, 0, -1.5])
     outputs = model.outputs_at(np.zeros((2, 4)), np.zeros((2, 1)))
     np.testing.assert_array_equal(outputs, [[0, 1, 2.5]] * 2)
-
-
-@pytest.mark.parametrize("name", ["double_wishbone", "high_fidelity_vehicle", "flexible_truck"])
-def test_models_of_the_package_are_no_plug_ins(name):
-    assert plug_in_digest([component("model", name)]) == plug_in_digest([])

@@ -5,20 +5,16 @@ import subprocess
 import sys
 import tomllib
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-import vehiclemor as vm
 from vehiclemor import registry
 from vehiclemor.cli import main
-from vehiclemor.contracts import check_method
 from vehiclemor.files import data_folder
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
@@ -102,26 +98,6 @@ def test_runs_are_those_of_the_linear_system(car, start, frequency):
     np.testing.assert_allclose(rates[:, 2:] @ [250.0, 45.0], outputs[:, 2], rtol=0, atol=1e-9)
     np.testing.assert_array_equal(car.mass_matrix(x[7]), np.diag([250.0, 45.0]))
     np.testing.assert_array_equal(car.speeds_of_rates(x[7]), x[7, 2:])
-
-
-def test_windows_at_rest_have_no_growth_rate_and_the_others_have(car):
-    """The road is flat in the first second; amplitude 0 makes it flat for ever."""
-    road = component("maneuver", "quarter_car_road")
-
-    def later(times, frequency, amplitude):
-        return road.signal(np.maximum(times - 1.0, 0.0), frequency, amplitude)
-
-    bump = replace(road, signal=later, corners=lambda _: (1.0,))
-    for formulation in ("state", "coordinates", "paired"):
-        settings = {"rank": 2, "control_period": 0.5, "formulation": formulation}
-        moved = vm.simulate(car, "pod", maneuver=bump, **settings)
-        assert np.isfinite(moved["growth_rate"])
-        still = vm.simulate(car, "pod", maneuver=bump, amplitude=0.0, **settings)
-        for data in (moved, still):
-            assert data["status"].item() == "ok"
-        assert still["effective_rank"].item() == 0
-        assert np.isnan(still["growth_rate"])
-        assert (still["rms_error"] == 0.0).all()
 
 
 # The method
@@ -228,15 +204,3 @@ def test_a_write_that_ends_early_leaves_nothing(here, monkeypatch, error):
     with suppress(KeyboardInterrupt):
         assert main(["new-plugin", "my_car"]) != 0
     assert not list(here.iterdir())
-
-
-def test_a_vehicle_is_near_its_modes_at_small_amplitude():
-    check_method("quarter_car_modes", "independent_suspension_vehicle")
-    model = vm.model("independent_suspension_vehicle")
-    small = replace(lane_change, amplitude_factor=1e-3, duration=10.0, samples=1001)
-    full = model.simulate(small, tolerance=1e-9)
-    run = fitted(model, fastest=1e4).simulate(small, model.starts[0])
-    for name in ("yaw_rate", "roll", "lateral_position"):
-        column = model.outputs.index(name)
-        error = np.abs(run.outputs[:, column] - full.outputs[:, column]).max()
-        assert error < 2e-3 * np.abs(full.outputs[:, column]).max()

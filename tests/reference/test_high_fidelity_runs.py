@@ -170,10 +170,3 @@ def test_a_rack_beyond_reach_ends_the_run(vehicle, factor):
         corners = (closures[:6, 6:13], closures[6:, 13:20])
         signs.append([np.sign(np.linalg.det(np.delete(c, 4, axis=1))) for c in corners])
     assert len(np.unique(signs, axis=0)) == 1
-
-
-def test_a_maneuver_that_goes_on_after_the_run_is_remarked(vehicle):
-    late = LANE_CHANGE.perturbed(frequency=0.2)
-    run = vehicle.simulate(late, solver="etdrk4", tolerance=1e-3)
-    assert "13.5 s" in run.remark
-    assert not vehicle.simulate(LANE_CHANGE, solver="etdrk4", tolerance=1e-3).remark

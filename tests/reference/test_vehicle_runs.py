@@ -1,6 +1,5 @@
 """Symmetries and runs of both vehicles: against their mirror image, LSODA, CVODE, themselves."""
 
-from dataclasses import replace
 from functools import cache
 from itertools import pairwise, product
 
@@ -105,22 +104,6 @@ def test_the_run_does_not_depend_on_the_heading(name, solver):
     assert turned.counts == plain.counts
     if name == FIDELITY:
         assert np.abs(plain.states - exact(name, "dropped")).max() > 1e-5
-
-
-def test_the_heading_does_not_change_the_cost_of_a_frozen_jacobian():
-    """Its steps are at the limit of stability, where rounding changes their number, too."""
-    model = build(FIDELITY)
-    x = model.start()
-
-    def calls(of, start: np.ndarray, tolerance: float) -> int:
-        return integrate(of, start, "etdrk4", tolerance).counts["rhs_calls"]
-
-    for tolerance in (1e-3, 1e-4, 1e-5):
-        expected = pytest.approx(calls(model, x, tolerance), rel=0.1)
-        assert calls(model, turn(model, x, 2.0), tolerance) == expected
-    # As it would without turning states into the Jacobian's heading and back.
-    fixed = replace(model, definition=replace(model.definition, heading_pairs=()))
-    assert calls(fixed, turn(model, x, 2.0), 1e-5) > 1.4 * calls(model, x, 1e-5)
 
 
 # Accuracy

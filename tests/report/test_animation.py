@@ -8,7 +8,6 @@ import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.exceptions import InputError
 from vehiclemor.report.figures import animation
-from vehiclemor.report.labels import declared
 
 
 @pytest.fixture(scope="module")
@@ -34,30 +33,6 @@ def test_film_of_reduced_and_full_order(tmp_path, model, method):
         assert film.n_frames == 6
         assert film.size[0] == 560
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_film_shows_what_has_been_driven_and_left_at_the_left():
-    car = vm.model("independent_suspension_vehicle")
-    histories = animation._quantities(car.simulate("lane_change").dataset(), "outputs")
-    frames = {name: values[:2000:100] for name, values in histories.items()}
-    looks = animation._styles(["slow_manifold", "full_order"])
-    names = "reduced", "full order"
-    scene = animation.SCENES["a car"]
-    film = animation._film(scene, [frames] * 2, names, looks, (car.parameters.values(), 1.0))
-    film._draw_was_started = True
-    above, behind = film._fig.axes
-    for frame in (0, 7):
-        film._func(frame)
-        for path in above.lines[2:]:
-            x, y = path.get_data()
-            np.testing.assert_array_equal(x, frames["longitudinal_position"][: frame + 1])
-            np.testing.assert_array_equal(y, frames["lateral_position"][: frame + 1])
-    assert (above.get_ylabel(), behind.get_xlabel()) == ("Y, left (m)",) * 2
-    low, high = above.get_ylim()
-    left, right = behind.get_xlim()
-    assert low < high
-    assert left > right
-    assert above.lines[0].get_color() == declared().methods["slow_manifold"].color
 
 
 def test_a_car_is_drawn_where_its_outputs_say():

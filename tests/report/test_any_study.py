@@ -19,7 +19,7 @@ from vehiclemor.report.default_studies import nominal, unseen
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.result_plot import draw, pictures_of, plot_result
 from vehiclemor.report.figures.theme import styled
-from vehiclemor.report.frames import ERRORS, frame, grid_rows
+from vehiclemor.report.frames import ERRORS, grid_rows
 from vehiclemor.report.labels import tabled_outputs
 from vehiclemor.report.page import error_table
 from vehiclemor.study.run import run_studies
@@ -133,27 +133,6 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     assert told == ["ok (trained on this run): not driven; not to be trusted on Mars"]
     data["status"][:] = "diverged"
     assert {row["failures"] for row in grid_rows(data)} == {"3 diverged", "6 diverged"}
-
-
-def test_a_frame_has_a_row_for_each_run_of_a_grid_and_of_a_protocol(place):
-    for name, dataset in run_studies(str(place / "both.toml"), place / "results").items():
-        runs = frame(dataset)
-        assert len(runs) == dataset["status"].size
-        axes = [str(dimension) for dimension in dataset["status"].dims]
-        assert {"label", "method"} <= set(runs), name
-        assert not runs.duplicated(axes).any()
-        # In the order of the grid: the first dimension changes last.
-        first = dataset[axes[0]].values
-        np.testing.assert_array_equal(runs[axes[0]], np.repeat(first, len(runs) // len(first)))
-        for row in runs.sample(5, random_state=1).to_dict("records"):
-            run = dataset.sel({axis: row[axis] for axis in axes})
-            assert row["status"] == run["status"].item()
-            assert row["method"] == run["method"].item()
-            for output in dataset["output"].values:
-                expected = run["rms_error"].sel(output=output).item()
-                np.testing.assert_array_equal(row[f"rms_error.{output}"], expected)
-        assert set(frame(dataset, ["status"])) >= {*axes, "status"}
-        assert "seconds" not in frame(dataset, ["status"])
 
 
 def test_a_protocol_is_judged_by_its_own_targets(place, said):

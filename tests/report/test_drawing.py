@@ -178,17 +178,6 @@ def test_what_was_not_compared_is_drawn_alone(tmp_path):
             vm.plot(result, "errors")
 
 
-def test_a_run_beside_full_order_has_its_methods_name_and_one_unit_in_a_panel():
-    rom = vm.reduce("double_wishbone", "pod", rank=3, training="nominal")
-    run, full = rom.simulate("sine_travel"), rom.model.simulate("sine_travel")
-    figure = checked(vm.plot(run, full))
-    assert "POD" in said(figure)[0]
-    error = float(vm.errors(run, full)["rms_error"].sel(output="spindle_y"))
-    panel = figure.axes[4]
-    assert panel.get_title(loc="left") == f"(e) RMS error {1e6 * error:.3g} µm"
-    assert panel.get_ylabel().endswith("(µm)")
-
-
 def test_a_rank_study_has_ranks_across_says_where_they_end_and_names_its_point(tmp_path, capsys):
     study = STUDIES["none"].partition("[grid]")[0] + "[grid]\nrank = [3, 4, 8]\n"
     study += "frequency_factor = [1.0, 1.2]\n"
@@ -206,17 +195,6 @@ def test_a_rank_study_has_ranks_across_says_where_they_end_and_names_its_point(t
     assert factors == ["1", "1.2"]
     point = vm.plot(path, results=tmp_path).get_suptitle()
     assert point.endswith("at frequency_factor 1.0, rank 3")
-
-
-def test_errors_are_drawn_over_what_is_not_chosen(folder):
-    data = stored(folder, "map-4")
-    chosen = vm.plot(data, "errors", label="untrusted_1")
-    assert chosen.axes[0].get_title(loc="left") == "(a) untrusted 1"
-    assert len(chosen.axes[0].texts) == 9
-    curve = checked(vm.plot(data, "errors", amplitude_factor=1.2)).axes[0]
-    lines = {line.get_label(): line for line in curve.lines}
-    place = {"label": "ok_0", "amplitude_factor": 1.2, "output": "second_euler_angle"}
-    np.testing.assert_array_equal(lines["ok 0"].get_ydata(), data["rms_error"].sel(place).squeeze())
 
 
 @pytest.mark.parametrize(
@@ -287,25 +265,3 @@ def test_curves_and_maps_show_the_errors():
     shown = figure.axes[0].collections[0].get_array().ravel()
     assert 1e-3 * shown.max() == pytest.approx(float(errors.max()))
     assert shown.size == errors.size
-
-
-def test_of_many_lines_no_two_have_one_colour():
-    data = varied(["pod"], frequency_factor=np.linspace(0.8, 1.4, 9), rank=[*range(1, 9)])
-    lines = [
-        line
-        for line in plot_result(data, None, "errors").axes[0].lines
-        if "rank" in line.get_label()
-    ]
-    assert len({line.get_color() for line in lines}) == len(lines) == 8
-
-
-def test_samples_are_drawn_over_what_was_sampled():
-    dataset = varied(sample=[*range(40)])
-    for number, name in enumerate(("first", "second", "third", "fourth")):
-        places = np.roll(np.linspace(0.0, 1.0, 40), 7 * number)
-        dataset = dataset.assign_coords({name: ("sample", places, {"units": "kg"})})
-    dataset["rms_error"] = dataset["rms_error"] * 0.0 + np.exp(dataset["third"])
-    figure = checked(plot_result(dataset, None, "errors"))
-    assert len(figure.axes) == 6
-    # Of four quantities the errors follow the third.
-    assert figure.axes[3].get_xlabel() == "third (kg)"

@@ -1,7 +1,5 @@
 """The figures of studies as data: what their texts, lines and limits are; and as files."""
 
-import re
-
 import matplotlib
 import numpy as np
 import pytest
@@ -9,7 +7,7 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from tests.report.figure_texts import checked, texts_of, varied
+from tests.report.figure_texts import checked, varied
 from vehiclemor.exceptions import InputError
 from vehiclemor.report.figures.costs import figure_pareto
 from vehiclemor.report.figures.errors import figure_errors
@@ -60,37 +58,6 @@ def drawn(results, unseen_travels):
         figures["map"] = figure_errors(grid_of("pod", "replay"), outputs=OUTPUTS)
         figures["pareto"] = figure_pareto(unseen_travels)
         return {name: checked(figure) for name, figure in figures.items()}
-
-
-def test_axes_have_units_and_no_label_is_longer_than_its_axis(drawn):
-    for name, figure in drawn.items():
-        for axis in figure.axes:
-            label = axis.yaxis.label
-            if label.get_text():
-                assert any(unit in label.get_text() for unit in ("(", "/", "energy")), name
-                assert label.get_window_extent().height <= axis.bbox.height, name
-            if axis.get_xlabel():
-                assert axis.xaxis.label.get_window_extent().width <= 1.1 * axis.bbox.width, name
-
-
-def test_exponents_are_superscripts(drawn):
-    for name, figure in drawn.items():
-        for text, _ in texts_of(figure):
-            assert not re.search(r"\^[^{]", text.get_text()), (name, text)
-
-
-def test_lines_differ_in_grey_too(drawn):
-    for name, figure in drawn.items():
-        for axis in figure.axes:
-            looks = {}
-            for line in axis.lines:
-                label = line.get_label()
-                if label and not label.startswith("_") and line.get_linestyle() != "None":
-                    marked = line.get_marker() not in ("None", None)
-                    face = line.get_markerfacecolor() if marked else ""
-                    grey = round(luminance(to_rgb(line.get_color())), 1), line.get_linewidth()
-                    look = str((line._dash_pattern, line.get_marker(), face, grey))
-                    assert looks.setdefault(look, label) == label, name
 
 
 def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, results):

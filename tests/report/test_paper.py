@@ -9,9 +9,8 @@ import measured_numbers
 import numpy as np
 import pandas as pd
 import pytest
-import regenerate
 import xarray as xr
-from drawings import coverage, fields
+from drawings import coverage
 from drawings.catalogue import FIGURES
 from mesh_sizes import size_rows
 from numbers_by_name import load
@@ -21,8 +20,6 @@ import vehiclemor as vm
 from tests.report.figure_texts import checked
 from vehiclemor.cli import main
 from vehiclemor.netcdf_file import read_dataset, write_dataset
-from vehiclemor.parameters import load_parameters
-from vehiclemor.registry import component
 from vehiclemor.report.figures.theme import styled
 
 # Widths of a column and of both in inches.
@@ -54,31 +51,6 @@ def test_figures_are_as_wide_as_a_column_or_two_and_nothing_is_cut_off(drawn):
         assert min(abs(figure.get_figwidth() - width) for width in WIDTHS) < 1e-9, name
         with styled(STYLE):
             checked(figure)
-
-
-def test_schematics_are_to_scale(drawn):
-    for name, model in (("01", "independent_suspension_vehicle"), ("08", "high_fidelity_vehicle")):
-        radius = load_parameters(model, component("model", model).parameters)["tire_radius"]
-        space = drawn[f"figure-{name}"].axes[0]
-        assert space.get_aspect() == 1.0
-        wheels = [line.get_xydata() for line in space.lines if len(line.get_xdata()) > 100]
-        assert len(wheels) == 4
-        for wheel in wheels:
-            # The longer half axis of a circle's projection is its radius.
-            longest = np.linalg.norm(wheel - wheel[:-1].mean(axis=0), axis=1).max()
-            assert longest == pytest.approx(float(radius), rel=1e-3)
-    texts = " ".join(text.get_text() for text in drawn["figure-01"].axes[0].texts)
-    # Of the public data.
-    assert "$a$ = 1.156 m" in texts
-    assert "$T_f$ = 1.387 m" in texts
-
-
-def test_what_the_folder_lacks_stays_as_it_is(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("sys.argv", ["regenerate", "--results", str(tmp_path), "--only", "size"])
-    before = (PAPER / "figures" / "size.svg").read_bytes()
-    assert regenerate.main() == 0
-    assert "size.svg stays as it is" in capsys.readouterr().err
-    assert (PAPER / "figures" / "size.svg").read_bytes() == before
 
 
 @pytest.fixture
@@ -152,15 +124,6 @@ def test_a_reduced_model_is_set_beside_the_cheapest_mesh_that_is_as_accurate():
     assert rows["shells, 5 m"]["growth_full"] == pytest.approx(1.0)
     assert rows["shells, 5 m"]["break_even"] == pytest.approx(2.0 / (16.0 - 0.05))
     assert rows["tricycle"]["rival_motion"] == ""
-
-
-def test_growth_over_meshes_stands_in_the_legend():
-    with styled(STYLE):
-        figure = fields.figure_size({"mesh_sizes": sized()})
-        checked(figure)
-    legend = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    # Of two small meshes of beams no growth is known.
-    assert {"shells, full: n$^{1.0}$", "beams, full"} <= set(legend)
 
 
 def test_every_picture_of_the_text_is_there():
