@@ -12,7 +12,6 @@ import vehiclemor as vm
 from vehiclemor.codegen.cache import cache_folder
 
 PACKAGE = Path(vm.__file__).parent
-MOST_LINES = 400
 # What takes longer to import than a model to run.
 HEAVY = ("numba", "sympy", "scipy", "pandas", "xarray", "matplotlib")
 
@@ -43,11 +42,6 @@ def test_no_files_import_one_another_in_a_circle():
         for name in free:
             del waiting[name]
     assert not waiting
-
-
-def test_no_file_is_long():
-    lengths = {name: len(path.read_text().splitlines()) for name, path in FILES.items()}
-    assert {name: length for name, length in lengths.items() if length > MOST_LINES} == {}
 
 
 SIMULATION = """

@@ -85,13 +85,6 @@ def test_what_is_no_result_is_not_replaced(other, run, name):
         WRITERS[name](path, run)
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_nor_by_a_command(other, capsys, name):
-    other(name)
-    assert main(COMMANDS[name].split()) == 2
-    assert name in capsys.readouterr().err
-
-
 def test_results_are_replaced_by_their_kind_alone(run, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     # What is not optimised compiles soon.
@@ -141,13 +134,3 @@ def test_keys_of_few_parts_and_long_lists_are_read(tmp_path):
         f'grid.frequency_factor = [{values}]\n[[methods]]\nmethod = "full_order"\n'
     )
     assert vm.status(str(path))["study"].runs == 60
-
-
-def test_studies_are_named_by_paths_too(tmp_path):
-    path = tmp_path / "study.toml"
-    path.write_text('title = "one"\nmodel = "double_wishbone"\n[[methods]]\nmethod = "pod"\n')
-    results = tmp_path / "results"
-    assert len(vm.compare(path, results=results)) > 0
-    assert vm.figures([path], results=results)
-    assert vm.write_report([path], results=results, out=tmp_path / "page.html").exists()
-    assert vm.describe(path) is not None

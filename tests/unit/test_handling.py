@@ -193,20 +193,6 @@ def test_a_car_that_stops_has_the_distance_to_its_stop():
     assert numbers["distance"] == pytest.approx(float(expected), rel=0.01)
 
 
-def test_numbers_of_the_vehicle_are_those_of_its_linear_model():
-    model = vm.model(CAR)
-    run = model.simulate(vm.maneuver("sine_sweep", amplitude=0.02))
-    numbers = vm.metrics(run)
-    linear = vm.reduce(model, "full_order").linearise().reachable()
-    output = linear.outputs.index("yaw_rate")
-    for hertz in (0.4, 1.2):
-        shifted = 2j * np.pi * hertz * np.eye(len(linear.states)) - linear.A
-        exact = linear.C[output] @ np.linalg.solve(shifted, linear.B[:, 0]) + linear.D[output, 0]
-        at = numbers.sel(frequency=hertz, method="nearest")
-        assert at["yaw_rate_gain"] == pytest.approx(abs(exact), rel=0.01)
-        assert at["yaw_rate_phase"] == pytest.approx(np.angle(exact), abs=0.01)
-
-
 @pytest.mark.parametrize(("name", "prefix"), [(CAR, ""), (FIDELITY, "rack_")])
 def test_reduced_vehicles_have_the_numbers_of_the_full_ones(name, prefix):
     full = vm.metrics(vm.model(name).simulate(vm.maneuver(f"{prefix}step_steer")))

@@ -100,13 +100,6 @@ def test_travel_and_rack_take_every_side_of_each_other_within_their_rectangle(na
     assert abs(np.corrcoef(inputs.T)[0, 1]) < 0.4
 
 
-def test_travel_and_rack_never_repeat():
-    # Spectral lines in the golden ratio: no common period.
-    sines = vm.maneuver("travel_and_rack").at(np.linspace(0.0, 1000.0, 100001)[:-1])
-    lines = np.abs(np.fft.rfft(sines, axis=0)).argmax(axis=0) / 1000.0
-    assert lines == pytest.approx([0.1, 0.1618], abs=1e-3)
-
-
 @settings(max_examples=30)
 @given(frequency=factors, amplitude=amplitudes)
 def test_the_rack_pulse_is_as_described_and_has_no_corner(frequency, amplitude):

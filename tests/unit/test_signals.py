@@ -129,11 +129,6 @@ def test_a_signal_ends_with_its_last_sample(car, hold):
         car.simulate(signal, times=np.array([1.0, 5.1]))
 
 
-def test_an_unknown_argument_is_one_of_the_function_that_was_called():
-    with pytest.raises(TypeError, match="from_csv"):
-        of_csv(TABLE, comma=",")
-
-
 def test_a_log_is_scaled_and_prints_its_file_and_size():
     signal = of_csv(COMMAS, separator=";", decimal=",", unit="deg", ratio=2.0)
     np.testing.assert_allclose(signal.at(np.array([0.0, 1.0]))[:, 0], [np.pi / 4, np.pi / 2])
@@ -183,17 +178,6 @@ def test_straight_lines_are_run_as_a_maneuver_of_the_same_lines(car):
         # The maneuver's lines are found to 1e-11; step sizes follow what is left.
         np.testing.assert_allclose(found.states, wanted.states, rtol=1e-7, atol=1e-6)
         np.testing.assert_allclose(found.inputs, wanted.inputs, atol=1e-15)
-
-
-@pytest.mark.parametrize("hold", ["linear", "zero", "cubic"])
-def test_what_is_noisy_is_run_as_accurately_as_what_is_smooth(car, hold):
-    t = np.linspace(0.0, 6.0, 301)
-    u = 0.01 * np.sin(t) + 2e-4 * np.random.default_rng(1).normal(size=len(t))
-    signal = vm.Signal.from_samples(t, u, hold)
-    exact = car.simulate(signal, "equilibrium", tolerance=1e-9)
-    found = car.simulate(signal, "equilibrium", solver="etdrk4", tolerance=2e-3)
-    place = car.outputs.index("lateral_position")
-    assert np.abs(found.outputs - exact.outputs)[:, place].max() < 0.01
 
 
 @pytest.mark.parametrize(
@@ -288,15 +272,6 @@ def test_a_table_gives_its_signal_back(tmp_path, car):
         np.testing.assert_allclose(car.simulate(signal).inputs, car.simulate(wanted).inputs)
 
 
-def test_a_signal_is_run_wherever_a_maneuver_is(car):
-    t = np.linspace(0.0, 4.0, 401)
-    signal = vm.Signal.from_samples(t, 0.01 * np.sin(t) ** 3, "cubic")
-    full = car.simulate(signal, "equilibrium")
-    result = vm.simulate(car, "pod", maneuver=signal, amplitude=0.9, training="nominal")
-    assert len(full.times) == 201
-    np.testing.assert_allclose(result["inputs"][:, 0], 0.9 * full.inputs[:, 0], atol=1e-12)
-
-
 def test_by_name_nothing_is_solved_twice(monkeypatch):
     solved, integrate = [], DynamicModel.integrate
 
@@ -319,21 +294,6 @@ def test_by_name_nothing_is_solved_twice(monkeypatch):
     assert not solved
     np.testing.assert_array_equal(run(other)["outputs"], without["outputs"])
     assert solved == ["2"]
-
-
-@pytest.mark.parametrize("solver", ["etdrk4", "dopri5"])
-def test_nothing_of_a_signal_is_left_for_the_next(car, solver):
-    t = np.linspace(0.0, 6.0, 301)
-    turns = 0.01 * np.abs((t + 0.5) % 2.0 - 1.0)
-    for k, u in enumerate((straight(t), turns, 0.01 * np.sin(t), -straight(t))):
-        signal = vm.Signal.from_samples(t, u)
-        how = {"solver": solver, "tolerance": 1e-4}
-        shared = car.simulate(signal, "equilibrium", **how)
-        # With a bound of its own, which is never reached, a run has a plan and space of its own.
-        alone = car.simulate(signal, "equilibrium", longest_step=1e3 + k, **how)
-        assert shared.counts == alone.counts
-        for name in ("inputs", "states", "outputs"):
-            np.testing.assert_array_equal(getattr(shared, name), getattr(alone, name))
 
 
 @pytest.mark.parametrize("hold", ["linear", "zero", "cubic"])
