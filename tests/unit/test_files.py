@@ -7,9 +7,8 @@ import pytest
 
 import vehiclemor as vm
 from vehiclemor.cli import main
-from vehiclemor.exceptions import FileError, VehiclemorError
+from vehiclemor.exceptions import VehiclemorError
 from vehiclemor.exporting import fmu
-from vehiclemor.files import write_text
 
 if os.name != "posix":
     pytest.skip("pipes, sockets and devices are those of POSIX", allow_module_level=True)
@@ -102,13 +101,6 @@ def test_results_are_replaced_by_their_kind_alone(run, tmp_path, monkeypatch, ca
         vm.rom(MODEL).save("run.nc", overwrite=True)
 
 
-def test_whatever_writes_leaves_devices_alone(tmp_path):
-    path = tmp_path / "pipe"
-    os.mkfifo(path)
-    with pytest.raises(FileError, match="pipe exists"):
-        write_text(path, "")
-
-
 READERS = {
     "a.toml": [vm.run_study, vm.status, vm.describe, vm.compare, vm.figures],
     "a.nc": [vm.load, vm.plot, lambda path: vm.convert(path, "csv")],
@@ -124,13 +116,3 @@ def test_what_is_no_file_is_refused_at_once(other, name):
     for read in READERS[name]:
         with pytest.raises(VehiclemorError):
             read(path)
-
-
-def test_keys_of_few_parts_and_long_lists_are_read(tmp_path):
-    path = tmp_path / "study.toml"
-    values = ",".join(f"{1.0 + k / 100}" for k in range(60))
-    path.write_text(
-        'title = "many"\nmodel = "double_wishbone"\n'
-        f'grid.frequency_factor = [{values}]\n[[methods]]\nmethod = "full_order"\n'
-    )
-    assert vm.status(str(path))["study"].runs == 60

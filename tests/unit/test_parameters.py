@@ -70,13 +70,9 @@ def test_values_come_in_declared_order_and_an_override_says_so(load):
     [
         ('model = "toy"', 'model = "other"', "'other'"),
         ("[parameters.pivot]", "[parameters.pivots]", "parameters.pivot is missing"),
-        ('unit = "m"', 'unit = "mm"', "parameters.pivot.unit: 'mm'"),
         ('source = "book"', 'source = "blog"', "parameters.pivot.source: 'blog'"),
         ("[4, 5.0, 6.0]", "[4.0, 5.0]", "parameters.pivot: a point has 3 components"),
-        ("[4, 5.0, 6.0]", "[4.0, 5.0, nan]", "parameters.pivot: nan is not finite"),
         ("value = 20.0", "value = 5.0", "parameters.speed: 5 m/s"),
-        ("value = 20.0", 'value = "long"', "parameters.speed.value"),
-        ('status = "published"', 'status = "guessed"', "parameters.pivot.status"),
     ],
 )
 def test_a_wrong_file_is_named(load, tmp_path, old, new, words):
@@ -100,18 +96,12 @@ def test_files_that_are_none_or_of_another_model(tmp_path: Path):
     ("name", "value", "words"),
     [
         ("pivots", [1, 2, 3], "did you mean pivot"),
-        ("pivot", [1, 2], "3 components"),
         ("pivot", [[1, 2, 3]], "not a number or list"),
-        ("pivot", "here", "'here' is not a number"),
-        ("pivot", [1, 2, np.nan], "nan is not finite"),
         ("pivot", [1, 2, -695], "-695"),
         ("pivot.y", [1], "a number is needed"),
         ("pivot.w", 1, "components x, y, z"),
         ("mass", 0, "0 kg is not above 0"),
-        ("mass", [2.0], "a number is needed"),
-        ("mass", 10**400, "is not a number"),
         ("speed", 5, "smallest allowed 10 m/s"),
-        ("speed", 60.5, "largest allowed 50 m/s"),
     ],
 )
 def test_a_wrong_override_is_named(load, name, value, words):

@@ -52,12 +52,6 @@ def test_derivatives_are_those_of_the_branch(model, points, of):
         np.testing.assert_allclose(model.jacobian(x, u, of=of), slopes, atol=1e-8)
 
 
-def test_at_a_kink_the_derivative_is_that_of_larger_arguments(model):
-    for a, slope in ((-0.5, 1.0), (0.5, 0.0)):
-        by_state = model.jacobian([a, 0.0, 0.0, 0.0], np.ones(3), of="outputs")
-        assert by_state[branches.LIMITED, 0] == slope
-
-
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 def test_exported_c(model, points, tmp_path):
     driver = compiled(vm.export(model, "c", tmp_path / "c"))

@@ -73,12 +73,8 @@ def test_jax_over_a_batch_and_by_tables(rng):
     [
         (CAR, {"to": "matlab"}, "'matlab'"),
         (CAR, {"to": "c", "step": 0.0}, "step: 0 s"),
-        (CAR, {"to": "c", "out": "no-such-folder/car"}, "no-such-folder"),
         (CAR, {"to": "jax", "out": "car.py"}, "jax"),
-        (3, {"to": "casadi"}, "model: 3"),
-        (CAR, {"to": "c", "integrator": "euler"}, "'euler'"),
         (CAR, {"to": "jax", "precision": "single"}, "not for jax"),
-        (CAR, {"to": "c", "outputs": 3}, "outputs is 3"),
         ("double_wishbone", {"to": "c", "integrator": "ros2"}, "no states"),
     ],
 )

@@ -28,9 +28,9 @@ ROOM = "vehiclemor.reduction"
 
 
 NAMES = [
-    *("os:system", "builtins:eval", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
-    *("vehiclemor.simulation.dynamic:DynamicModel", "vehiclemor.simulation.build:build"),
-    *("vehiclemor.simulation.system:System", f"{ROOM}.reduced_system:ReducedMechanism"),
+    *("os:system", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
+    *("vehiclemor.simulation.dynamic:DynamicModel",),
+    *(f"{ROOM}.reduced_system:ReducedMechanism"),
     *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.blocks", "PLANAR")),
     # Defined elsewhere.
     f"{ROOM}.vehicle.reduced_vehicle:Features",

@@ -1,11 +1,10 @@
 """Parts of saved models by declared types: what a file can't make, and what can't be written."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.reduction import parts
 from vehiclemor.reduction.parts import Parts
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -30,17 +29,3 @@ def test_another_model_is_not_written(model):
     other = build("independent_suspension_vehicle", overrides={"sprung_mass": 1400.0})
     with pytest.raises(InputError, match="it can't be saved: model is"):
         Parts(model).write(other, "model", DynamicModel)
-
-
-class Couple(NamedTuple):
-    """A part of a plug-in that holds more than it declares."""
-
-    items: tuple[float, float]
-
-
-def test_more_items_than_declared_are_not_written(model, monkeypatch):
-    monkeypatch.setattr(parts, "_plug_ins", lambda: {__name__.partition(".")[0]})
-    writer: Any = Parts(model)
-    assert writer.write(Couple((1.0, 2.0)), "couple")["items"] == [1.0, 2.0]
-    with pytest.raises(InputError, match=r"it can't be saved: couple\.items is"):
-        writer.write(Couple((1.0, 2.0, 3.0)), "couple")  # type: ignore[arg-type]

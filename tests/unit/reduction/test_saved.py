@@ -135,20 +135,19 @@ def test_a_path_that_is_taken_is_refused_unless_asked(car, saved):
 
 
 UNWRITABLE = [
-    *((lambda state: state, "offline"), (build(CAR).start, "offline"), (Pair(1.0, 2.0), "offline")),
-    *((KERNELS, "offline"), ([1.0, KERNELS], "offline"), ({2: 3.0}, "offline")),
-    *((np.array(["text"]), "offline"), (np.zeros(3, dtype=np.float32), "offline")),
-    (dataclasses.replace(build(CAR).system, inputs=1), "offline"),
+    lambda state: state,
+    build(CAR).start,
+    KERNELS,
+    [1.0, KERNELS],
+    dataclasses.replace(build(CAR).system, inputs=1),
 ]
 
 
-@pytest.mark.parametrize(("wrong", "what"), UNWRITABLE)
-def test_what_cant_be_written_is_named_and_leaves_no_file(wrong, what, car, tmp_path):
+@pytest.mark.parametrize("wrong", UNWRITABLE)
+def test_what_cant_be_written_is_named_and_leaves_no_file(wrong, car, tmp_path):
     other = dataclasses.replace(car, reduced=dataclasses.replace(car.reduced, offline=wrong))
-    with pytest.raises(InputError) as error:
+    with pytest.raises(InputError, match=r"it can't be saved: reduced\.offline is "):
         other.save(tmp_path / "car.nc")
-    start = f"linear_single_track of {CAR}: it can't be saved: reduced.{what} is "
-    assert str(error.value).startswith(start)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -184,16 +184,10 @@ def test_a_coarse_mesh_is_the_model_with_that_mesh():
 
 WRONG = [
     ("craig_bampton", {"highest": 1e-3}, "no mode is below 0.001 Hz: the first has"),
-    ("craig_bampton", {"highest": 0.0}, "highest is 0; it must be above 0"),
-    ("craig_bampton", {"highest": np.nan}, "highest"),
-    ("modal_truncation", {"highest": 1e-4}, "no mode is below 0.0001 Hz: the first has"),
-    ("fixed_basis", {"rank": 0}, "rank is 0; it must be at least 1"),
     ("pod", {"control_period": 0.01}, "control_period is below 0.1 s"),
-    ("full_order", {"tolerance": 1e9}, "tolerance"),
     ("slow_manifold", {}, "flexible_truck is of kind structural"),
     ("coarse_mesh", {"parameters": {"elements_per_bay": 1.5}}, "elements_per_bay is 1.5"),
     ("coarse_mesh", {"parameters": "elements_per_bay"}, "coarse_mesh: parameters "),
-    ("coarse_mesh", {"parameters": {"wheels": 3}}, "wheels"),
     ("full_order", {"parameters": {"payload": 3.0}}, "payload is set for each run"),
 ]
 

@@ -1,7 +1,6 @@
 """Tables: what is handed in stands there in every format; rates, times, printed numbers."""
 
 import math
-from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -13,19 +12,15 @@ from scipy.stats import binom
 
 import vehiclemor as vm
 from tests.models import MODELS
-from tests.unit import standard_problems
 from vehiclemor.registry import component, names
 from vehiclemor.report.default_studies import of_paper, smaller_rank
 from vehiclemor.report.labels import (
     Column,
     column,
     declared,
-    default_rank,
-    main_outputs,
     method_text,
     of_kind,
     readable_unit,
-    tabled_outputs,
     tables_file,
     timing_cases,
 )
@@ -127,7 +122,6 @@ def test_a_simulation_prints_the_errors_of_each_output_and_a_zero_as_such():
         assert rows[output][1:] == [f"{n:.1e}" if n else "0" for n in numbers] + [unit]
 
 
-PLAIN = standard_problems.DEFINITION
 NOMINAL = ("figures-6-7", "figures-2-4", "figures-9-10")
 
 
@@ -159,20 +153,6 @@ def test_settings_of_the_paper_are_the_defaults_of_pod(name, nominal):
         if number.kind == "rms_error":
             assert settings["rank"] == number.states
             assert settings["control_period"] == number.control_period
-
-
-def test_defaults_follow_the_kind():
-    speeds = {"ae": (), "ode": PLAIN.speeds, "dae": PLAIN.speeds}
-    for kind, counted in (("ae", "iterations"), ("ode", "rhs_calls"), ("dae", "rhs_calls")):
-        made = replace(PLAIN, kind=kind, speeds=speeds[kind], design_coordinates=PLAIN.starts)
-        cases = [case.id for case in timing_cases(made)]
-        assert cases[:2] == ["baseline", "strongest"]
-        assert cases[-4:] == ["replay", "pod_r1", "pod_literal_r1", "fixed_basis_r1"]
-        assert counted in of_kind(kind).counts
-    for coordinates, rank in ((1, 1), (2, 1), (3, 2), (4, 3), (26, 3)):
-        assert default_rank(coordinates) == rank
-    assert tabled_outputs(PLAIN) == tuple(output.name for output in PLAIN.outputs)
-    assert main_outputs(PLAIN) == ("angle", "tracked", "angular_speed")
 
 
 @given(st.integers(0, 40), st.integers(1, 400))

@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from tests.unit.standard_problems import maneuver
-from vehiclemor.codegen import kernels as codegen_kernels
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, check_subspace
 from vehiclemor.registry import component
 from vehiclemor.simulation import build
 from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.integrators import catalogue
 from vehiclemor.simulation.integrators.catalogue import INTEGRATORS
 from vehiclemor.simulation.workspaces import Solver
 
@@ -24,43 +22,6 @@ QUIET = maneuver(lambda times, *_: np.zeros((len(times), 3)), 1.0)
 @pytest.fixture(scope="module")
 def vehicle() -> DynamicModel:
     return build.build("high_fidelity_vehicle")
-
-
-@pytest.fixture
-def compiled(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of kernels that are asked for."""
-    asked: list[str] = []
-    machine = codegen_kernels._machine
-    monkeypatch.setattr(
-        codegen_kernels,
-        "_machine",
-        lambda source, *how: asked.append(source.name) or machine(source, *how),
-    )
-    return asked
-
-
-@pytest.mark.parametrize("solver", INTEGRATORS)
-def test_all_models_run_in_the_same_loop_and_need_two_kernels(standard, vehicle, compiled, solver):
-    found = []
-    for model, given in ((standard(), QUIET), (vehicle, STRAIGHT)):
-        compiled.clear()
-        model.simulate(given, times=np.array([0.1]), solver=solver, tolerance=1e-3)
-        found.append(catalogue.time_loop(solver, "full"))
-    assert found[0] is found[1]
-    # Neither the mass matrix nor the equations before elimination.
-    needed = {"derivative", "outputs"}
-    assert set(compiled) - {f"{solver}_step"} <= needed < set(vehicle.kernels.sources)
-
-
-def test_a_start_may_be_any_sequence_and_one_that_cannot_be_written(standard):
-    model = standard()
-    np.testing.assert_array_equal(model.start([0.1, 0.2, 0.3, 0.4]), [0.1, 0.2, 0.3, 0.4])
-    with pytest.raises(InputError, match="start"):
-        model.start([1.0, 2.0])
-    start = model.start()
-    start.flags.writeable = False
-    assert model.simulate(QUIET, start, solver="dopri5", tolerance=1).status == "ok"
-    np.testing.assert_array_equal(start, model.start())
 
 
 @pytest.mark.parametrize("lacking", ["second_order", "speeds"])

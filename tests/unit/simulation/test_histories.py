@@ -10,14 +10,11 @@ import pytest
 import vehiclemor as vm
 from tests.models import CAR, FIDELITY, VEHICLES
 from vehiclemor.exceptions import ConvergenceError
-from vehiclemor.inputs.steering import lane_change
 from vehiclemor.registry import component
-from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.control_periods import whole_space
 from vehiclemor.simulation.system import Solver
-from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, DYNAMIC_COUNTS, trajectory_dataset
-from vehiclemor.study.result import variables
+from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, trajectory_dataset
 
 
 def test_dataset_is_labelled_with_names_and_units(model, full):
@@ -41,25 +38,6 @@ def test_dataset_is_labelled_with_names_and_units(model, full):
         assert set(dataset[name][f"{label}_unit"].values) == {"m", "rad"}
     own = dataset["outputs"].sel(output="second_euler_angle")["output_unit"]
     assert str(own.item()) == "rad"
-
-
-def test_speeds_and_counts_of_a_dynamic_model_are_written():
-    vehicle = build("independent_suspension_vehicle")
-    run = vehicle.simulate(lane_change, times=[0.0, 0.5, 2.0])
-    dataset, name = trajectory_dataset(vehicle, run), vehicle.speeds[2]
-    speed = dataset["speeds"].sel(speed=name)
-    np.testing.assert_array_equal(speed, run.speeds[:, 2])
-    np.testing.assert_array_equal(run.states, np.hstack((run.coordinates, run.speeds)))
-    assert str(speed["speed_unit"].item()) == "m/s"
-    assert {count: int(dataset[count]) for count in DYNAMIC_COUNTS} == run.counts
-    assert not set(dataset.variables) & (set(ALGEBRAIC_COUNTS) - set(DYNAMIC_COUNTS))
-
-
-def test_stored_seconds_name_their_clock(model, full):
-    for name in ("seconds", "seconds_median", "seconds_lower"):
-        assert variables({name: 1.0})[name][2]["clock"] == run_timer.CLOCK
-    assert variables({"offline_seconds": 1.0})["offline_seconds"][2]["clock"] != run_timer.CLOCK
-    assert trajectory_dataset(model, full)["seconds"].attrs["clock"] == run_timer.CLOCK
 
 
 # One model: its runs share what they are recorded in.
