@@ -133,3 +133,18 @@ def test_a_run_that_leaves_its_range_says_when_and_ends_there(solver):
         assert (np.diff(finite.astype(int)) <= 0).all()
     np.testing.assert_array_equal(np.isfinite(few.states), np.isfinite(each.states))
     assert few.message.split(" at ")[1] == each.message.split(" at ")[1]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_limit_that_is_passed_between_the_points_of_a_step_ends_the_run(sign):
+    model, given = build(CAR), component("maneuver", "lane_change")
+    how = {"solver": "etdrk4", "tolerance": 0.1}
+    turning = sign * model.simulate(given, **how)["yaw_rate"]
+    # Passed in a few samples about the largest value.
+    most = 0.999 * turning.max()
+    limits = {"yaw_rate": (-9.0, most) if sign > 0.0 else (-most, 9.0)}
+    narrow = replace(model, definition=replace(model.definition, validity=limits))
+    with pytest.raises(ConvergenceError) as error:
+        narrow.simulate(given, **how)
+    known = np.isfinite(error.value.trajectory.outputs).all(axis=1)
+    assert known.sum() == np.argmax(turning > most)
