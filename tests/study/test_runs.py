@@ -430,3 +430,22 @@ def test_what_ends_a_batch_is_one_line_or_tried_again(error, ends):
     with ends:
         (done,) = workers.on_cluster([[]], client=client)
         assert done == Done([], KILLED)
+
+
+def test_a_scheduler_without_workers_is_told(monkeypatch, caplog):
+    monkeypatch.setattr(workers, "IDLE", 0.01)
+    future: Future[Done] = Future()
+    looks = []
+
+    def nthreads():
+        """Workers, which come at the third look and end the run."""
+        looks.append(len(looks))
+        if len(looks) < 3:
+            return {}
+        future.set_result(Done([]))
+        return {"tcp://": 1}
+
+    pool = SimpleNamespace(submit=lambda *_: future, shutdown=lambda **_: None)
+    client = SimpleNamespace(get_executor=lambda **_: pool, nthreads=nthreads)
+    assert list(workers.on_cluster([[]], client=client)) == [Done([])]
+    assert ["no worker" in message for message in caplog.messages] == [True]

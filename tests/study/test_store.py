@@ -54,6 +54,12 @@ def test_any_dataset_comes_back_as_it_was(shape):
             assert again[name].values.tobytes() == variable.values.tobytes()
 
 
+def test_what_has_no_place_in_a_run_is_refused():
+    for wrong in ({"data_vars": {"x": ("d", np.array([{}], dtype=object))}}, {"attrs": {"a": {1}}}):
+        with pytest.raises(TypeError):
+            encoded(xr.Dataset(**wrong), KEY)
+
+
 def test_every_flipped_bit_and_every_part_of_a_file_is_noticed():
     whole = encoded(a_run(), KEY)
     assert decoded(whole, KEY).ends == {("ok", ""): 2, ("diverged", "at 1 s"): 1}
@@ -167,6 +173,16 @@ def test_a_corrupt_run_is_quarantined_and_computed_again(done, place, computed, 
         assert all(str(path) in caplog.messages[-1] for path in (first, aside))
     assert computed == [first.stem] * 2
     assert len(caplog.messages) == 2
+
+
+def test_runs_that_do_not_fit_together_are_named(place):
+    path = max((place / "out" / "cells").glob("??/*"))
+    (place / "out" / "studies" / "small.nc").unlink()
+    path.write_bytes(
+        with_described(path.read_bytes(), lambda variables, _: variables.pop("warned"))
+    )
+    with pytest.raises(CorruptError, match="move it away"):
+        run(place / "small.toml", place / "out")
 
 
 def test_a_combined_dataset_with_any_damage_is_made_again(done, place, computed, caplog):

@@ -176,3 +176,12 @@ def test_the_identity_of_the_compiler_names_versions_and_processor(monkeypatch):
             patch.setattr(where, name, changed)
             assert identity() != before
     assert identity() == before
+
+
+def test_what_is_missing_has_no_address():
+    kernels = Kernels([DOUBLE])
+    assert "triple" not in kernels
+    assert kernels.address("triple") == 0
+    _, _, code = module._machine.__wrapped__(kernels.sources["double"])
+    with pytest.raises(ImportError, match="triple"):
+        code.address("triple")

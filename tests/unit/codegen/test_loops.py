@@ -163,6 +163,12 @@ def test_kernels_are_called_by_address_with_as_many_arrays_as_they_take(call, ex
     assert result == [expected]
 
 
+@pytest.mark.parametrize("call", ["0, x[::2], x, x, result", "0, x, 1.0, x, result"])
+def test_kernels_take_whole_arrays_alone(call):
+    with pytest.raises(NumbaError, match="C-contiguous"):
+        compiled(CALL.format(call))
+
+
 def test_another_source_entry_or_compiler_is_another_file(monkeypatch):
     names = []
 

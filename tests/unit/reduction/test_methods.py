@@ -198,7 +198,7 @@ def test_a_default_is_at_most_the_number_of_coordinates_where_it_says_so():
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
-        ("rank", 0, "rank is 0.*at least 1"),
+        ("rank", np.int64(0), "rank is 0.*at least 1"),
         ("rank", 2.5, "rank is 2.5, not an integer"),
         ("rank", float("nan"), "rank is nan, not finite"),
         ("period", 0.0, "period is 0.*above 0"),

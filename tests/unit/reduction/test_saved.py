@@ -139,6 +139,7 @@ UNWRITABLE = [
     build(CAR).start,
     KERNELS,
     [1.0, KERNELS],
+    {2: 3.0},
     dataclasses.replace(build(CAR).system, inputs=1),
 ]
 

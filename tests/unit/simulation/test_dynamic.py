@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.unit.standard_problems import maneuver
+from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, check_subspace
 from vehiclemor.registry import component
@@ -45,6 +46,14 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
         function(model.start())
 
 
+def test_equations_that_lack_a_function_make_no_model(standard):
+    model = standard()
+    sources = {k: v for k, v in model.equations.sources.items() if k != "outputs"}
+    lacking = replace(model, equations=replace(model.equations, sources=sources))
+    with pytest.raises(InputError, match="its equations have no outputs"):
+        build.reparametrised(lacking, {})
+
+
 # Borders
 
 
@@ -59,6 +68,17 @@ def test_a_run_that_ends_at_once_is_its_start(vehicle, solver, end):
 def test_a_start_with_rates_that_are_not_finite_says_so(vehicle, solver):
     with pytest.raises(ConvergenceError, match=r"a state is not finite at t = 0 s"):
         vehicle.simulate(STRAIGHT, np.full(52, 1e200), solver=solver)
+
+
+def test_a_kernel_that_is_not_there_is_never_called(standard):
+    system = standard().system
+    kernels = system.kernels.sources.values()
+    lacking = [kernel for kernel in kernels if kernel.name not in ("speeds", "outputs")]
+    system = replace(system, kernels=Kernels(lacking))
+    with pytest.raises(InputError, match="no speeds"):
+        system.called("coordinates", "")
+    with pytest.raises(InputError, match="no outputs"):
+        system.values_at("outputs", np.zeros((1, 4)), np.zeros((1, 3)), 8)
 
 
 # Runs that begin in mid-maneuver: cut at any time and continued, a run is the uncut one
