@@ -91,31 +91,6 @@ def test_a_study_that_extends_another_has_its_sets_and_the_rows_it_names(
             load_protocol("other.toml")
 
 
-def test_short_forms_say_the_same(tmp_path, protocol_text, protocol):
-    text = protocol_text
-    for old, new in (
-        (
-            """bounds.spindle_y = { measure = "rms", bound = 7.57e-5 }
-bounds.second_euler_angle = { measure = "max", bound = 2.4e-5 }
-""",
-            """bounds = [
-    { outputs = ["spindle_y"], measure = "rms", bound = 7.57e-5 },
-    { outputs = ["second_euler_angle"], measure = "max", bound = 2.4e-5 },
-]
-""",
-        ),
-        ("[{ tolerance = 1e-12 }, { tolerance = 1e-6 }]", "{ tolerance = [1e-12, 1e-6] }"),
-        (
-            "frequency = [0.7, 2.0], amplitude = [1.3, 1.4] }]",
-            "amplitude = [1.3, 1.4] }]\ncommon = { amplitude = [9.0], frequency = [0.7, 2.0] }",
-        ),
-    ):
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "small.toml").write_text(text)
-    assert load_protocol(str(tmp_path / "small.toml")).definition == protocol.definition
-
-
 # What the files of the package say
 
 

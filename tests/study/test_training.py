@@ -4,15 +4,12 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from tests.models import CAR, WISHBONE
+from tests.models import WISHBONE
 from tests.study.small import small_study
 from vehiclemor.cli.app import main
-from vehiclemor.reduction.methods import replay
-from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.registry import component
 from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.page import error_table
-from vehiclemor.simulation.build import build
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
 
@@ -72,20 +69,6 @@ def test_a_run_of_the_training_is_marked_by_its_content(case):
     assert bool(replayed(training=training, maneuver=tested)["in_training"]) is marked
     # What learns from no run has none in its training.
     assert not vm.simulate(WISHBONE, training=training, maneuver=tested)["in_training"]
-
-
-def test_replay_of_runs_of_other_lengths():
-    model = build(CAR)
-    step, change = component("maneuver", "step_steer"), component("maneuver", "lane_change")
-    runs = [TrainingRun(model, step, "equilibrium"), TrainingRun(model, change, "equilibrium")]
-    recorded = replay.fit(model, runs, {})
-    again = recorded.simulate(change.perturbed(1.0, 1.1), "equilibrium")
-    np.testing.assert_array_equal(again.coordinates, recorded.recorded[1].coordinates)
-    sweep = component("maneuver", "sine_sweep").perturbed(1.0, 0.0)
-    held = replay.fit(model, runs[:1], {}).simulate(sweep, "equilibrium")
-    assert held.coordinates.shape == (sweep.samples, len(model.coordinates))
-    np.testing.assert_allclose(held.coordinates[:251], recorded.recorded[0].coordinates)
-    np.testing.assert_array_equal(held.coordinates[-1], held.coordinates[250])
 
 
 STUDY = """

@@ -32,22 +32,15 @@ STUDIES = {
         ("rank = [3, 3]", "same value twice"),
         ("rank = [12]", "rank 12"),
         ("rang = [3]", "unknown grid dimension"),
-        ("amplitude_factor = [inf]", "amplitude"),
         ("frequency_factor = [-1.0]", "frequency"),
-        ("rank = {first = 1.0, last = 2.0, count = 1000000000}", "count"),
-        ("rank = {first = 1.0, last = inf, count = 3}", "grid.rank.span.last"),
     ],
     'method = "pod"': [
-        ('methode = "pod"', "methods.0"),
-        ('method = "dmd"', "unknown method"),
         ('method = "pod"\n[[methods]]\nmethod = "pod"', "used twice"),
         ('method = "pod"\nsettings = {rank = 2}', "rank is set twice"),
         ('method = "pod"\nrole = "baseline"', "methods.0.role"),
     ],
     'title = "for the tests"': [
         ("x = " + 2000 * "[" + 2000 * "]", "nested too deeply"),
-        ("x = " + 5000 * "9", "not a valid TOML file"),
-        (".".join(["a"] * 50_000) + " = 1", "a key has more than 8 parts"),
         ("x . 'y'\t.\"z\"" + ".a" * 50_000 + " = 1", "a key has more than 8 parts"),
         ("#" * 1_000_001, "bytes, more than 1000000"),
         (f"title = '{'x' * 900_000}'", "a text of 900000 characters"),
@@ -55,40 +48,24 @@ STUDIES = {
     'model = "double_wishbone"': [
         ('model = "double_wishbone"\nmaneuver = "lane_change"', "gives inputs delta")
     ],
-    "[grid]": [
-        ('training = "set"\n[grid]', "training_set"),
-        ("keep = 'all'\n[grid]", "keep"),
-        ("timed = 3\n[grid]", "timed is not a key of a grid: it belongs to a study with bounds"),
-    ],
     STUDY: [
-        ('title = "mine"\nstudies = ["double_wishbon"]', "unknown study"),
         ('title = "mine"\nstudies = ["absent.toml"]', "absent.toml"),
         ('title = "x"\nmodel = "x"\nstudies = ["a"]', "model is not a key of a collection: it"),
-        ('title = "x"\nstudies = []', "studies: "),
     ],
 }
 PROTOCOLS = {
     "points = [[0.9, 1.0]]": [
         ("points = [[1.0, 1.2]]", "is in training too"),
-        ("points = [[1.3, 1.0]]", "is in validation too"),
         ("points = []", "points is empty"),
         ("points = [[0.9]]", "a point is [frequency, amplitude]"),
-        ("points = [[0.9, 1.0, 20.0]]", "has no initial_speed"),
-        ("points = [[-0.9, 1.0]]", "test, group 1"),
-        ('start = ["droped"]', "unknown start 'droped'"),
         ("points = [[1.0, 1.0]], speed = [1.0]", "points or lists"),
     ],
     'test = [{ maneuver = "sine_travel"': [('test = [{ maneuver = "lane_change"', "delta")],
     'role = "full order"': [
-        ("candidates = [{ rank = 3 }]", "unknown setting of full_order"),
-        ('candidates = [{ preset = "best" }]', "unknown preset"),
-        ("candidates = [{}, {}]", "the same candidate twice"),
         ("candidates = { tolerance = 1e-3 }", "has a list of values"),
         ('training = ["lane_change"]', "training of"),
     ],
     "title =": [
-        ('targets = [{ against = "me", ratio = 2.0 }]\ntitle =', "target is against"),
-        ("rounds = 3\ntitle =", "rounds is not a key of a study with bounds: "),
         (
             'keep = "metrics"\ntitle =',
             "keep is not a key of a study with bounds: it belongs to a grid",
@@ -98,10 +75,8 @@ PROTOCOLS = {
     '"for the tests"': [('""', "title: ''")],
     'label = "newton"': [('label = "a\\nb"', r"label: 'a\nb'")],
     '"double_wishbone"': [('"double_wishbon"', "unknown model")],
-    "spindle_y": [("spindl_y", "unknown output")],
     "bound = 1e-4": [("bound = 0.0", "bounds.spindle_y.bound")],
     'bounds = { spindle_y = { measure = "rms", bound = 1e-4 } }': [
-        ("bounds = {}", "bounds: "),
         ('bounds = [{ measure = "rms", bound = 1e-4 }]', "has a list of outputs"),
         (f"bounds = [{', '.join(2 * [BOUND])}]", "spindle_y is in two tables"),
     ],
@@ -115,11 +90,7 @@ amplitude_factor = { first = 0.5, last = 0.9, count = 60 }
 """
 # Model, and what a study of it says.
 GRIDS = [
-    (WISHBONE, 'grid = { "parameters.tie_rod_iner.z" = [0.1] }', "tie_rod_inner"),
     (WISHBONE, 'grid = { "parameters.tie_rod_inner" = [0.1] }', "tie_rod_inner"),
-    (WISHBONE, 'grid = { "parameters.tie_rod_inner.z" = [-90.0] }', "millimetres"),
-    (WISHBONE, 'grid = { training = ["mached"] }', "matched"),
-    (WISHBONE, 'grid = { start = ["equilibrium"] }\nstart = ["equilibrium"]', "start is set twice"),
     (WISHBONE, 'start = ["equilibrium", "equilibrium"]', "start"),
     (WISHBONE, LARGE, "GB"),
     (CAR, 'grid = { maneuver = ["lane_change", "step_steer"] }', "metrics"),
@@ -131,22 +102,14 @@ DRAWN = "frequency = [0.7, 2.0], amplitude = [0.5, 1.1]"
 TWICE = '[[outside]]\nmaneuver = "chirp_travel"\npoints = [[1.0, 0.0]]\n\n[drawn]'
 # Part of the protocol with drawn sets -> what stands in its place; words of the line in order.
 DRAWS = [
-    (DRAWN, "frequency = [2.0, 0.7]", "drawn"),
-    ("amplitude = [1.3, 1.4]", 'start = ["dropped"]', "drawn_outside, box 1: ...dropped"),
-    ("runs = 5", "runs = 0", "drawn"),
-    (DRAWN, "members = [1, 2]", "drawn, box 1: ...sine_travel is no family"),
     (DRAWN, "members = [2, 1]", "members...in order"),
-    (DRAWN, "members = [-1, 1]", "members"),
     (DRAWN, "parameters.wheel = [0.0, 1.0]", "drawn, box 1: ...wheel"),
     (DRAWN, "parameters.wheel = [0.0, 0.0004]", "3 decimals"),
     (DRAWN, "parameters.initial_speed = [1.0, 2.0]", "by speed = ["),
-    ("[[0.9, 1.0]]", "[[0.9, 1.0]]\nparameters.wheel = [1.0]", "test, group 1: ...wheel"),
     ("[[0.9, 1.0]]", "[[0.9, 1.0]]\nparameters.wheel = []", "wheel is not a list of finite"),
     ('maneuver = "chirp_travel"', 'maneuver = "chrp_travel"', "test, group 2: ...chirp_travel"),
-    ("points = [[0.9, 1.0]]", "points = [[0.9, 1.0, 20.0]]", "test, group 1"),
     ("{ rank = 4 }", "{ rank = 3 }", "fixed basis"),
     ("{ tolerance = 1e-6 }", '{ tolerance = 1e-12, solver = "newton_lanes" }', "newton 1e-12"),
-    ("newton 1e-12", "newtn", "newton 1e-12"),
     ('reported = ["toe"]', 'reported = ["to"]', "toe"),
 ]
 FILES = [

@@ -81,19 +81,6 @@ def reduced(control):
     return vm.rom(control.MODEL)
 
 
-def test_costs_fall_as_their_derivatives_say(control, reduced):
-    controller, rng = control.Controller(reduced), np.random.default_rng(5)
-    # Half a second before the obstacle, so that the way leads into it.
-    state = reduced.state()
-    state[reduced.states.index("X")] = control.OBSTACLE[0] - 15.0
-    steering, along = 0.02 * rng.normal(size=(2, control.HORIZON))
-    values, slopes = controller.costs(state, 0.01, steering)
-    assert (values[2 * control.HORIZON : 3 * control.HORIZON] > 0.0).any()
-    sides = [controller.costs(state, 0.01, steering + h * along)[0] for h in (1e-4, -1e-4)]
-    difference = (sides[0] - sides[1]) / 2e-4
-    np.testing.assert_allclose(slopes @ along, difference, rtol=1e-6, atol=1e-6)
-
-
 def test_the_car_goes_around_the_obstacle_and_comes_back(control, reduced):
     full = vm.reduce(reduced.model, "full_order")
     runs = [control.drive(control.Controller(reduced), car, 3.6) for car in (full, reduced)]

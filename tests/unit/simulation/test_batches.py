@@ -11,7 +11,6 @@ from tests.models import CAR, WISHBONE
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component
 from vehiclemor.simulation import batches
-from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import FINISHED
 
 TIMES = np.linspace(0.0, 4.0, 41)
@@ -153,24 +152,6 @@ def test_parameters_by_run(full):
     alone = vm.simulate_many(own, signals[1:3], **KEPT)
     np.testing.assert_array_equal(table["values"][1:3], alone["values"])
     assert abs(table["values"] - table["values"][0])[1].max() > 1e-3
-
-
-@pytest.mark.parametrize("solver", ["etdrk4", "rodas4", "dopri5"])
-def test_similar_cars_share_all_but_their_numbers(solver, monkeypatch):
-    jacobian, made = System.jacobian, []
-    monkeypatch.setattr(System, "jacobian", lambda *of: made.append(of) or jacobian(*of))
-    (signal,) = vm.many_signals(TIMES, steering(1), "cubic")
-    car = vm.reduce(CAR, "full_order", solver=solver, tolerance=1e-8)
-    masses = float(car.parameters["sprung_mass"]) * np.array([0.91, 1.11, 0.97, 0.6, 1.02, 0.94])
-    found = vm.simulate_many(car, [signal] * 6, parameters={"sprung_mass": masses}, jobs=2)
-    assert len(made) <= 4  # of two groups in two threads
-    for run, mass in enumerate(masses):
-        other = vm.model(CAR, parameters={"sprung_mass": mass})
-        alone = vm.reduce(other, "full_order", solver=solver, tolerance=1e-8).simulate(signal)
-        np.testing.assert_array_equal(found["values"][run], alone.outputs)
-        exact = other.simulate(signal, solver="dopri5", tolerance=1e-10)
-        scale = np.abs(exact.outputs).max(axis=0) + 1e-3
-        np.testing.assert_allclose(alone.outputs / scale, exact.outputs / scale, atol=1e-3)
 
 
 STATE = [0.0] * 27

@@ -12,7 +12,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change, step_steer
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods import pod
-from vehiclemor.reduction.projection.dynamic import DynamicPodSettings, DynamicProjection, _weight
+from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
@@ -77,22 +77,6 @@ def test_projected_mechanics_keep_the_energy():
     exchanged = np.ptp([0.5 * p["m_s"] * x[16] ** 2 for x in run.states])
     assert exchanged > 1.0
     assert np.ptp(energy) < 1e-5 * exchanged
-
-
-def test_energy_weight_is_the_kinetic_energy(model):
-    generator = np.random.default_rng(5)
-    period = 0.5
-    weight = _weight(model, DynamicPodSettings(formulation="state"), np.zeros(0), [0.0, period])
-    rest = model.start()
-    for _ in range(5):
-        x = rest.copy()
-        x[N:] = generator.normal(size=N)
-        still = rest.copy()
-        still[N:] = 0.0
-        kinetic = oracle.energy(x, oracle.PARAMETERS) - oracle.energy(still, oracle.PARAMETERS)
-        assert x[N:] @ weight[N:, N:] @ x[N:] == pytest.approx(2.0 * kinetic, rel=1e-9)
-        rates = model.rhs(x, [0.0])[:N]
-        assert rates @ weight[:N, :N] @ rates * period**2 == pytest.approx(2.0 * kinetic, rel=1e-9)
 
 
 def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):

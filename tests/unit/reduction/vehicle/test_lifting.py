@@ -42,13 +42,6 @@ def test_the_compiled_lifting_is_the_formula(reduced, start):
     np.testing.assert_allclose(run.inputs, maneuver.at(maneuver.times), rtol=1e-12, atol=1e-15)
 
 
-def test_few_samples_are_lifted_alike(reduced):
-    maneuver = replace(CARS[reduced.model.name], duration=0.2, samples=5)
-    run = reduced.simulate(maneuver, "equilibrium")
-    states = lifted(reduced, maneuver, "equilibrium")
-    np.testing.assert_allclose(run.states[1:], states[1:], rtol=1e-9, atol=1e-12)
-
-
 def at_speed(reduced, start, speed):
     """State (2 n,) of a start at another speed."""
     return build(reduced.model.name, overrides={"initial_speed": speed}).start(start)
@@ -61,16 +54,6 @@ def test_straight_running_at_another_speed_is_known_to_stay_as_it_is(reduced, sp
     shapes = reduced.shape.of(reduced.simulate(maneuver, start).states)
     size = np.abs(reduced.shape.reference).max()
     assert np.abs(shapes - shapes[0]).max() < 1e-3 * size
-
-
-@pytest.mark.parametrize("start", ["equilibrium", "dropped"])
-def test_a_start_gives_one_run_by_its_name_and_by_its_numbers(reduced, start):
-    maneuver, state = CARS[reduced.model.name], reduced.model.start(start)
-    named = reduced.simulate(maneuver, start)
-    for given in (state, state.tolist(), state):
-        run = reduced.simulate(maneuver, given)
-        np.testing.assert_array_equal(run.states, named.states)
-        np.testing.assert_array_equal(run.outputs, named.outputs)
 
 
 def test_what_was_run_before_leaves_no_trace(reduced):
