@@ -157,32 +157,6 @@ def test_a_model_that_ships_shows_what_it_was_trained_on():
     assert str(vm.reduce(car.model, "linear_single_track")).endswith("training runs: none")
 
 
-@pytest.mark.parametrize("name", names("method"))
-def test_a_method_shows_every_setting_of_every_kind(name):
-    models = {model: vm.model(model) for model in names("model")}
-    shown, method = vm.describe(name), component("method", name)
-    for kind, declared in method.settings.items():
-        (table,) = [rows for key, rows in shown.items() if {"settings,", kind} <= set(key.split())]
-        assert [row["name"] for row in table] == list(declared.model_fields)
-        for row, field in zip(table, declared.model_fields.values(), strict=True):
-            assert (row["meaning"], row["default"]) == (field.description, field.default)
-    presets = {(row["preset"], row["kind"]) for row in shown["presets"]}
-    assert presets == {(p, kind) for kind in method.settings for p in method.presets_of(kind)}
-    for row in shown["models"]:
-        accepted, reason = method.accepts(models[row["model"]])
-        assert (row["accepted"], row["reason"]) == ("yes" if accepted else "no", reason)
-
-
-@pytest.mark.parametrize("name", names("maneuver"))
-def test_a_maneuver_shows_its_inputs_and_the_models_it_drives(name):
-    shown, maneuver = vm.describe(name), component("maneuver", name)
-    assert [row["name"] for row in shown["inputs"]] == list(maneuver.inputs)
-    signals = maneuver.at(maneuver.times)
-    assert [row["largest"] for row in shown["inputs"]] == signals.max(axis=0).tolist()
-    for model in shown["models"]:
-        assert vm.model(model).inputs == maneuver.inputs
-
-
 def test_a_study_shows_its_grid():
     for name in data_names("studies"):
         shown, definitions = vm.describe(name), load_studies(name)

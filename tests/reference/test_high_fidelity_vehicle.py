@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.oracles import high_fidelity_pinocchio as pinocchio
 from tests.oracles import high_fidelity_vehicle as oracle
-from tests.oracles.high_fidelity_data import PARAMETERS, design, mirror
+from tests.oracles.high_fidelity_data import PARAMETERS, design
 from tests.oracles.projected_simulation import projected_state
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
@@ -270,58 +270,3 @@ def heading(q: np.ndarray, corner: int) -> float:
     chassis, carrier = (Rotation.from_euler("ZYX", q[k : k + 3]) for k in (3, corner))
     axis = (chassis * carrier).apply([0.0, 1.0, 0.0])
     return np.arctan2(-axis[0], axis[1])
-
-
-def steady_turn(model: DynamicModel, speed: float) -> tuple[float, float]:
-    """Yaw rate and angle of the front wheels per displacement of the rack, 1/(m s) and rad/m."""
-    x, h = model.start(), 1e-5
-    jacobian = model.system.jacobian(x, REST)
-    # In axes that turn with the vehicle its lateral speed can be steady.
-    jacobian[N + 1, N + 3] -= speed
-    sides = (model.rhs(x, np.array([sign * h, 0.0, 0.0])) for sign in (1, -1))
-    by_rack = np.subtract(*sides) / (2 * h)
-    # Lateral motions are the ones that the mirror reverses; path, heading and wheel angles play
-    # no part.
-    part = np.array([2, 4, *range(5, 22), *range(N, 2 * N)])
-    reverse = (np.eye(2 * N) - mirror(np.eye(2 * N)).T)[np.ix_(part, part)] / 2
-    basis, size, _ = np.linalg.svd(reverse)
-    basis = basis[:, size > 0.5]
-    system = basis.T @ jacobian[np.ix_(part, part)] @ basis
-    steady = np.zeros(2 * N)
-    steady[part] = basis @ np.linalg.solve(system, -basis.T @ by_rack[part])
-    turned = [heading(x + 1e-6 * steady, corner) - heading(x, corner) for corner in (6, 13)]
-    return steady[N + 3], np.mean(turned) / 1e-6
-
-
-def single_track_gain(speed: float, loads: tuple[float, float], trail: float) -> float:
-    """Steady yaw rate in 1/s per angle of the front wheels of the linear single-track vehicle.
-
-    Parameters
-    ----------
-    loads
-        Of the front and the rear axle in N.
-    trail
-        How far behind the contacts' middles the lateral forces act, in m.
-    """
-    stiffness, wheelbase = 2 * 117000.0, 2.776
-    mass = sum(loads) / 9.81
-    ahead = wheelbase * loads[1] / sum(loads) - trail
-    behind = wheelbase * loads[0] / sum(loads) + trail
-    understeer = mass / wheelbase * (behind - ahead) / stiffness
-    return speed / (wheelbase + understeer * speed**2)
-
-
-@pytest.mark.parametrize(("speed", "without_trail"), [(10.0, 0.981), (20.0, 0.927), (30.0, 0.847)])
-def test_yaw_gain_is_the_single_track_vehicles(speed, without_trail):
-    model = build(NAME, overrides={"initial_speed": speed})
-    yaw_rate, angle = steady_turn(model, speed)
-    found = outputs(model, model.start(), REST)
-    loads = found["Fz_FL"] + found["Fz_FR"], found["Fz_RL"] + found["Fz_RR"]
-    # Small slips: the tire's moment is that of its force on a third of the width.
-    expected = single_track_gain(speed, loads, PARAMETERS["tyre.width"] / 3)
-    assert yaw_rate / angle / expected == pytest.approx(1.0, abs=1e-3)
-    assert yaw_rate / angle / single_track_gain(speed, loads, 0.0) == pytest.approx(
-        without_trail, abs=1e-3
-    )
-    if speed == 10.0:
-        assert np.degrees(angle) == pytest.approx(-421.0, abs=1.0)

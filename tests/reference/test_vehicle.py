@@ -11,7 +11,6 @@ from vehiclemor.simulation.dynamic import DynamicModel
 
 NAME = "independent_suspension_vehicle"
 LANE_CHANGE = component("maneuver", "lane_change")
-STRAIGHT = component("maneuver", "straight_ahead")
 # What the published vehicle leaves out: product of inertia and damping of the tires.
 EXTENDED = {"product_of_inertia": 35.0, "tire_damping": 400.0, "unsprung_mass": 44.0}
 IN_ORACLE = {"product_of_inertia": "Ixz", "tire_damping": "ct", "unsprung_mass": "m_u"}
@@ -163,22 +162,6 @@ def test_energy_changes_by_the_power_of_tires_and_dampers(vehicle):
 
 
 # Linear theory
-
-
-def test_yaw_gain_is_the_single_track_vehicles(vehicle):
-    x = vehicle.start()
-    h = 1e-5
-    by_steer = (vehicle.rhs(x, h) - vehicle.rhs(x, -h)) / (2 * h)
-    jacobian = vehicle.system.jacobian(x, np.zeros(1))
-    # Lateral motions are the ones that the mirror reverses; cyclic states play no part.
-    reverse = (np.eye(28) - np.array([oracle.mirror(e) for e in np.eye(28)])) / 2
-    lateral = [4 + 1, *range(6, 10), *range(14, 28)]
-    basis, size, _ = np.linalg.svd(reverse[np.ix_(lateral, lateral)])
-    basis = basis[:, size > 0.5]
-    system = basis.T @ jacobian[np.ix_(lateral, lateral)] @ basis
-    steady = basis @ np.linalg.solve(system, -basis.T @ by_steer[lateral])
-    gain = steady[lateral.index(19)]
-    assert gain == pytest.approx(oracle.single_track_yaw_gain(), rel=1e-5)
 
 
 def test_eigenvalues_are_those_of_the_exact_jacobian(vehicle):

@@ -21,7 +21,6 @@ from vehiclemor.report.figures.result_plot import draw, pictures_of, plot_result
 from vehiclemor.report.figures.theme import styled
 from vehiclemor.report.frames import ERRORS, grid_rows
 from vehiclemor.report.labels import tabled_outputs
-from vehiclemor.report.page import error_table
 from vehiclemor.study.run import run_studies
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
@@ -118,21 +117,6 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     figure = plot_result(data, None, "errors")
     assert "a run has failed" in [text.get_text() for text in figure.legends[0].get_texts()]
     checked(figure)
-    # What a protocol would not trust has the status ok, a mark and a remark.
-    data["warned"].loc[there | {"frequency_factor": 1.0}] = True
-    # The template's method reads no training: a mark that it could have.
-    data["in_training"].loc[there | {"frequency_factor": 1.0}] = True
-    data["remark"] = data["remark"].astype(object)
-    data["remark"].loc[there | {"frequency_factor": 1.0}] = "not driven; not to be trusted on Mars"
-    data["remark"].loc[there | {"frequency_factor": 0.8}] = "not driven"
-    now = {(r["label"], r["start"], r["output"]): r["warned"] for r in grid_rows(data)}
-    more = {key[:2] for key, count in now.items() if count != before[key]["warned"]}
-    assert more == {("mine", "dropped")}
-    table = error_table(data)
-    told = [status for status in table["status"] if status.endswith("Mars")]
-    assert told == ["ok (trained on this run): not driven; not to be trusted on Mars"]
-    data["status"][:] = "diverged"
-    assert {row["failures"] for row in grid_rows(data)} == {"3 diverged", "6 diverged"}
 
 
 def test_a_protocol_is_judged_by_its_own_targets(place, said):

@@ -73,17 +73,6 @@ def test_a_study_that_extends_another_has_its_sets_and_the_rows_it_names(
     assert third.definition.bounds == protocol.definition.bounds
     for old, new, words in (
         ("replay", "rerun", "rows: unknown row of small.toml 'rerun'"),
-        ("small.toml", "none.toml", "none.toml: no such file"),
-        ("small.toml", "paper", "extends: paper is a collection"),
-        ('["replay", "newton"]', "3", "rows: give a list of labels of the extended study"),
-        (
-            'rows = ["replay", "newton"]\n        targets = []',
-            "",
-            (
-                "'newton 1e-12', a row of small.toml: rows is needed and must name its method, of "
-                "newton, replay, fixed basis"
-            ),
-        ),
         ("small.toml", "other.toml", "extends: other.toml extends itself"),
     ):
         (tmp_path / "other.toml").write_text(more.replace(old, new, 1))

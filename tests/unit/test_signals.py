@@ -16,7 +16,6 @@ import vehiclemor as vm
 from tests.models import CAR
 from vehiclemor.exceptions import InputError, VehiclemorError
 from vehiclemor.inputs.maneuver import Maneuver
-from vehiclemor.simulation.dynamic import DynamicModel
 
 PRESETS = "recommended", "strongest", "paper"
 GAPS = st.lists(st.floats(1e-3, 0.5), min_size=1, max_size=30)
@@ -176,15 +175,6 @@ def test_a_log_may_be_long_and_noisy(name, duration):
         assert np.abs(run["yaw"] - exact["yaw"]).max() < 0.02
 
 
-@pytest.mark.parametrize("solver", ["etdrk4", "rodas4"])
-def test_a_spline_that_sets_off_from_rest_is_not_stepped_over(car, solver):
-    t = np.linspace(0.0, 4.0, 401)
-    signal = vm.Signal.from_samples(t, 0.01 * np.sin(5.0 * np.maximum(t - 1.0, 0.0)), "cubic")
-    exact = car.simulate(signal, "equilibrium", solver="dopri5", tolerance=1e-10)
-    found = car.simulate(signal, "equilibrium", solver=solver, tolerance=1e-7)
-    np.testing.assert_allclose(found["lateral_position"], exact["lateral_position"], atol=2e-5)
-
-
 def test_the_run_begins_with_the_first_sample_and_a_car_is_its_own_mirror_image(car):
     t = np.linspace(0.0, 4.0, 129)
     u = 0.01 * np.sin(t) ** 3
@@ -250,30 +240,6 @@ def test_a_table_gives_its_signal_back(tmp_path, car):
         read, written = signal.pieces.coefficients, wanted.pieces.coefficients
         np.testing.assert_allclose(read, written, 1e-12, atol=1e-15)
         np.testing.assert_allclose(car.simulate(signal).inputs, car.simulate(wanted).inputs)
-
-
-def test_by_name_nothing_is_solved_twice(monkeypatch):
-    solved, integrate = [], DynamicModel.integrate
-
-    def counted(self, maneuver, *arguments):
-        solved.append(maneuver.name)
-        return integrate(self, maneuver, *arguments)
-
-    def run(signal, **further):
-        given = {"maneuver": signal, "training": "matched", **further}
-        return vm.simulate(CAR, "linear_single_track", **given)
-
-    t = np.linspace(0.0, 3.0, 301)
-    one, other = (vm.Signal.from_samples(t, 0.01 * np.sin(k * t), name=f"{k}") for k in (1, 2))
-    monkeypatch.setattr(DynamicModel, "integrate", counted)
-    first = run(one).drop_vars("seconds")
-    solved.clear()
-    xr.testing.assert_identical(first, run(one).drop_vars("seconds"))
-    without = run(other, errors=False)
-    assert "rms_error" not in without
-    assert not solved
-    np.testing.assert_array_equal(run(other)["outputs"], without["outputs"])
-    assert solved == ["2"]
 
 
 @pytest.mark.parametrize("hold", ["linear", "zero", "cubic"])

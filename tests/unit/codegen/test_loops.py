@@ -13,7 +13,7 @@ from vehiclemor.codegen import loops as module
 from vehiclemor.codegen.compiler import compiled_loops
 from vehiclemor.codegen.kernels import Kernels, MachineCode
 from vehiclemor.codegen.loop_types import Float, Int, IntVector, Matrix, Vector, declared_arguments
-from vehiclemor.codegen.loops import Loop, address_of_array, ready
+from vehiclemor.codegen.loops import Loop, ready
 
 
 class Pair(NamedTuple):
@@ -80,24 +80,6 @@ def test_a_loop_computes_what_its_text_says(loop, bundle):
         found, expected = np.empty(3), np.empty(3)
         assert loop(given, 2.5, -3, found) == plain(bundle, 2.5, -3, expected) == -7
         np.testing.assert_allclose(found, expected, rtol=1e-14)
-
-
-def test_prepared_arguments_serve_many_runs_and_their_words_can_be_replaced(loop, bundle):
-    results = np.empty(3), np.empty(3)
-    run = loop.prepared(bundle, 1.0, 0, results[0])
-    run()
-    bundle.rows[:] *= 2.0
-    run.words[run.address("result")] = address_of_array(results[1])
-    run()
-    np.testing.assert_allclose(results[1], 2.0 * results[0], rtol=1e-14)
-    assert run.words[run.address("bundle.rows") + 1] == len(bundle.rows)
-
-
-def test_a_later_module_takes_the_place_of_an_earlier_one(bundle):
-    other = compiled(ENTRY, "def changed(value, factor):\n    return factor + 0.0 * value\n")
-    result = np.empty(3)
-    other(bundle, 2.5, 0, result)
-    np.testing.assert_array_equal(result, 2.5)
 
 
 def test_arrays_of_another_kind_are_refused(loop, bundle):

@@ -128,22 +128,6 @@ def test_model_exchange_with_another_integrator(units, case):
     assert relative(found[:, : wanted.shape[1]], wanted) < 1e-5
 
 
-@pytest.mark.parametrize("precision", ["double", "single"])
-def test_a_long_implicit_step_with_chosen_outputs(units, precision):
-    names = ("yaw_rate", "lateral_position")
-    options = {"step": 0.02, "integrator": "ros2", "precision": precision, "outputs": names}
-    model, path = units(*CASES[0], **options)
-    assert validate_fmu(str(path)) == []
-    described = fmpy.read_model_description(str(path))
-    # Older fmpy gives a number, newer text.
-    assert float(described.defaultExperiment.stepSize) == 0.02
-    found = simulated(path, "CoSimulation", 1.0, start_values={"delta": 0.03}, step_size=0.02)
-    signal = vm.Signal.from_samples([0.0, 1.0], [[0.03], [0.03]])
-    run = model.model.simulate(signal, tolerance=1e-9)
-    wanted = [run[name][-1] for name in names]
-    assert found[-1] == pytest.approx(wanted, rel=2e-3)
-
-
 def test_a_turned_car_moves_as_the_same_car_turned(started):
     model, unit = started(*CASES[2], integrator="ros2", step=0.02)
     names, angle = [f"state.{name}" for name in model.states], 2.0

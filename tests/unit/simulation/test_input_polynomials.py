@@ -7,16 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.unit.python_system import python_system
-from tests.unit.standard_problems import driven, maneuver
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import values_at
 from vehiclemor.inputs.maneuver import Maneuver, smooth
 from vehiclemor.inputs.polynomial_loops import Pieces
 from vehiclemor.inputs.polynomials import fitted_pieces
 from vehiclemor.registry import component
-from vehiclemor.simulation.control_periods import whole_space
-from vehiclemor.simulation.system import Solver
 
 LANE_CHANGE = component("maneuver", "lane_change")
 
@@ -49,23 +45,6 @@ def test_polynomials_equal_the_lane_change_at_any_time(frequency, amplitude):
     # Before and after the pulse the input is one constant.
     assert np.diff(signal.first)[[0, 2]].tolist() == [1, 1]
     assert not signal.coefficients[[0, -1]].any()
-
-
-@pytest.mark.parametrize("solver", ["dopri5", "etdrk4"])
-def test_compiled_loops_read_the_polynomials(solver):
-    man, seen = maneuver(driven, 8.0, (2.5,)), []
-
-    def time_itself(x, u):
-        seen.append((x[0], *u))
-        return [1.0]
-
-    run = python_system(time_itself, [0.0], 3).run(
-        man, np.zeros(1), whole_space(1), Solver(solver, 1e-6, longest_step=0.3)
-    )
-    np.testing.assert_allclose(run.path[:, 0], run.times, rtol=1e-12)
-    times, inputs = np.array(seen)[3:, 0], np.array(seen)[3:, 1:]
-    assert len(times) > 60
-    np.testing.assert_allclose(inputs, man.at(times), rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("at_jump", [0.0, 0.5, 1.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.models import MODELS, VEHICLES
+from tests.models import MODELS
 from tests.oracles import complex_step
 from vehiclemor.codegen.derivatives import JacobianProduct
 from vehiclemor.exceptions import InputError
@@ -81,20 +81,6 @@ def test_coordinates_of_a_mechanism_follow_its_inputs_and_its_points(runs):
     for by, expected in (("inputs", by_inputs), ("tie_rod_outer", by_point)):
         found = [model.jacobian(q, u, by, of) for of in ("coordinates", "outputs")]
         np.testing.assert_allclose(np.vstack(found), np.transpose(expected), rtol=0, atol=2e-8)
-
-
-@pytest.mark.parametrize("name", VEHICLES)
-def test_jacobians_are_those_of_differences_at_straight_running_too(runs, name):
-    model, run = runs[name]
-    for x, u in ((model.start(), run.inputs[0]), (run.states[300], run.inputs[300])):
-        jacobian, differences = model.jacobian(x, u), model.system.jacobian(x, u)
-        scale = np.abs(jacobian).max()
-        # At rest on the road a step of differences makes tires slip: a norm at its kink.
-        np.testing.assert_allclose(jacobian / scale, differences / scale, rtol=0, atol=1e-5)
-        # Places on the road change nothing.
-        assert not np.delete(jacobian, model.active, axis=1).any()
-    # No slip, no drift: norms at zero.
-    assert np.isfinite(model.jacobian(model.start(), run.inputs[0], of="outputs")).all()
 
 
 def test_what_can_not_be_differentiated_is_refused(runs):

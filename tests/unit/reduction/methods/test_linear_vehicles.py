@@ -15,8 +15,6 @@ from vehiclemor.inputs.steering import (
     rack_straight_ahead,
     straight_ahead,
 )
-from vehiclemor.reduction.methods.linearised import ModalVehicleSettings, truncated
-from vehiclemor.reduction.vehicle.linear_modes import lateral_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 
 VEHICLES = {
@@ -88,12 +86,6 @@ def single_track(model, speed):
 def test_single_track_corners_as_the_linearised_vehicle(shape):
     turn = -np.linalg.solve(*single_track(shape.model, shape.speed))[1]
     assert turn == pytest.approx(steady_turn(shape), rel=1e-6)
-
-
-def test_static_correction_keeps_steady_cornering(shape):
-    kept, follow = truncated(shape, *lateral_modes(shape), ModalVehicleSettings(fastest=20.0))
-    moved = follow[:, 0] - kept.right @ np.linalg.solve(kept.rates, kept.input_matrix)
-    assert shape.linearised.velocity_a[0] @ moved == pytest.approx(steady_turn(shape), rel=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -121,24 +121,6 @@ def test_leaving_the_training_is_said_with_time_and_place(model, both, sign, col
     assert np.isnan(stopped.outputs[first:]).all()
 
 
-def test_the_edge_of_training_is_known_and_beyond_it_nothing(model, nominal):
-    reduced = mapped(model, nominal, outside="stop")
-
-    def end(maneuver):
-        run = reduced.simulate(maneuver, START)
-        return run.status, reduced.trust(run.coordinates, run.inputs).indicator
-
-    assert end(nominal) == ("ok", pytest.approx(1.0 / 1.01, abs=1e-5))
-    for amplitude, status in ((1.01 - 1e-6, "ok"), (1.01 + 1e-6, "diverged")):
-        found, indicator = end(nominal.perturbed(1.0, amplitude))
-        assert (found, indicator > 1.0) == (status, status == "diverged")
-    # Another rack than in training, however little it moves.
-    still = np.arange(nominal.samples) >= 500
-    aside = travelling(lambda t: (0.05 * np.sin(t), 1e-6 * still), nominal)
-    assert end(aside)[0] == "diverged"
-    assert "s0 1e-06 m" in reduced.simulate(aside, START).message
-
-
 def test_wrong_training_and_inputs_are_refused(model, nominal):
     # Either is within reach; both together are not.
     corner = travelling(lambda t: (-0.18 * (t < 5.0), 0.08 * (t >= 5.0)), nominal)

@@ -7,37 +7,14 @@ import math
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from tests.unit.python_system import python_system
 from tests.unit.standard_problems import maneuver
 from vehiclemor.simulation.control_periods import whole_space
-from vehiclemor.simulation.integrators.etdrk4 import phi_functions
 from vehiclemor.simulation.integrators.step_kernels import partners, signs
 from vehiclemor.simulation.system import Solver
 
 QUIET = maneuver(lambda t, *_: np.zeros((len(t), 3)), 4.0)
-
-
-def exact_functions(matrix: np.ndarray, highest: int) -> list[np.ndarray]:
-    """phi_0 to the highest as blocks of one matrix exponential (Higham, theorem 10.15)."""
-    n = len(matrix)
-    large = np.zeros(((highest + 1) * n, (highest + 1) * n))
-    large[:n, :n] = matrix
-    large[: highest * n, n:] += np.eye(highest * n)
-    return np.split(expm(large)[:n], highest + 1, axis=1)
-
-
-@pytest.mark.parametrize("norm", [0.0, 1e-3, 1.0, 30.0, 500.0])
-def test_phi_functions_agree_with_one_exponential(norm):
-    # Stable, with a defective pair, as those of stabilised constraints.
-    z = -np.diag([0.0, 0.1, 0.5, 1.0, 1.0]) + np.diag([0.3, 0.2, 0.0, 1.0], 1)
-    for seed in range(20):
-        q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(5, 5)))
-        matrix = norm * (q @ z @ q.T)
-        pairs = zip(phi_functions(matrix), exact_functions(matrix, 3), strict=True)
-        for found, expected in pairs:
-            np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
 
 
 def test_partners_are_told_by_names_and_an_asymmetric_system_has_no_signs():
