@@ -20,15 +20,11 @@ from vehiclemor.cli import main, studies
 from vehiclemor.cli.app import COMMANDS, ended
 from vehiclemor.cli.options import key_values
 from vehiclemor.exceptions import MachineError
-from vehiclemor.files import data_names
 from vehiclemor.parameters import load_parameters
 from vehiclemor.reduction.methods import replay
 from vehiclemor.registry import component, names
 from vehiclemor.report.description import SCHEMAS
 from vehiclemor.study import run as study_run
-from vehiclemor.study.plans.loading import load_studies
-from vehiclemor.study.plans.protocol import load_protocol
-from vehiclemor.study.plans.study_file import GridFile
 
 
 @pytest.fixture
@@ -139,38 +135,6 @@ def test_a_model_shows_all_that_it_declares(name):
     rows = vm.describe("double_wishbone", {"wheel_centre": [0.0, 0.8, -0.1]})["parameters"]
     (row,) = [row for row in rows if row["name"] == "wheel_centre"]
     assert (row["value"], row["source"]) == ([0.0, 0.8, -0.1], "override")
-
-
-def test_a_model_that_ships_shows_what_it_was_trained_on():
-    car = vm.rom("independent_suspension_vehicle")
-    shown = vm.describe(car.model.name)["reduced model that ships"]
-    speeds = [run["speed"] for run in car.training]
-    assert shown["initial speed, m/s"] == f"{min(speeds):g} to {max(speeds):g}"
-    assert shown["training runs"] == str(len(speeds))
-    assert shown["maneuvers"].startswith("lane_change, multisine")
-    assert shown["starts"] == "dropped, equilibrium"
-    largest = car.input_range.largest[:, 0]
-    assert f"{largest[0]:.3g} rad ({np.degrees(largest[0]):.3g} deg)" in shown["input delta"]
-    lines = str(car).splitlines()
-    assert lines[0] == f"{car.model.name} by slow_manifold, order 12"
-    assert lines[1:] == [f"  {name}: {text}" for name, text in shown.items() if name != "method"]
-    assert str(vm.reduce(car.model, "linear_single_track")).endswith("training runs: none")
-
-
-def test_a_study_shows_its_grid():
-    for name in data_names("studies"):
-        shown, definitions = vm.describe(name), load_studies(name)
-        definition = definitions.get(name)
-        if isinstance(definition, GridFile):
-            assert shown["grid points"] == definition.points
-            assert [row["dimension"] for row in shown["grid"]] == list(definition.grid)
-    members = {row["study"]: row["runs"] for row in vm.describe("paper")["studies"]}
-    assert members["figure-13-frequency"] == 31 * 5
-    assert vm.describe("paper")["runs"] == sum(members.values())
-    protocol = load_protocol("predictive-independent_suspension_vehicle").definition
-    runs = vm.describe("predictive-independent_suspension_vehicle")["runs"]
-    assert f"{protocol.drawn.runs} drawn" in runs
-    assert f"{sum(g.scenarios for g in protocol.validation)} validation" in runs
 
 
 STUDY = """

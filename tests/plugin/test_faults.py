@@ -187,25 +187,6 @@ def test_the_machine_or_the_user_stops_a_method(faulty, capsys, fit, status, wor
     assert words in capsys.readouterr().err
 
 
-TRAVEL = """
-from dataclasses import replace
-from vehiclemor.inputs.suspension import sine_travel
-MANEUVER = replace(sine_travel, name="faulty", %s)
-"""
-
-
-@pytest.mark.parametrize(
-    ("function", "text"), [("signal", "raise SystemExit(0)"), ("corners", "1 / 0")]
-)
-def test_a_maneuver_that_breaks_is_named_with_its_line(plug_in, capsys, function, text):
-    travel = f"def broken(*_):\n    {text}\n{TRAVEL % f'{function}=broken'}"
-    plug_in("faulty", travel, ":MANEUVER", "maneuver")
-    assert main(["simulate", "double_wishbone", "--maneuver", "faulty"]) == 1
-    message = capsys.readouterr().err
-    assert f"vehiclemor: maneuver 'faulty': {function}: " in message
-    assert ".py:2)" in message
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [

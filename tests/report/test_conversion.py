@@ -30,6 +30,9 @@ def test_a_table_has_a_row_for_each_point(study, tmp_path, to):
     read = {"csv": lambda p: pd.read_csv(p, keep_default_na=False), "parquet": pd.read_parquet}
     table = read[to](path)
     assert len(table) == 8
+    # In the order of the grid: the first dimension changes last.
+    first = next(str(name) for name in found["status"].dims if found.sizes[name] > 1)
+    np.testing.assert_array_equal(table[first], np.repeat(found[first], 8 // found.sizes[first]))
     point = {"parameters.tie_rod_inner.z": -0.09, "rank": 3, "label": "pod"}
     row = table.query("`parameters.tie_rod_inner.z` == -0.09 and rank == 3 and label == 'pod'")
     here = found.sel(point).squeeze()

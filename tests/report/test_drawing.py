@@ -222,12 +222,9 @@ MANY = {"rank": [*range(1, 9)]}
     ("dimensions", "label", "panels", "meshes"),
     [
         (FACTOR | {"rank": [1, 2, 3]}, "frequency perturbation (%)", 2, 0),
-        (FACTOR | MANY, "rank", 2, 0),
         (FACTOR | {"amplitude_factor": [0.9, 1.0]}, "frequency perturbation (%)", 4, 4),
         ({"tolerance": [1e-8, 1e-6, 1e-3]}, "tolerance", 2, 0),
-        (MANY | {"snapshots": [*range(5, 11)]}, "rank", 4, 4),
         (MANY | {"formulation": ["state", "paired"], "start": ["a", "b", "c"]}, "rank", 4, 4),
-        ({"start": ["a", "b"], "rank": [1, 2, 3]}, "rank", 2, 0),
         ({"formulation": ["coordinates", "state", "paired"]}, "formulation", 2, 0),
         ({"equation_seed": [*range(30)]}, "equation seed, sorted by error", 2, 0),
     ],

@@ -4,7 +4,6 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 from tests.report.figure_texts import checked, varied
@@ -20,13 +19,6 @@ PARETO = "predictive-double_wishbone"
 
 FACTORS = np.linspace(0.7, 1.3, 7)
 OUTPUTS = ("lateral_position", "yaw")
-
-
-def luminance(color):
-    """Relative luminance of a colour (red, green, blue), as WCAG 2 defines it."""
-    parts = np.array(color)
-    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
-    return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def grid_of(*labels):
@@ -81,17 +73,6 @@ def steps_of(line):
     """Edges and heights of a stair, each height twice."""
     x, y = line.get_data()
     return np.repeat(x, 2)[1:-1], np.repeat(y[:-1], 2)
-
-
-def test_maps_hold_the_nominal_input_and_read_well(drawn):
-    cells = [t for t in drawn["map"].axes[0].texts if t.get_text()]
-    assert len(cells) == 49
-    assert not [t for t in cells if "e" in t.get_text()]
-    mesh = drawn["map"].axes[0].collections[0]
-    colors = mesh.to_rgba(mesh.get_array()).reshape(-1, 4)
-    for text, color in zip(cells, colors, strict=True):
-        one, other = sorted((luminance(to_rgb(text.get_color())), luminance(color[:3])))
-        assert (other + 0.05) / (one + 0.05) > 4.5
 
 
 def test_files_have_fonts_texts_resolution_and_style(drawn, tmp_path):

@@ -92,30 +92,6 @@ def test_the_choice_does_not_read_the_test_set(done, tmp_path, protocol_text):
     assert not set(files(folder, "test")) & set(files(tmp_path, "test"))
 
 
-def no_timing(_, rows, scenarios, *__):
-    shape = len(rows), len(scenarios)
-    return xr.Dataset(
-        {
-            **{name: (("label", "scenario"), np.ones(shape)) for name in SECONDS},
-            "offline_seconds": ("label", np.ones(shape[0])),
-        },
-        attrs={"timing": "none"},
-    )
-
-
-def test_a_second_run_computes_nothing_and_processes_change_nothing(
-    done, tmp_path, protocol_text, monkeypatch
-):
-    folder, study, dataset = done
-    written = {path: path.stat().st_mtime_ns for path in (folder / "cells").rglob("*")}
-    again = run_studies(study, folder)["small0"]
-    assert {path: path.stat().st_mtime_ns for path in (folder / "cells").rglob("*")} == written
-    xr.testing.assert_identical(again, dataset)
-    monkeypatch.setattr("vehiclemor.study.plans.protocol_run._timed", no_timing)
-    run_studies(study_of(tmp_path, protocol_text), tmp_path, jobs=2)
-    assert_same(files(folder), files(tmp_path))
-
-
 def test_the_comparison_marks_the_winner_and_judges_it(done):
     folder, study, dataset = done
     rows = study_comparison(study, folder)

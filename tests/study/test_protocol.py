@@ -1,7 +1,6 @@
 """Protocols: scenarios of the files, drawn test runs, and how the runs are judged."""
 
 import hashlib
-import math
 import re
 from dataclasses import replace
 
@@ -17,14 +16,13 @@ from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.plans.choice import Validation, choose, outcomes, reasons, scores
 from vehiclemor.study.plans.protocol import (
     _of_group,
-    _sampled_run,
     load_protocol,
     protocol_names,
     sampled_runs,
     sampled_sets,
 )
 from vehiclemor.study.plans.study_file import Bound
-from vehiclemor.study.plans.study_runs import FACTORS, Box, Draw, Group
+from vehiclemor.study.plans.study_runs import Box, Draw, Group
 
 SAME_POINT = "f 1.01, a 1.435, equilibrium, 18.548 m/s"
 BOX = Box(maneuver="sine_travel", frequency=[0.7, 1.8], amplitude=[0.5, 1.1], start=["equilibrium"])
@@ -145,29 +143,6 @@ def test_an_audit_draws_other_runs_and_stands_apart(protocol, tmp_path):
     assert (protocol.study, audit.study) == ("small", "small-seed-7")
     with pytest.raises(InputError, match="seed"):
         vm.run_study("figure-12", seed=7, results=tmp_path)
-
-
-def test_members_and_parameters_are_drawn_after_all_else(protocol):
-    box = BOX.model_copy(update={"maneuver": "road_travel"})
-    further = {"members": [3, 6], "parameters": {"tie_rod_inner.z": [0.1, 0.2], "a.b": [1.0, 1.0]}}
-    full = Box.model_validate(box.model_dump() | further)
-    assert _sampled_run(protocol.model, full, iter_of(9)).parameters[0] == ("a.b", 1.0)
-    for seed in range(20):
-        plain = _sampled_run(protocol.model, box, iter_of(seed))
-        run = _sampled_run(protocol.model, full, iter_of(seed))
-        of_plain = run.maneuver.perturbed(*(getattr(plain.maneuver, f) for f in FACTORS))
-        assert (run.maneuver, run.start, run.speed) == (of_plain, plain.start, plain.speed)
-        value = dict(run.parameters)["tie_rod_inner.z"]
-        assert 0.1 <= value == round(value, 3) <= 0.2
-    names = [_sampled_run(protocol.model, full, iter_of(k)).maneuver.name for k in range(400)]
-    counts = [names.count(f"road_travel:{number}") for number in (3, 4, 5, 6)]
-    # Binomial: five standard deviations.
-    assert sum(counts) == 400
-    assert all(abs(count - 100) < 5.0 * math.sqrt(75.0) for count in counts)
-
-
-def iter_of(seed):
-    return np.random.default_rng(seed).random
 
 
 def test_parameters_of_a_group_are_combined_with_all_else(protocol):

@@ -110,23 +110,6 @@ def test_full_and_reduced_car_have_one_optimal_lane_change(reduced):
     assert np.abs(plan - expected).max() < 0.1 * np.abs(linear - expected).max()
 
 
-def test_a_reduced_car_that_brakes_leads_the_full_one_into_the_other_lane():
-    planning = example("optimal_control")
-    reduced = planning.braking_car()
-    full = vm.reduce(reduced.model, "full_order")
-    planners = [planning.Planner(car, 10, steps) for car, steps in ((reduced, 1), (full, 0))]
-    plans = np.array([p.plan(p.start())[0] for p in planners])
-    steering, braking = np.abs(plans[0] - plans[1]).max(axis=1)
-    assert steering < 0.1 * np.abs(plans[1, 0]).max()
-    assert braking < 0.1
-    assert plans[1, 1].max() > 2.0
-    seen, _ = planning.drive(planners[0], full, 2.0)
-    # On the way there it slows down.
-    assert 1.0 < seen[-1, 0] < planning.LANE
-    assert abs(seen[-1, 1] - planning.SPEED) < 0.5
-    assert (np.diff(seen[:, 1]) < 0.05).all()
-
-
 def test_a_mean_of_sampled_plans_leads_around_the_obstacle(control, reduced):
     sampling = example("sampled_plans")
     full = vm.reduce(reduced.model, "full_order")

@@ -26,19 +26,3 @@ CHEAPER = points((1e-2, 1e-4, 5.0), (1e-3, 1e-5, 2.0))
 )
 def test_the_cheapest_that_reaches_the_target_not_by_luck_is_chosen(scan, target, tolerance):
     assert (report.choose(scan, target) or {}).get("tolerance") == tolerance
-
-
-def case(**seconds):
-    curves = {
-        label.replace("_", " "): {"delivers": "states", "points": points((1e-3, 1e-4, s))}
-        for label, s in seconds.items()
-    }
-    about = {"title": "a car", "unit": "m", "targets": [1e-3], "clock": "CPU time", "about": ""}
-    return about | {"curves": curves, "missing": {"other": "not installed (No module)"}}
-
-
-def test_a_peer_that_is_faster_stands_first_and_is_said_so():
-    rows = report.rows(case(ours_slow=2e-3, ours=1e-3, peer=4e-4, late=3e-2), 1e-3, "states")
-    assert [row[0] for row in rows] == ["peer", "ours", "ours slow", "late"]
-    assert [row[3] for row in rows] == ["0.4: FASTER THAN OURS", "1", "2", "30"]
-    assert rows[0][1] == "400 us"

@@ -240,15 +240,3 @@ def test_a_table_gives_its_signal_back(tmp_path, car):
         read, written = signal.pieces.coefficients, wanted.pieces.coefficients
         np.testing.assert_allclose(read, written, 1e-12, atol=1e-15)
         np.testing.assert_allclose(car.simulate(signal).inputs, car.simulate(wanted).inputs)
-
-
-@pytest.mark.parametrize("hold", ["linear", "zero", "cubic"])
-def test_many_are_as_one_by_one(hold):
-    times, values = samples([0.1, 0.2, 0.3], 8)
-    every = vm.many_signals(times, values.reshape(4, 4, 2).swapaxes(0, 1), hold)
-    places = np.linspace(0.0, times[-1], 101)
-    assert len(every) == 4
-    for run, signal in enumerate(every):
-        alone = vm.Signal.from_samples(times, values.reshape(4, 4, 2)[:, run], hold)
-        np.testing.assert_array_equal(signal.at(places), alone.at(places))
-        assert (signal.samples, signal.summary) == (alone.samples, alone.summary)

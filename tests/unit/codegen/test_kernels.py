@@ -134,16 +134,6 @@ def test_a_kernel_knows_what_it_wants_of_its_arrays():
     assert result.tolist() == [[15.0, 7.0]]
 
 
-def test_a_kernel_that_is_not_used_is_not_compiled(folder):
-    kernels = Kernels([times(7.0), PRODUCT])
-    assert "product" in kernels
-    assert names(folder) == []
-    result = np.empty(1)
-    kernels.call("double", np.array([1.5]), result)
-    assert result == [10.5]
-    assert names(folder) == ["double"]
-
-
 def test_another_operation_compiler_or_processor_is_another_file(folder, monkeypatch):
     loaded(DOUBLE)
     loaded(DOUBLE)

@@ -18,18 +18,13 @@ PLAIN = standard_problems.DEFINITION
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"kind": "pde"}, "'pde'"),
         ({"kind": "ae"}, "design_coordinates"),
         ({"starts": definition._unset}, "no starts"),
         ({"speeds": PLAIN.speeds[:1]}, "1 speeds"),
         ({"cyclic": ("angel",)}, "cyclic names 'angel'"),
-        ({"planar": ("x", "y", "psi")}, "planar names 'x'"),
         ({"heading_pairs": (("angle", "tracked"),)}, "heading_pairs"),
-        ({"error_scale": {"speed": 1.0}}, "error_scale names 'speed'"),
         ({"validity": {"roll": (0.0, 1.0)}}, "validity names 'roll'"),
-        ({"loads": ("Fz_FL",)}, "loads names 'Fz_FL'"),
         ({"tabled_outputs": ("pitch",)}, "tabled_outputs names 'pitch'"),
-        ({"main_outputs": ("yaw",)}, "main_outputs names 'yaw'"),
         (
             {"tabled_outputs": ("angle",), "main_outputs": ("tracked",)},
             "main_outputs names 'tracked'; known: angle",

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-import vehiclemor as vm
 from tests.models import CAR, FIDELITY
 from tests.oracles import high_fidelity_vehicle as fidelity_oracle
 from tests.oracles import vehicle_lagrange as oracle
 from tests.oracles.projected_simulation import projected_state
-from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, WHEELS
+from vehiclemor.multibody.quantities import OPTIONAL_INPUTS
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.dynamic import DynamicModel
 
@@ -76,17 +75,3 @@ def test_every_input_moves_the_high_fidelity_vehicle_as_in_dalemberts_principle(
         assert np.abs(found - expected).max() < 1e-11 * max(1.0, np.abs(expected).max())
         slipped += np.count_nonzero(x[48:] < 1.0)
     assert slipped > 8
-
-
-def test_locked_wheels_use_the_friction_that_there_is():
-    slippery = vm.model(CAR, {"initial_speed": 30.0}, inputs={f"friction_{w}": 0.3 for w in WHEELS})
-    run = slippery.simulate(vm.maneuver("straight_braking", amplitude=2.0))
-    p, locked = slippery.parameters.values(), (run.times > 2.0) & (run.times < 6.0)
-    assert max(run[f"slip_ratio_{wheel}"][locked].max() for wheel in WHEELS) < -0.5
-    for wheel in WHEELS:
-        load = run[f"Fz_{wheel}"]
-        d = load / (p["nominal_load"] * p["load_scale"]) - 1.0
-        share = np.abs(run[f"Fx_{wheel}"]) / (0.3 * load * (p["PDX1"] + p["PDX2"] * d))
-        assert share.max() < 1.0 + 1e-6
-        # A locked wheel slides with less than the peak, by the Magic Formula.
-        assert 0.5 < share[locked].min() < share[locked].max() < 0.95
