@@ -38,6 +38,7 @@ def test_a_method_of_structures_passes():
         (lambda s: replace(s, stiffness=s.stiffness + s.ports @ s.ports[::-1].T), "not symmetric"),
         (lambda s: replace(s, outputs=tuple(c[1:] for c in s.outputs)), "outputs of q has shape"),
         (lambda s: replace(s, dampers=s.dampers[1:]), "dampers has shape"),
+        (lambda s: replace(s, stiffness=s.stiffness * np.nan), "not finite"),
     ],
 )
 def test_a_broken_structure_is_named(monkeypatch, alter, message):

@@ -74,13 +74,6 @@ def test_wrong_input_is_one_line(suspension, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.usefixtures("plug_in_package")
-def test_a_model_without_the_outputs_is_refused(tmp_path):
-    run = vm.model("quarter_car").simulate("quarter_car_road")
-    with pytest.raises(InputError, match=r"no film of these runs: to draw a .* it lacks "):
-        vm.animate(run, out=tmp_path / "film.gif")
-
-
 def test_command_line(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(animation, "FRAMES_PER_SECOND", 1)
     kept, film = tmp_path / "run.nc", tmp_path / "film.gif"

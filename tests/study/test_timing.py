@@ -1,20 +1,18 @@
 """The timing pass: cases are known by their names, and nothing is measured twice."""
 
 from dataclasses import replace
-from itertools import accumulate, count
+from itertools import count
 
 import numpy as np
 import pytest
 
-import vehiclemor as vm
 from vehiclemor.reduction.methods.full_order import FullOrder
 from vehiclemor.simulation import run_timer
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study import timing
 from vehiclemor.study.experiment import complete_settings, make_experiment
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.timing import called, timed_cases, timed_starts, timed_tests
+from vehiclemor.study.timing import timed_cases, timed_starts, timed_tests
 
 SETTINGS = {
     "pod_r3": ("pod", {"rank": 3}, "recommended"),
@@ -94,17 +92,6 @@ def test_inputs_are_new_and_no_row_is_timed_cold_whatever_ran_before_it(monkeypa
     data = timed_tests(cases("strongest", "baseline"), np.ones((2, 1), dtype=bool))
     np.testing.assert_allclose(data["seconds"], 1e-2)
     np.testing.assert_allclose(data["repeated_seconds"], 1e-4)
-
-
-def test_the_first_input_warms_the_caches_and_the_median_of_the_others_counts(monkeypatch):
-    lengths = [100.0, 9.0, 3.0, 0.3, 50.0, 0.2, 2.0, 0.1]
-    steps = accumulate([0.0, *(step for length in lengths for step in (length, 0.0))])
-    monkeypatch.setattr(run_timer, "clock", lambda: next(steps))
-    ended = Trajectory(*[np.zeros((1, 1))] * 5, {}, 7.0)
-    run = (vm.maneuver("lane_change"),)
-    assert called(lambda _: ended, run, 4) == pytest.approx((3.0, 0.2, 7.0))
-    monkeypatch.setattr(run_timer, "clock", count().__next__)
-    assert called(lambda _: replace(ended, status="diverged"), run, 1).status == "diverged"
 
 
 def test_what_was_measured_is_measured_again_only_if_it_has_changed(tmp_path):

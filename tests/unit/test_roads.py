@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.exceptions import InputError
+from vehiclemor.exceptions import InputError, PlugInError
 from vehiclemor.inputs import road as roads
 from vehiclemor.inputs.checks import check_resolved
 from vehiclemor.registry import component
@@ -146,6 +146,13 @@ def test_members_have_names_and_are_sent_by_them():
 def test_what_is_wrong_is_one_line(call, words):
     with pytest.raises(InputError, match=words):
         call()
+
+
+@pytest.mark.parametrize("given", [lambda _: vm.maneuver("road"), lambda number: 1 // (number - 2)])
+def test_a_family_that_gives_something_else_is_named(monkeypatch, given):
+    monkeypatch.setattr(roads, "roads", replace(roads.roads, member=given))
+    with pytest.raises(PlugInError, match=r"maneuver 'road:2' \(vehiclemor.inputs.road:roads\)"):
+        component("maneuver", "road:2")
 
 
 # Frequency weighting; ISO 2631-1:1997, table 3

@@ -166,6 +166,3 @@ def test_limits_are_where_statics_puts_them(given_values):
     check(p | {"tire_stiffness": softest * (1.0 + 1e-12)})
     with pytest.raises(GeometryError, match="rear tires"):
         check(p | {"tire_stiffness": softest * (1.0 - 1e-12)})
-
-
-# Pivots of the front corners' fixed elimination

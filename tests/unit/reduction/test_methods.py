@@ -67,6 +67,16 @@ def test_iteration_that_fails_is_a_result(model, nominal):
     assert np.isnan(run.outputs[:, 0]).all()
 
 
+def test_a_run_has_the_histories_of_its_trajectory(model, nominal):
+    [run] = training_runs(model, nominal)
+    recorded = run.recorded()
+    for name in ("times", "inputs", "states", "outputs"):
+        np.testing.assert_array_equal(getattr(run, name), getattr(recorded, name))
+    assert run.outputs is run.outputs
+    with pytest.raises(AttributeError, match="rank"):
+        _ = run.rank
+
+
 def test_snapshots_of_several_runs_are_put_side_by_side(model, nominal):
     method = component("method", "pod")
     settings = validated(method, model.kind, {"rank": 3})

@@ -11,6 +11,7 @@ import vehiclemor as vm
 from tests.models import TRUCK
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.projection.structural import ReducedStructure, modes_within
+from vehiclemor.registry import component, names
 from vehiclemor.simulation.structures.model import relative_error
 
 HEIGHTS = ("road_FL", "road_FR", "road_RL", "road_RR")
@@ -40,6 +41,11 @@ def model(chain):
 @cache
 def truck():
     return vm.model(TRUCK)
+
+
+def learns_nothing(name):
+    method = component("method", name)
+    return method.learns_from == "nothing" and "structural" in method.settings
 
 
 def error_of(rom, given, full=None):
@@ -232,6 +238,19 @@ def test_quick_roads_are_not_trusted_however_small_they_are(method, settings):
     assert rom.simulate(corrugated(3.0, 0.01)).status == "ok"
     run = rom.simulate(corrugated(100.0, 1e-4))
     assert (run.status, "64 to 128 Hz" in run.message) == ("untrusted", True)
+
+
+@pytest.mark.parametrize("method", [m for m in names("method") if learns_nothing(m)])
+def test_training_that_is_never_read_changes_no_status(method):
+    found = []
+    for training in (ROAD, ROAD.perturbed(amplitude=5.0)):
+        rom = vm.reduce(truck(), method, training=[training], **SHORT)
+        run = rom.simulate(vm.road("D", 1))
+        found.append((run.status, run.message, run.outputs.tobytes()))
+        dataset = vm.simulate(truck(), method, maneuver=ROAD, training=training, **SHORT)
+        found[-1] += (dataset["remark"].item(),)
+    assert found[0] == found[1]
+    assert found[0][0] == "ok"
 
 
 def test_bases_of_control_periods_are_not_trusted_on_another_road():

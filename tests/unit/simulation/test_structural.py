@@ -174,13 +174,6 @@ def test_wrong_input_is_told_in_one_line(chain, wrong, words):
         chain().simulate(**given)
 
 
-def test_steps_are_judged_between_output_times_that_are_far_apart(chain):
-    model, given = chain(), vm.Signal.from_function(bump(0.02), 2.0, inputs=["z"], output_step=2.0)
-    fine = vm.Signal.from_function(bump(0.02), 2.0, inputs=["z"], output_step=0.01)
-    spacing = [2.0 / model.run(s, tolerance=1e-3).counts["steps"] for s in (given, fine)]
-    assert spacing[0] <= 2.0 * spacing[1]
-
-
 def test_a_tolerance_that_no_step_meets_is_told(chain):
     assert "of an output's range" in chain().run(signal(), tolerance=1e-12).remark
     assert chain().run(signal(), tolerance=1e-2).remark == ""

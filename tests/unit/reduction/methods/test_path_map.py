@@ -80,17 +80,6 @@ def test_coordinates_depend_on_the_inputs_alone(model, both):
     assert set(first.counts.values()) == {0}
 
 
-def test_an_input_that_rests_costs_nothing(model, nominal, both):
-    aside = travelling(lambda t: (0.08 * np.sin(t) + 0.02, np.full(len(t), 0.03)), nominal)
-    steered = travelling(lambda t: (np.full(len(t), -0.05), 0.04 * np.sin(t)), nominal)
-    for maneuver in (nominal, aside, steered):
-        reduced = mapped(model, maneuver, cells=4, degree=5)
-        assert reduced.order == 1
-        assert reduced.cells.coefficients.shape[:2] == (4, 6)
-        assert largest_error(model, reduced, maneuver) < 1e-6
-    assert mapped(model, both, cells=4, degree=5).cells.coefficients.shape[:2] == (16, 21)
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("column", [0, 1])
 def test_leaving_the_training_is_said_with_time_and_place(model, both, sign, column):

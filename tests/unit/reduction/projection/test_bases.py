@@ -83,15 +83,3 @@ def test_every_sample_is_in_exactly_one_window(duration, share, samples):
         assert np.all(inside >= edges[k] - slack)
         if k < len(edges) - 2:
             assert np.all(inside < edges[k + 1])
-
-
-@given(windows=st.integers(1, 60), per_window=st.integers(1, 40))
-def test_period_that_divides_the_run_gives_equal_windows(windows, per_window):
-    # Not representable in binary, so that edges and times are rounded each in its own way.
-    period = 0.1
-    edges = window_edges(period * windows, period)
-    assert len(edges) == windows + 1
-    first = first_samples(np.linspace(0.0, period * windows, windows * per_window + 1), edges)
-    counts = np.diff(first)
-    assert list(counts[:-1]) == [per_window] * (windows - 1)
-    assert counts[-1] == per_window + 1

@@ -156,3 +156,19 @@ def test_errors_grow_within_a_period_alone(car, maneuver, formulation):
     assert restarted[-1] < 0.01 * own[-1]
     # A period is 25 samples: what follows an edge is better than what comes before it.
     assert np.all(restarted[76::25] < 0.2 * restarted[75::25].max())
+
+
+@pytest.mark.parametrize("formulation", ["coordinates", "state"])
+def test_its_rates_are_those_of_its_steps_and_its_jacobian_theirs(car, maneuver, formulation):
+    rom = vm.reduce(car, "pod", restart="full_model", formulation=formulation)
+    x, u, t = car.simulate(maneuver).states[90], maneuver.at(np.array([1.8]))[0], 1.8
+    # What comes after a step lies in the subspace.
+    y, dt = rom.step(x, u, 1e-3, t), 1e-5
+    slopes = (rom.step(y, u, dt, t) - y) / dt
+    np.testing.assert_allclose(rom.rhs(y, u, t), slopes, rtol=1e-3, atol=1e-2)
+    found, columns = rom.jacobian(x, u, time=t), []
+    for step in 1e-6 * np.maximum(np.abs(x), 1.0) * np.eye(len(x)):
+        sides = rom.rhs(x + step, u, t) - rom.rhs(x - step, u, t)
+        columns.append(sides / (2.0 * step.sum()))
+    scale = np.abs(found).max()
+    np.testing.assert_allclose(np.transpose(columns) / scale, found / scale, atol=1e-7)

@@ -28,12 +28,3 @@ def test_each_term_is_the_one_that_explains_most(seed, first):
         others = [i for i in range(8) if i not in chosen[:n]]
         best = min(left_over(columns, values, [*chosen[:n], i]) for i in others)
         assert left_over(columns, values, chosen[: n + 1]) == pytest.approx(best, rel=1e-6)
-
-
-def test_a_sum_of_chosen_terms_comes_last():
-    random = np.random.default_rng(3)
-    columns = random.normal(size=(40, 3))
-    both = np.column_stack(
-        [columns[:, 0], columns[:, 1], columns[:, :2].sum(axis=1), columns[:, 2]]
-    )
-    assert forward_selection(both, columns[:, :2], 2, 1) == [0, 1, 3]
