@@ -115,7 +115,7 @@ def compare(
         that they have not seen), the name of a model (every method that fits it), or a study,
         collection or protocol by its name or TOML file.
     every
-        Of the comparison with the paper: print every claim with its reason, and the costs.
+        Of the comparison with the paper: print the costs too.
     check
         Exit with status 1 if a bound of the paper or a target of a protocol is missed.
     """

@@ -26,7 +26,7 @@ from vehiclemor.report.frames import counted_ends, frame
 from vehiclemor.report.labels import TRAINED, Column, trained_runs, unit_of
 from vehiclemor.report.printing import Table
 from vehiclemor.report.result_selection import KINDS, select_point
-from vehiclemor.report.screens import Part, claim_parts, paper_parts, study_parts
+from vehiclemor.report.screens import Part, paper_parts, study_parts
 from vehiclemor.study.plans.loading import refuse_doubles
 from vehiclemor.study.run import run_studies
 
@@ -152,8 +152,7 @@ def _page(sections: Sequence[Section], left_out: Mapping[str, str]) -> str:
 
 def _paper(folder: Path, jobs: int) -> Section:
     """Verdicts on what the paper prints."""
-    rows = paper_comparison(folder, jobs)
-    parts = paper_parts(rows) + claim_parts(rows)
+    parts = paper_parts(paper_comparison(folder, jobs))
     return Section("published", "Published beside reproduced", parts)
 
 
