@@ -14,7 +14,7 @@ from vehiclemor.files import write_text
 if os.name != "posix":
     pytest.skip("pipes, sockets and devices are those of POSIX", allow_module_level=True)
 
-MODEL = "double_wishbone"
+MODEL, CAR = "double_wishbone", "independent_suspension_vehicle"
 
 
 def listening(path):
@@ -65,14 +65,13 @@ WRITERS = {
     "a.png": lambda path, run: vm.plot(run, out=path),
     "a.svg": lambda path, run: run.vehiclemor.plot(out=path),
     "a.pdf": lambda path, run: vm.plot(run, out=path),
-    "a.gif": lambda path, run: vm.animate(run, duration=0.5, out=path),
+    "a.gif": lambda path, _: vm.animate(vm.simulate(CAR), duration=0.5, out=path),
     "b.csv": lambda path, _: vm.convert(path, "csv", out=path),
     "b": lambda path, _: vm.dataset(MODEL, out=path),
 }
 COMMANDS = {
     "run.nc": f"simulate {MODEL} --out run.nc",
     "run.png": f"simulate {MODEL} --plot run.png",
-    "run.gif": f"simulate {MODEL} --animate run.gif",
     "run.html": "report figure-11 --out run.html",
     "unit.fmu": f"export {MODEL} --to fmu --overwrite --out unit.fmu",
 }
