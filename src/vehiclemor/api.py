@@ -228,7 +228,6 @@ def simulate(
     VehiclemorError
         If the input is wrong or can't be reached.  A model that diverges is a result.
     """
-    import vehiclemor.report.result_accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
@@ -318,7 +317,6 @@ def run_study(
         run of its studies on the dimension `cell`, without histories; the datasets of the studies
         are in the folder `studies`.
     """
-    import vehiclemor.report.result_accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.progress import listening
     from vehiclemor.study.plans.results import flattened
     from vehiclemor.study.run import run_studies
@@ -361,7 +359,7 @@ def plot(
     results: str | Path = RESULTS,
     **at: object,
 ) -> Figure:
-    """Draw a result; a dataset draws itself by `dataset.vehiclemor.plot(...)`.
+    """Draw a result.
 
     Parameters
     ----------
@@ -386,8 +384,8 @@ def plot(
     """
     import xarray as xr
 
-    from vehiclemor.report.result_accessor import ResultAccessor
-    from vehiclemor.report.result_selection import dataset_of, stored_result
+    from vehiclemor.report.figures.result_plot import plot_result
+    from vehiclemor.report.result_selection import dataset_of, select_point, stored_result
     from vehiclemor.simulation.trajectory import Trajectory
 
     if isinstance(result, str | Path):
@@ -397,4 +395,5 @@ def plot(
     if not isinstance(result, xr.Dataset):
         raise InputError(f"result is {quoted(result)}; it must be a run, a dataset, file or study")
     kind = next((str(given) for given in beside if isinstance(given, str)), kind)
-    return ResultAccessor(result).plot(kind, out, **at)
+    dataset, _ = select_point(result, kind, at)
+    return plot_result(dataset, None if out is None else file_path("out", out), kind)

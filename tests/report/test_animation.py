@@ -9,7 +9,6 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.report.figures import animation
 from vehiclemor.report.labels import declared
 
-
 CAR = "independent_suspension_vehicle"
 
 

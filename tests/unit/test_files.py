@@ -63,7 +63,7 @@ WRITERS = {
     "a.html": lambda path, _: vm.write_report("figure-11", out=path),
     "a.txt": lambda path, _: vm.write_report("figure-11", out=path),
     "a.png": lambda path, run: vm.plot(run, out=path),
-    "a.svg": lambda path, run: run.vehiclemor.plot(out=path),
+    "a.svg": lambda path, run: vm.plot(run, out=path),
     "a.pdf": lambda path, run: vm.plot(run, out=path),
     "a.gif": lambda path, _: vm.animate(vm.simulate(CAR), duration=0.5, out=path),
     "b.csv": lambda path, _: vm.convert(path, "csv", out=path),
