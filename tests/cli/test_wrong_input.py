@@ -18,7 +18,7 @@ WRONG = [
     (f"{POD} rank", "key=value"),
     (f"{POD} rank=3 --set rank=4", "rank is given twice"),
     (f"{POD} rank=3 rank=4", "rank is given twice"),
-    ("figures --only vehicles,errors-double_wishbone", "--only vehicles errors-double_wishbone"),
+    ("figures --only vehicles,figure-11", "--only vehicles figure-11"),
     ("report vehicles,figure-12", "spaces separate names, report vehicles figure-12"),
     (f"{TRAVEL} --training nominal,matched", "--training nominal matched"),
     (f"{POD} errors=3", "errors"),

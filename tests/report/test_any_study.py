@@ -224,11 +224,14 @@ def test_a_model_is_compared_by_every_method_and_output(folder, capsys):
 def test_figures_are_those_of_every_model(folder, tmp_path, capsys, monkeypatch):
     # One picture of each figure is enough here.
     monkeypatch.setattr(theme, "FORMATS", ("png",))
-    names = [f"{kind}-{CAR}" for kind in ("histories", "errors", "map", "pareto")]
-    arguments = ["--results", str(folder), "--out", str(tmp_path), "--only", *names]
+    names = [f"{CAR}-nominal", f"{CAR}-perturbed", f"predictive-{CAR}"]
+    files = [str(folder / "studies" / f"{name}.toml") for name in names]
+    arguments = ["--results", str(folder), "--out", str(tmp_path), "--only", *files]
     assert main(["figures", *arguments]) == 0
     written = capsys.readouterr().out.split()
-    assert written == [str(tmp_path / f"figure-{name}.png") for name in names]
+    pictures = ["nominal-errors", "nominal-histories", "perturbed-errors"]
+    pictures = [f"{CAR}-{picture}" for picture in pictures] + [f"predictive-{CAR}-pareto"]
+    assert written == [str(tmp_path / f"figure-{picture}.png") for picture in pictures]
     assert all(np.fromfile(path, dtype=np.uint8).size > 10_000 for path in written)
 
 

@@ -133,7 +133,7 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeyp
     names = ("numbers", "map-4", "alone-diverged")
     only = ["--only", *(str(folder / f"{name}.toml") for name in names)]
     arguments = ["figures", *only, "--results", str(folder), "--out", str(folder / "figures")]
-    assert main([*arguments, "--dpi", "20"]) == 0
+    assert main(arguments) == 0
     written = {path.stem.removeprefix("figure-") for path in (folder / "figures").iterdir()}
     kinds = {name: ("errors", "histories")[: 1 + (name != "numbers")] for name in names}
     assert written == {f"{name}-{kind}" for name, every in kinds.items() for kind in every}
@@ -149,7 +149,7 @@ def test_a_figure_that_fails_is_named_and_stops_no_other(folder, capsys, monkeyp
     # A comma belongs to the name of a file.
     late = shutil.copy(folder / "late.toml", folder / "late, or not.toml")
     only = ["--only", str(late), "--only", str(folder / "numbers.toml"), "--results", str(folder)]
-    assert main(["figures", *only, "--out", str(folder / "some"), "--dpi", "20"]) == 1
+    assert main(["figures", *only, "--out", str(folder / "some")]) == 1
     printed = capsys.readouterr()
     *_, line = printed.err.splitlines()
     assert line.startswith("figure late, or not-histories can't be drawn: IndexError")

@@ -121,8 +121,6 @@ def trained(points):
         (lambda v: vm.compare(jobs=v), NO_JOBS, "jobs is"),
         (vm.figures, [3, np.ones(3), range(10**12)], "only is"),
         (vm.figures, [[5], [[]], b"x"], "only: "),
-        (lambda v: vm.figures(["figure-11"], style=v), [b"x", {"a": 1}, *WRONG], "style is"),
-        (lambda v: vm.figures(["figure-11"], dpi=v), [np.timedelta64(99, "s")], "dpi is"),
         (vm.write_report, [3, np.ones(3), range(10**12)], "studies is"),
         (vm.write_report, [[5], ["a\udcff.toml"]], "studies: "),
         (lambda v: vm.rom(CAR).save("a.nc", overwrite=v), NO_FLAGS, "overwrite is"),

@@ -119,7 +119,7 @@ READERS = {
     "a.toml": [vm.run_study, vm.status, vm.describe, vm.compare, vm.figures],
     "a.nc": [vm.load, vm.plot, lambda path: vm.convert(path, "csv")],
     "a.csv": [vm.Signal.from_csv],
-    "b.toml": [lambda path: vm.model(MODEL, None, path), lambda path: vm.figures("x", style=path)],
+    "b.toml": [lambda path: vm.model(MODEL, None, path)],
     "test.nc": [lambda path: vm.judge(path, ".")],
 }
 
