@@ -368,7 +368,7 @@ def plot(
     *beside
         The full-order run of the same input, to be drawn with the run; or the kind.
     kind
-        `histories`, `paths`, `errors`, `frequency_response` of a sweep, or `sine_with_dwell`.
+        `histories`, `paths` or `errors`.
     out
         Picture to write (PNG, SVG or PDF).
     results
