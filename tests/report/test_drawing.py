@@ -251,7 +251,7 @@ MANY = {"rank": [*range(1, 9)]}
         (MANY | {"formulation": ["state", "paired"], "start": ["a", "b", "c"]}, "rank", 4, 4),
         ({"start": ["a", "b"], "rank": [1, 2, 3]}, "rank", 2, 0),
         ({"formulation": ["coordinates", "state", "paired"]}, "formulation", 2, 0),
-        ({"equation_seed": [*range(30)]}, "equation seed, sorted by error", 2, 0),
+        ({"equation_seed": [*range(30)]}, "equation seed", 2, 0),
     ],
 )
 def test_figures_follow_from_what_varies(dimensions, label, panels, meshes):
@@ -297,15 +297,3 @@ def test_of_many_lines_no_two_have_one_colour():
         if "rank" in line.get_label()
     ]
     assert len({line.get_color() for line in lines}) == len(lines) == 8
-
-
-def test_samples_are_drawn_over_what_was_sampled():
-    dataset = varied(sample=[*range(40)])
-    for number, name in enumerate(("first", "second", "third", "fourth")):
-        places = np.roll(np.linspace(0.0, 1.0, 40), 7 * number)
-        dataset = dataset.assign_coords({name: ("sample", places, {"units": "kg"})})
-    dataset["rms_error"] = dataset["rms_error"] * 0.0 + np.exp(dataset["third"])
-    figure = checked(plot_result(dataset, None, "errors"))
-    assert len(figure.axes) == 6
-    # Of four quantities the errors follow the third.
-    assert figure.axes[3].get_xlabel() == "third (kg)"

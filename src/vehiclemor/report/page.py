@@ -194,7 +194,6 @@ def error_table(dataset: xr.Dataset) -> pd.DataFrame:
     marks = runs["trained"].map({True: f" ({TRAINED})", False: ""})
     status = runs["status"] + marks + said.map(lambda text: f": {text}" if text else "")
     axes = [str(d) for d in dataset["status"].dims if d != "label" and dataset.sizes[d] > 1]
-    axes += [n for n, c in dataset.coords.items() if c.dims == ("sample",) and n not in axes]
     for axis in axes:
         fixed = runs.groupby("label")[axis].transform("nunique") == 1
         runs[axis] = runs[axis].astype(object).mask(fixed, "")

@@ -1,7 +1,7 @@
-"""Errors of any study over what it varies or samples, or of one point.
+"""Errors of any study over what it varies, or of one point.
 
 Which picture it is follows from the dimensions of the study's grid, whatever model and methods it
-has: curves over one, a map over two where more varies, clouds over samples.
+has: curves over one, a map over two where more varies.
 """
 
 import itertools
@@ -11,7 +11,6 @@ from math import ceil
 from typing import Literal, NamedTuple
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
@@ -28,8 +27,8 @@ from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
-# Lines of a panel, and sampled quantities with panels.
-LINES, SAMPLED = 8, 3
+# Lines of a panel.
+LINES = 8
 # Letters of an axis' label in a line.
 LETTERS = 38
 # Between marks of two lines above the axes, as a share of their height.
@@ -39,8 +38,6 @@ OFF: tuple[tuple[Style, float, str, Callable[[np.ndarray], np.ndarray]], ...] = 
     (theme.CROSS, 1.0, "a run has failed", lambda errors: ~np.isfinite(errors)),
     (theme.ZERO, 0.0, "error 0, off the log axis", lambda errors: errors == 0.0),
 )
-# Of samples that have no quantity.
-SORTED = "sorted by error"
 # Columns of maps, and cells of a map with their number.
 COLUMNS, WRITTEN = 3, 100
 # In % of the cells, those whose small errors the colours leave out; part of the colours on which
@@ -53,7 +50,7 @@ Lines = Mapping[str, tuple[str, xr.DataArray]]
 class Picture(NamedTuple):
     """How errors of a study are drawn: the kind, the dimensions on axes, and those left over."""
 
-    kind: Literal["curves", "cloud", "map"]
+    kind: Literal["curves", "map"]
     axes: Sequence[str]
     rest: Sequence[str]
 
@@ -72,17 +69,11 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
     lines = _lines(errors, methods, varied[1:], saturated)
     picture = choose_picture(varied, len(lines), len(methods))
-    if picture.kind != "curves":
+    if picture.kind == "map":
         errors = errors.max(picture.rest)
-        lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
-    axis = varied[0]
-    match picture.kind:
-        case "map":
-            figure = _map(dataset, errors, methods, outputs, picture.axes)
-        case "cloud":
-            figure = _panels(dataset, axis, _sampled(dataset, axis), outputs, lines)
-        case "curves":
-            figure = _panels(dataset, axis, [ticks_of(dataset, axis)], outputs, lines)
+        figure = _map(dataset, errors, methods, outputs, picture.axes)
+    else:
+        figure = _panels(dataset, varied[0], outputs, lines)
     _mark_saturation(figure, [f"{methods[m]} saturates at {r}" for m, r in saturated.items()])
     if notes := _notes(dataset, picture, errors, methods):
         figure.suptitle(notes, fontsize="medium")
@@ -91,12 +82,10 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
 
 
 def choose_picture(varied: Sequence[str], lines: int, methods: int) -> Picture:
-    """Clouds over samples, a map over both factors or of many lines, else curves."""
+    """A map over both factors or of many lines, else curves."""
     axis, *others = varied
     kind, axes = "curves", [axis]
-    if _is_sample(axis):
-        kind = "cloud"
-    elif set(FACTORS) <= set(varied):
+    if set(FACTORS) <= set(varied):
         kind, axes = "map", list(FACTORS)
     elif lines > max(LINES, methods):
         kind, axes = "map", [axis, others[0]]
@@ -108,9 +97,7 @@ def _notes(
 ) -> str:
     """Lines above the panels: what is drawn, and how many runs were trained on."""
     notes: list[str] = []
-    if picture.kind == "cloud":
-        notes.append(f"{dataset.sizes[picture.axes[0]]} samples")
-    if picture.kind != "curves" and picture.rest:
+    if picture.rest and picture.kind == "map":
         notes.append(f"the largest error over {_listed(picture.rest)}")
     if picture.kind == "map" and bool(np.isinf(errors).any()):
         notes.append("a cross where a run has failed")
@@ -129,28 +116,21 @@ def _mark_saturation(figure: Figure, texts: Sequence[str]) -> None:
                 axis.set_label_text(textwrap.fill(f"rank; {', '.join(texts)}", LETTERS))
 
 
-def _panels(
-    dataset: xr.Dataset, axis: str, ticks: Sequence[Ticks], outputs: Sequence[str], lines: Lines
-) -> Figure:
-    """A panel for each output, or a row of them where there are several axes."""
-    cells = list(itertools.product(outputs, ticks))
-    columns = len(ticks) if len(ticks) > 1 else len(outputs)
-    rows = len(cells) // columns
-    size = (6.7 if columns < 3 else 8.5, 2.5 * rows + 0.8)
-    figure, grid = theme.panels(rows, columns, size)
-    for number, (panel, (output, at)) in enumerate(zip(grid.flat, cells, strict=True)):
+def _panels(dataset: xr.Dataset, axis: str, outputs: Sequence[str], lines: Lines) -> Figure:
+    """A panel for each output."""
+    ticks = ticks_of(dataset, axis)
+    size = 6.7 if len(outputs) < 3 else 8.5, 3.3
+    figure, grid = theme.panels(1, len(outputs), size)
+    for number, (panel, output) in enumerate(zip(grid.flat, outputs, strict=True)):
         panel.set_title(theme.letter(number))
-        _draw_panel(panel, dataset, output, axis, at, lines)
-        at.scale(panel)
-        # Of panels above each other the lowest has the label of their axis.
-        if number + columns < len(cells):
-            panel.set_xlabel("")
+        _draw_panel(panel, dataset, output, axis, ticks, lines)
+        ticks.scale(panel)
     return figure
 
 
-def _is_sample(dimension: str) -> bool:
+def _is_seed(dimension: str) -> bool:
     """Whether values of a dimension have no order."""
-    return dimension == "sample" or dimension.endswith("_seed")
+    return dimension.endswith("_seed")
 
 
 def _varied(dataset: xr.Dataset) -> list[str]:
@@ -161,7 +141,7 @@ def _varied(dataset: xr.Dataset) -> list[str]:
 
     # A factor goes before a setting with as many values.
     def order(name: str) -> tuple[bool, bool, int, bool]:
-        return _is_sample(name), name in numbers, sizes[name], name in FACTORS
+        return _is_seed(name), name in numbers, sizes[name], name in FACTORS
 
     return sorted(names, key=order, reverse=True)
 
@@ -196,42 +176,18 @@ def _lines(
     return lines
 
 
-def _sampled(dataset: xr.Dataset, sample: str) -> list[Ticks]:
-    """Sampled quantities, those first that the errors follow most (rank correlation)."""
-    names: list[str] = []
-    for name, values in dataset.coords.items():
-        is_number = name != sample and values.dims == (sample,) and values.dtype.kind == "f"
-        if is_number and np.ptp(values.values) > 0.0:
-            names.append(str(name))
-    errors = dataset["rms_error"]
-    ranks = pd.Series(errors.mean([d for d in errors.dims if d != sample])).rank()
-
-    def follows(name: str) -> float:
-        return abs(ranks.corr(pd.Series(dataset[name].values).rank()))
-
-    if names:
-        names = sorted(names, key=follows, reverse=True)[:SAMPLED]
-        return [ticks_of(dataset, name) for name in names]
-    return [Ticks(np.arange(len(ranks)), f"{_listed([sample])}, {SORTED}")]
-
-
 def _draw_panel(
     axis: Axes, dataset: xr.Dataset, output: str, dimension: str, ticks: Ticks, lines: Lines
 ) -> None:
     """Lines of one output; over perturbations the published error."""
-    cloud = _is_sample(dimension)
     methods = theme.methods_of(dataset)
     looks, marks = theme.styles(lines, methods), theme.marks(lines, methods)
     for name, (text, errors) in lines.items():
         values = errors.sel(output=output).values.ravel()
         look: Style = {**looks[name], "marker": marks[name], "markersize": 3.5}
-        # Names and samples have no order that a line could follow.
-        if ticks.names or cloud:
+        # Names and seeds have no order that a line could follow.
+        if ticks.names or _is_seed(dimension):
             look["linestyle"] = "none"
-        if cloud:
-            look |= {"alpha": 0.6, "markeredgewidth": 0.0, "rasterized": len(ticks.at) > 1000}
-        if ticks.label.endswith(SORTED):
-            values = np.sort(values)
         visible = np.isfinite(values) & (values > 0.0)
         axis.plot(ticks.at, np.where(visible, values, np.nan), label=text, **look)
         for mark, height, _, is_off in OFF:
