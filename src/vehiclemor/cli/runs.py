@@ -249,7 +249,7 @@ def export(
         Registered name, or file of a reduced model.
     to
         c: a folder with C99 sources; fmu: a functional mock-up unit by FMI 2.0; casadi: a function
-        that CasADi loads.
+        that CasADi loads.  For jax and rollouts see vm.export in Python.
     method
         Reduce the model by this method first, of which --set may give preset and training (nominal,
         protocol) too; shipped: the reduced model that ships with the package.  The full model by

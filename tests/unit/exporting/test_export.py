@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import sympy as sp
 
 import vehiclemor as vm
 from tests.models import CAR
@@ -80,25 +79,6 @@ def test_jax_over_a_batch_and_by_tables(rng):
     assert np.abs(np.asarray(outputs)[:, :-1] - run.outputs[ends]).max() < 1e-13
 
 
-def test_sympy(rng):
-    model = in_use("independent_suspension_vehicle", "full")
-    states, inputs = around(model, rng)
-    expressions = vm.export(model, "sympy")
-    assert [symbol.name for symbol in expressions.x] == list(model.states)
-    values = system_of(model).values
-    found = []
-    for results in (expressions.derivative, expressions.outputs):
-        function = sp.lambdify(
-            [expressions.x, expressions.u, expressions.p],
-            results,
-            modules="math",
-            cse=lambda _, results=results: (expressions.assignments, [*results]),
-        )
-        rows = [function(x, u, values) for x, u in zip(states, inputs, strict=True)]
-        found.append(np.array(rows))
-    agree(found, states, model, inputs)
-
-
 @pytest.mark.parametrize(
     ("model", "arguments", "words"),
     [
@@ -125,7 +105,7 @@ def test_what_has_no_equations_to_export(model, nominal, monkeypatch):
     with pytest.raises(vm.VehiclemorError, match="double_wishbone_pod"):
         vm.export(ReducedOrderModel(model, "pod", {}, (), reduced), "casadi")
     with pytest.raises(vm.VehiclemorError, match="table"):
-        vm.export(vm.rom("double_wishbone"), "sympy")
+        vm.export(vm.rom("double_wishbone"), "casadi")
     # Missing packages are named.
     monkeypatch.setattr(libraries, "find_spec", lambda _: None)
     with pytest.raises(vm.VehiclemorError, match=r"vehiclemor\[casadi\]"):
