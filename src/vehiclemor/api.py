@@ -61,11 +61,7 @@ def studies() -> dict[str, str]:
     return {name: read_study(study_path(name)).title for name in data_names("studies")}
 
 
-def describe(
-    name: str | Path,
-    parameters: Mapping[str, object] | None = None,
-    parameter_file: str | Path | None = None,
-) -> dict[str, object]:
+def describe(name: str | Path) -> dict[str, object]:
     """What a model, method, maneuver or study declares; lists of dictionaries are tables.
 
     Parameters
@@ -73,18 +69,15 @@ def describe(
     name
         Registered name, name or TOML file of a study, or `study-schema`,
         `parameter-schema` for the keys of such a file.
-    parameters, parameter_file
-        As of `model()`.
 
     Raises
     ------
     VehiclemorError
-        If nothing has that name, or a parameter is wrong.
+        If nothing has that name.
     """
     from vehiclemor.report.description import description
 
-    path = None if parameter_file is None else file_path("parameter_file", parameter_file)
-    return description(str(file_path("name", name)), parameters, path)
+    return description(str(file_path("name", name)))
 
 
 def model(

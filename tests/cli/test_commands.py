@@ -136,9 +136,6 @@ def test_a_model_shows_all_that_it_declares(name):
     assert shown["starts"] == list(model.starts)
     accepting = [m for m in names("method") if component("method", m).accepts(model)[0]]
     assert shown["methods"] == accepting
-    rows = vm.describe("double_wishbone", {"wheel_centre": [0.0, 0.8, -0.1]})["parameters"]
-    (row,) = [row for row in rows if row["name"] == "wheel_centre"]
-    assert (row["value"], row["source"]) == ([0.0, 0.8, -0.1], "override")
 
 
 def test_a_model_that_ships_shows_what_it_was_trained_on():

@@ -101,8 +101,6 @@ def trained(points):
             "no body has the principal moments",
         ),
         (lambda v: vm.model(CAR, None, v), NO_PATHS[1:], "is not a path"),
-        (lambda v: vm.describe(CAR, v), WRONG, "parameter"),
-        (lambda v: vm.describe(CAR, None, v), WRONG, "parameter_file"),
         (lambda v: vm.reduce(car(), "full_order").for_parameters(v), WRONG, "parameter"),
         (lambda v: car().driving(v), [3, [1], np.ones(3)], "inputs is"),
         (lambda v: vm.metrics(car().simulate(STEER), v), [np.zeros(0), *WRONG], "maneuver with"),

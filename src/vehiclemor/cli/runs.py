@@ -11,7 +11,6 @@ from vehiclemor.api import RESULTS
 from vehiclemor.cli.options import (
     FAILED,
     Json,
-    ParameterFile,
     Parameters,
     Results,
     Settings,
@@ -50,7 +49,6 @@ def simulate(
     preset: str = "recommended",
     training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = ("matched",),
     parameter: Parameters = None,
-    parameter_file: ParameterFile = None,
     out: Path | None = None,
     plot: Annotated[list[Path] | None, Several] = None,
     all_outputs: bool = False,
@@ -94,7 +92,7 @@ def simulate(
     picture = _picture(plot, f"{model}-{method}.png")
     if out is not None:
         result_file("--out", out)
-    ready = vm.model(model, key_values("--parameter", parameter), parameter_file)
+    ready = vm.model(model, key_values("--parameter", parameter))
     how: dict[str, Any] = {"maneuver": _maneuver(maneuver, csv), "start": start, "preset": preset}
     how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
     dataset = vm.simulate(ready, method, **how, **chosen)

@@ -161,17 +161,13 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
     counts = of_kind(component("model", model).kind).counts
     derived = {
         "us_per_run": 1e6 * seconds,
-        "ns_per_sample": 1e9 * runs["seconds_per_sample"],
         "quartile_spread": (spread / seconds).where(seconds > 0.0, 0.0),
-        "loop_us": 1e6 * runs["loop_seconds"],
         "offline_us": 1e6 * offline,
         "break_even": break_even(runs, "speed_up"),
         "break_even_strongest": break_even(runs, "speed_up_strongest"),
     }
-    speed_ups = ["speed_up", "speed_up_strongest"]
-    columns = ["start", "case", "label", "status", "rank", "us_per_run", "ns_per_sample", *counts]
-    columns += ["tolerance", "quartile_spread", *speed_ups]
-    columns += ["loop_us", *(f"loop_{name}" for name in speed_ups)]
+    columns = ["start", "case", "label", "status", "rank", "us_per_run", *counts]
+    columns += ["tolerance", "quartile_spread", "speed_up", "speed_up_strongest"]
     columns += [*(renamed[name] for name in errors)]
     columns += ["offline_us", "break_even", "break_even_strongest"]
     return runs.assign(**derived).rename(columns=renamed)[columns]

@@ -1,14 +1,13 @@
 """What a name stands for: model, method, maneuver, study, or the schema of a file."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
 from vehiclemor.files import data_names
 from vehiclemor.inputs.excitation import FACTORS
-from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition, with_overrides
+from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path
 from vehiclemor.reduction.interface import never_refused
 from vehiclemor.reduction.model_file import training_of
@@ -48,13 +47,10 @@ QUANTITIES = (
 )
 
 
-def description(
-    name: str, parameters: Mapping[str, object] | None = None, parameter_file: Path | None = None
-) -> Description:
+def description(name: str) -> Description:
     """What a name stands for; lists of dictionaries are the rows of tables."""
-    if name in names("model"):
-        return _model(name, parameters, parameter_file)
     known = {
+        **dict.fromkeys(names("model"), _model),
         **dict.fromkeys(names("method"), _method),
         **dict.fromkeys(names("maneuver"), _maneuver),
         **dict.fromkeys(data_names("studies"), _study),
@@ -63,18 +59,15 @@ def description(
     known |= {name: _maneuver} if name.partition(":")[0] in names("maneuver") else {}
     describe = _study if is_study(name) else known.get(name)
     if describe is None:
-        raise unknown("name", name, {*known, *names("model")})
+        raise unknown("name", name, known)
     return describe(name)
 
 
-def _model(
-    name: str, overrides: Mapping[str, object] | None, parameter_file: Path | None
-) -> Description:
+def _model(name: str) -> Description:
     """Kind, parameters, starts, inputs, outputs and states of a model, and what reduces it."""
-    overrides = {} if overrides is None else overrides
-    definition: ModelDefinition = with_overrides(component("model", name), overrides)
-    path = parameter_file or definition.parameter_file or parameter_path(name)
-    parameters = load_parameters(name, definition.parameters, path, overrides)
+    definition: ModelDefinition = component("model", name)
+    path = definition.parameter_file or parameter_path(name)
+    parameters = load_parameters(name, definition.parameters, path)
     accepted = {method: _accepts(method, definition)[0] for method in names("method")}
     # Initial conditions, as far as they are known without deriving the model.
     if model := build_derived(name):
