@@ -76,20 +76,7 @@ def said(figure):
 def test_every_study_is_drawn(folder, name):
     if name.startswith(("alone", "none")):
         checked(vm.plot(folder / f"{name}.toml", results=folder))
-    if name.startswith("map"):
-        # One output of two is enough.
-        data = stored(folder, name).sel(output=["spindle_y"])
-        panels = checked(vm.plot(data, "errors")).axes
-        ticks = [tick.get_text() for tick in panels[0].get_yticklabels()]
-        assert ticks == ["\N{MINUS SIGN}150", "0", "20"]
-        maps = [axis for axis in panels if axis.get_label() != "<colorbar>"]
-        assert len(maps) == int(name[-1])
-        for axis, label in zip(maps, data["label"].values, strict=True):
-            crosses = sum(np.size(line.get_xdata()) for line in axis.lines)
-            ended = data["status"].sel(label=label).isin(("ok", "untrusted"))
-            assert crosses == int((~ended).sum())
-    else:
-        checked(vm.plot(folder / f"{name}.toml", "errors", results=folder))
+    checked(vm.plot(folder / f"{name}.toml", "errors", results=folder))
 
 
 @pytest.mark.parametrize("name", ["all", "late", "at-once", "beside-untrusted", "beside-rejected"])
@@ -206,8 +193,7 @@ def test_a_rank_study_has_ranks_across_says_where_they_end_and_names_its_point(t
 def test_errors_are_drawn_over_what_is_not_chosen(folder):
     data = stored(folder, "map-4")
     chosen = vm.plot(data, "errors", label="untrusted_1")
-    assert chosen.axes[0].get_title(loc="left") == "(a) untrusted 1"
-    assert len(chosen.axes[0].texts) == 9
+    assert all(text.startswith("untrusted 1") for text in said(chosen)[0][:3])
     curve = checked(vm.plot(data, "errors", amplitude_factor=1.2)).axes[0]
     lines = {line.get_label(): line for line in curve.lines}
     place = {"label": "ok_0", "amplitude_factor": 1.2, "output": "second_euler_angle"}
@@ -236,33 +222,31 @@ MANY = {"rank": [*range(1, 9)]}
 
 
 @pytest.mark.parametrize(
-    ("dimensions", "label", "panels", "meshes"),
+    ("dimensions", "label"),
     [
-        (FACTOR | {"rank": [1, 2, 3]}, "frequency perturbation (%)", 2, 0),
-        (FACTOR | MANY, "rank", 2, 0),
-        (FACTOR | {"amplitude_factor": [0.9, 1.0]}, "frequency perturbation (%)", 4, 4),
-        ({"tolerance": [1e-8, 1e-6, 1e-3]}, "tolerance", 2, 0),
-        (MANY | {"snapshots": [*range(5, 11)]}, "rank", 4, 4),
-        (MANY | {"formulation": ["state", "paired"], "start": ["a", "b", "c"]}, "rank", 4, 4),
-        ({"start": ["a", "b"], "rank": [1, 2, 3]}, "rank", 2, 0),
-        ({"formulation": ["coordinates", "state", "paired"]}, "formulation", 2, 0),
-        ({"equation_seed": [*range(30)]}, "equation seed", 2, 0),
+        (FACTOR | {"rank": [1, 2, 3]}, "frequency perturbation (%)"),
+        (FACTOR | MANY, "rank"),
+        (FACTOR | {"amplitude_factor": [0.9, 1.0]}, "frequency perturbation (%)"),
+        ({"tolerance": [1e-8, 1e-6, 1e-3]}, "tolerance"),
+        (MANY | {"snapshots": [*range(5, 11)]}, "rank"),
+        (MANY | {"formulation": ["state", "paired"], "start": ["a", "b", "c"]}, "rank"),
+        ({"start": ["a", "b"], "rank": [1, 2, 3]}, "rank"),
+        ({"formulation": ["coordinates", "state", "paired"]}, "formulation"),
+        ({"equation_seed": [*range(30)]}, "equation seed"),
     ],
 )
-def test_figures_follow_from_what_varies(dimensions, label, panels, meshes):
+def test_figures_follow_from_what_varies(dimensions, label):
     figure = checked(plot_result(varied(**dimensions), None, "errors"))
-    shown = [axis for axis in figure.axes if axis.get_label() != "<colorbar>"]
-    assert len(shown) == panels
+    shown = figure.axes
+    assert len(shown) == 2
     assert shown[-1].get_xlabel() == label
-    found = [axis for axis in shown if any(hasattr(c, "get_coordinates") for c in axis.collections)]
-    assert len(found) == meshes
     assert (shown[-1].get_xscale() == "log") == (label == "tolerance")
     if label == "rank":
         ticks = shown[-1].get_xticks()
         assert all(float(tick).is_integer() for tick in ticks)
 
 
-def test_curves_and_maps_show_the_errors():
+def test_curves_show_the_errors():
     dataset = varied(**FACTOR, rank=[2, 3])
     # One method does not depend on the rank.
     dataset["rms_error"][:, 1, 1] = dataset["rms_error"][:, 0, 1]
@@ -277,11 +261,10 @@ def test_curves_and_maps_show_the_errors():
         np.testing.assert_allclose(line.get_xdata(), [-20.0, 0.0, 20.0, 40.0], atol=1e-12)
     dataset = varied(**MANY, formulation=["state", "paired"], start=["a", "b", "c"])
     figure = plot_result(dataset, None, "errors")
-    assert "formulation" in figure.get_suptitle()
-    errors = dataset["rms_error"].max("formulation").sel(label="pod", output="second_euler_angle")
-    shown = figure.axes[0].collections[0].get_array().ravel()
-    assert 1e-3 * shown.max() == pytest.approx(float(errors.max()))
-    assert shown.size == errors.size
+    assert "the largest error over start and formulation" in figure.get_suptitle()
+    errors = dataset["rms_error"].max(["formulation", "start"]).sel(label="pod")
+    (line,) = (x for x in figure.axes[0].lines if x.get_label() == "POD")
+    np.testing.assert_array_equal(line.get_ydata(), errors.sel(output="second_euler_angle"))
 
 
 def test_of_many_lines_no_two_have_one_colour():

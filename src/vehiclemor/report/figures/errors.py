@@ -1,19 +1,16 @@
 """Errors of any study over what it varies, or of one point.
 
-Which picture it is follows from the dimensions of the study's grid, whatever model and methods it
-has: curves over one, a map over two where more varies.
+Curves go over one dimension of the study's grid, whatever model and methods it has; where there
+would be too many, they show the largest error over the others.
 """
 
 import itertools
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from math import ceil
-from typing import Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from vehiclemor.exceptions import InputError
@@ -38,21 +35,8 @@ OFF: tuple[tuple[Style, float, str, Callable[[np.ndarray], np.ndarray]], ...] = 
     (theme.CROSS, 1.0, "a run has failed", lambda errors: ~np.isfinite(errors)),
     (theme.ZERO, 0.0, "error 0, off the log axis", lambda errors: errors == 0.0),
 )
-# Columns of maps, and cells of a map with their number.
-COLUMNS, WRITTEN = 3, 100
-# In % of the cells, those whose small errors the colours leave out; part of the colours on which
-# white has more contrast than black.
-LEAST, DARK = 2.0, 120 / 256
 # Label -> text, errors on the dimensions output and the axis.
 Lines = Mapping[str, tuple[str, xr.DataArray]]
-
-
-class Picture(NamedTuple):
-    """How errors of a study are drawn: the kind, the dimensions on axes, and those left over."""
-
-    kind: Literal["curves", "map"]
-    axes: Sequence[str]
-    rest: Sequence[str]
 
 
 def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
@@ -68,52 +52,27 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
     saturated = saturated_ranks(dataset)
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
     lines = _lines(errors, methods, varied[1:], saturated)
-    picture = choose_picture(varied, len(lines), len(methods))
-    if picture.kind == "map":
-        errors = errors.max(picture.rest)
-        figure = _map(dataset, errors, methods, outputs, picture.axes)
-    else:
-        figure = _panels(dataset, varied[0], outputs, lines)
+    notes: list[str] = []
+    if len(lines) > max(LINES, len(methods)):
+        largest = errors.max(varied[1:])
+        lines = {label: (text, largest.sel(label=label)) for label, text in methods.items()}
+        notes.append(f"the largest error over {_listed(varied[1:])}")
+    figure = _panels(dataset, varied[0], outputs, lines)
     _mark_saturation(figure, [f"{methods[m]} saturates at {r}" for m, r in saturated.items()])
-    if notes := _notes(dataset, picture, errors, methods):
-        figure.suptitle(notes, fontsize="medium")
+    trained = labels.trained_runs(dataset).sel(label=list(methods))
+    if number := int(trained.sum()):
+        notes.append(f"{number} of {trained.size} runs were in their own training")
+    if notes:
+        figure.suptitle("\n".join(notes), fontsize="medium")
     theme.legend_below(figure, figure.axes)
     return figure
-
-
-def choose_picture(varied: Sequence[str], lines: int, methods: int) -> Picture:
-    """A map over both factors or of many lines, else curves."""
-    axis, *others = varied
-    kind, axes = "curves", [axis]
-    if set(FACTORS) <= set(varied):
-        kind, axes = "map", list(FACTORS)
-    elif lines > max(LINES, methods):
-        kind, axes = "map", [axis, others[0]]
-    return Picture(kind, axes, [name for name in others if name not in axes])
-
-
-def _notes(
-    dataset: xr.Dataset, picture: Picture, errors: xr.DataArray, methods: Mapping[str, str]
-) -> str:
-    """Lines above the panels: what is drawn, and how many runs were trained on."""
-    notes: list[str] = []
-    if picture.rest and picture.kind == "map":
-        notes.append(f"the largest error over {_listed(picture.rest)}")
-    if picture.kind == "map" and bool(np.isinf(errors).any()):
-        notes.append("a cross where a run has failed")
-    lines = [", ".join(notes)]
-    trained = labels.trained_runs(dataset).sel(label=list(methods))
-    if count := int(trained.sum()):
-        lines.append(f"{count} of {trained.size} runs were in their own training")
-    return "\n".join(filter(None, lines))
 
 
 def _mark_saturation(figure: Figure, texts: Sequence[str]) -> None:
     """Say beside axes of ranks which methods reach their largest rank."""
     for panel in figure.axes if texts else ():
-        for axis in (panel.xaxis, panel.yaxis):
-            if axis.get_label_text() == "rank":
-                axis.set_label_text(textwrap.fill(f"rank; {', '.join(texts)}", LETTERS))
+        if panel.get_xlabel() == "rank":
+            panel.set_xlabel(textwrap.fill(f"rank; {', '.join(texts)}", LETTERS))
 
 
 def _panels(dataset: xr.Dataset, axis: str, outputs: Sequence[str], lines: Lines) -> Figure:
@@ -215,83 +174,6 @@ def _draw_off(axis: Axes, at: np.ndarray, mark: Style, height: float, color: str
 
 def _count_marked(axis: Axes, mark: Style) -> int:
     return sum(line.get_marker() == mark["marker"] for line in axis.lines)
-
-
-def _map(
-    dataset: xr.Dataset,
-    errors: xr.DataArray,
-    methods: Mapping[str, str],
-    outputs: Sequence[str],
-    axes: Sequence[str],
-) -> Figure:
-    """Errors over two dimensions (across and upwards), a column for each method.
-
-    Of few cells each has its number.
-    Colours leave out the least errors, as that of the training run, far below all others.
-    """
-    errors = errors.squeeze([d for d in errors.dims if d not in ("output", "label", *axes)])
-    errors = errors.transpose("output", "label", *reversed(axes))
-    each = ceil(len(methods) / COLUMNS)
-    columns = ceil(len(methods) / each)
-    size = 3.35 * columns, 2.8 * each * len(outputs) + 0.3
-    figure, grid = theme.panels(each * len(outputs), columns, size, sharex=True, sharey=True)
-    across, up = (ticks_of(dataset, name).even() for name in axes)
-    written = across.at.size * up.at.size <= WRITTEN
-    for row, output in enumerate(outputs):
-        block = grid[row * each : (row + 1) * each]
-        values = errors.sel(output=output, label=list(methods)).values
-        colored = values[np.isfinite(values) & (values > 0.0)]
-        # A map on which nothing differs from zero, or nothing has come to its end, is still one.
-        if not colored.size:
-            colored = np.array([1.0, 10.0])
-        factor, unit = 1.0, labels.unit_of(dataset, output)
-        if written:
-            factor, unit = labels.readable_unit(float(np.median(colored)), unit)
-        low, high = factor * np.percentile(colored, (LEAST, 100.0), method="higher")
-        norm = LogNorm(low, high, clip=True)
-        for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):
-            _draw_cells(axis, across.at, up.at, factor * values[number], norm, written=written)
-            axis.set_title(theme.letter(row * len(methods) + number, text))
-        label = labels.error_label(dataset, "RMS error", output, unit)
-        extend = "min" if factor * colored.min() < low else None
-        bar = figure.colorbar(block[0, 0].collections[0], ax=block, label=label, extend=extend)
-        tick_decades(bar.ax.yaxis, low, high)
-        for axis in block[:, 0]:
-            up.tick(axis.yaxis)
-    for axis in grid.flat if each > 1 else grid[-1]:
-        across.tick(axis.xaxis)
-        axis.tick_params(labelbottom=True)
-    # They share the ticks of the others until these are set.
-    for axis in grid.flat:
-        if not axis.collections:
-            axis.remove()
-    return figure
-
-
-def _draw_cells(
-    axis: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, norm: LogNorm, *, written: bool
-) -> None:
-    """Cells in colours, with their numbers if `written`; a run that has failed has a cross."""
-    failed = ~np.isfinite(values)
-    style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
-    cells = np.where(failed, np.nan, np.maximum(values, norm.vmin or 0.0))
-    axis.pcolormesh(x, y, cells, norm=norm, **style)
-    j, i = np.nonzero(failed)
-    axis.plot(x[i], y[j], color="#D55E00", **theme.CROSS)
-    axis.grid(visible=False)
-    for j, i in np.argwhere(~failed) if written else ():
-        color = "white" if norm(cells[j, i]) < DARK else "black"
-        text: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
-        axis.text(float(x[i]), float(y[j]), two_digits(float(values[j, i])), **text)
-
-
-def two_digits(value: float) -> str:
-    """A number with two significant digits, below a hundredth with one, without an exponent."""
-    if value == 0.0:
-        return "0"
-    rounded = float(f"{value:.1e}")
-    decimals = (1 if rounded >= 0.01 else 0) - int(np.floor(np.log10(abs(rounded))))
-    return f"{value:.{max(0, decimals)}f}"
 
 
 def _of_a_point(dataset: xr.Dataset, methods: Mapping[str, str]) -> Figure:

@@ -145,14 +145,6 @@ class Ticks(NamedTuple):
             panel.set_xscale("log")
         self.tick(panel.xaxis)
 
-    def even(self) -> "Ticks":
-        """Cells of one size: numbers at unequal distances become names."""
-        steps = np.diff(self.at)
-        if self.names or np.allclose(steps, steps.mean(), rtol=1e-6):
-            return self
-        names = [f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for value in self.at]
-        return Ticks(np.arange(len(names)), self.label, names)
-
 
 def ticks_of(dataset: xr.Dataset, name: str) -> Ticks:
     """Ticks of a dimension of a grid, or of a coordinate on one."""
