@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, flag, number, quoted, real_array
+from vehiclemor.arguments import file_path, flag, quoted, real_array
 from vehiclemor.exceptions import InputError, UnreachableError, VehiclemorError
 from vehiclemor.registry import component, names
 
@@ -175,7 +175,6 @@ def simulate(
     preset: str = "recommended",
     training: Given = "matched",
     training_set: Sequence[tuple[float, float]] = (),
-    rtol: float | None = None,
     errors: bool = True,
     **settings: object,
 ) -> xr.Dataset:
@@ -204,12 +203,10 @@ def simulate(
         model's protocol), `set`; or a list of these.
     training_set
         (frequency, amplitude) factors on the maneuver, of `set`.
-    rtol
-        Tolerance of the solver; for a kinematic model the largest step of the last iteration.
     errors
         Whether to compare with the full-order solution; else only the method runs.
     **settings
-        Settings of the method, such as `rank=3`.
+        Settings of the method, such as `rank=3`, and `tolerance` of its solver.
 
     Returns
     -------
@@ -229,10 +226,6 @@ def simulate(
 
     ready = model if isinstance(model, Model) else kept_build(model)
     flag("errors", errors)
-    if rtol is not None:
-        if "tolerance" in settings:
-            raise InputError("rtol and tolerance are the same setting: give one of them")
-        settings["tolerance"] = number("rtol", rtol)
     chosen = complete_settings(ready, method, settings, preset)
     test = _scenario(ready, maneuver, start, (frequency, amplitude))
     trained = training_of(ready, method, training, test, _pairs(training_set))
