@@ -5,7 +5,7 @@ the Proper Orthogonal Decomposition, J. Comput. Nonlinear Dyn. 10(3), 031007 (20
 L. Sirovich, Turbulence and the dynamics of coherent structures, Quart. Appl. Math. 45 (1987).
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, create_model
@@ -30,15 +30,6 @@ SETTINGS: dict[str, type[Settings]] = {
 PERIODS = {"ae": 5.0, "ode": 0.5, "dae": 0.1, "structural": 0.5}
 SHORTEST_PERIOD = {"ae": 1e-3, "ode": 1e-2, "dae": 1e-2, "structural": 0.1}
 ControlPeriod = Annotated[float, Field(gt=0.0, description="length of a control period in s")]
-Restart = Annotated[
-    Literal["own", "projected", "full_model"],
-    Field(
-        description="where a control period starts: own: where the one before has ended; "
-        "projected: at the full model's state, projected onto the period's subspace (paper, step "
-        "6); full_model: at that state itself, the origin of the subspace from there on, as in a "
-        "model-predictive controller; the full model runs beside both"
-    ),
-]
 # As many snapshots of one basis as the paper's control periods have together.
 SNAPSHOTS = {"ae": 20, "ode": 500, "dae": 500}
 DYNAMIC_LITERAL = {"formulation": "state", "inner_product": "euclidean", "rank_tolerance": 0.0}
@@ -52,10 +43,8 @@ PRESETS = {
 
 def _in_periods(kind: str) -> type[Settings]:
     """Settings of POD in control periods."""
-    fields: dict[str, Any] = {"control_period": (ControlPeriod, PERIODS[kind])}
-    if kind in ("ode", "dae"):
-        fields["restart"] = Restart, "own"
-    return create_model("PodSettings", __base__=SETTINGS[kind], **fields)
+    period: Any = ControlPeriod, PERIODS[kind]
+    return create_model("PodSettings", __base__=SETTINGS[kind], control_period=period)
 
 
 def _of_one_basis(kind: str) -> type[Settings]:
