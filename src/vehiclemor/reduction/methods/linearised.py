@@ -256,7 +256,7 @@ def modal(model: Any, training: Training, settings: Any) -> ReducedVehicle | Red
     if model.kind != "structural":
         return linear_vehicle(model, settings, truncated)
     began = time.process_time()
-    return reduced(model, [free_modes(model, settings.highest)], settings, began)
+    return reduced(model, free_modes(model, settings.highest), settings, began)
 
 
 def balanced(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
