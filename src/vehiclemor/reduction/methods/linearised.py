@@ -13,7 +13,7 @@ stays that of the start, and the dynamics are those at the speed of the model.
 Reductors choose coordinates of the lateral modes, those that steering moves:
 
 - `modal_truncation` (E. Davison, IEEE Trans. Autom. Control 11 (1966), 93-101) takes the slow
-  modes.  The others are dropped, or follow the steering without delay (static correction), so that
+  modes.  The others follow the steering without delay (static correction), so that
   steady cornering is that of the linearisation.  Of a structure it takes all modes up to a
   frequency, linearised at the static state.
 - `balanced_truncation` (B. C. Moore, IEEE Trans. Autom. Control 26 (1981), 17-32) is pyMOR's; its
@@ -37,7 +37,7 @@ Velocity and acceleration of the rack are left out, and so are heave and pitch.
 
 import time
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -81,9 +81,6 @@ class ModalVehicleSettings(FallbackSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
-    static_correction: Literal["yes", "no"] = Field(
-        "yes", description="dropped modes follow the steering without delay"
-    )
 
 
 class RankedVehicleSettings(FallbackSettings):
@@ -118,7 +115,7 @@ def truncated(
     if not slow.any():
         limit = settings.fastest
         raise InputError(f"fastest is {limit:g} 1/s: no mode that steering moves is that slow")
-    if settings.static_correction == "yes" and not slow.all():
+    if not slow.all():
         steady = np.linalg.solve(modes.rates[~slow][:, ~slow], modes.input_matrix[~slow])
         static_response = static_response.copy()
         static_response[:, 0] -= modes.right[:, ~slow] @ steady
