@@ -160,7 +160,7 @@ def reduce(
     with first_use(f"{ready.name} with {method}"), one_thread():
         runs = [training_run(ready, scenario) for scenario in scenarios]
         reduced = fitted(definition, ready, runs, complete)
-    known = known_inputs(ready, scenarios, definition.follows_time)
+    known = known_inputs(ready, scenarios)
     return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, reduced, known)
 
 

@@ -236,7 +236,7 @@ def scenario(model, frequency=1.0, amplitude=1.0, speed=20.0):
 @given(frequency=st.floats(0.5, 2.0), amplitude=st.floats(-2.0, 2.0), speed=st.floats(15.0, 25.0))
 def test_a_run_is_trusted_exactly_within_the_range(model, frequency, amplitude, speed):
     training = (scenario(model, 1.0, 1.2, 18.0), scenario(model, 1.3, -0.8, 22.0))
-    known = known_inputs(build(model), training, False)
+    known = known_inputs(build(model), training)
     test = scenario(model, frequency, amplitude, speed)
     found = known.trust(build(model), test.maneuver, speed_of(build(model), test))
     if abs(amplitude) > 1.201 or not 17.99 < speed < 22.01:

@@ -91,16 +91,6 @@ def test_warnings_of_the_full_order_stay():
     assert "an arm is beyond" in run.message
 
 
-@pytest.mark.parametrize(
-    "settings", [{"safe_solver": "rodas4", "safe_tolerance": 1e-5}, {"fallback": "rodas4"}]
-)
-def test_guarded_has_a_fallback_by_either_name(settings):
-    method = component("method", "guarded")
-    chosen = validated(method, "ode", settings)
-    assert chosen.fallback == "rodas4"
-    assert chosen.fallback_tolerance == settings.get("safe_tolerance", 1e-4)
-
-
 def test_wrong_fallbacks_are_refused():
     for method, wrong in (("slow_manifold", "euler"), ("guarded", "none")):
         with pytest.raises(InputError, match=f"{method}: fallback"):

@@ -12,7 +12,11 @@ from scipy.sparse.linalg import spsolve
 import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
-from vehiclemor.simulation.structures.model import Periods, relative_error, wrong_matrices
+from vehiclemor.simulation.structures.model import (
+    first_samples,
+    relative_error,
+    wrong_matrices,
+)
 from vehiclemor.simulation.structures.sparse_loops import solve
 from vehiclemor.simulation.structures.system import DAMPED, blocks_of, factored, weights_of
 
@@ -74,7 +78,7 @@ def test_a_run_is_that_of_another_integrator_and_of_second_order(chain):
         expected = np.column_stack([x[n - 1], x[-1], np.array(slopes)[:, -1]])
         errors = []
         for every in (20, 40, 320):
-            found = Periods((model.system,)).steps_of(complete, every, 101)[0]
+            found = first_samples(model.system, complete, every, 101)[0]
             errors.append(relative_error(found[:, :3], expected))
         assert errors[-1] < tight
         if size < 0.1:
@@ -172,7 +176,7 @@ def test_the_step_that_is_chosen_meets_the_tolerance(chain):
     for given in (signal(), sharp):
         model, steps = chain(), []
         complete = whole(given, model)
-        exact = Periods((model.system,)).steps_of(complete, 320, complete.samples)[0]
+        exact = first_samples(model.system, complete, 320, complete.samples)[0]
         for tolerance in (1e-2, 1e-3, 1e-4):
             run = model.simulate(given, tolerance=tolerance)
             assert relative_error(run.outputs, exact) < tolerance
