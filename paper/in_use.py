@@ -146,14 +146,6 @@ def steps(model: str) -> Iterator[tuple[str, float]]:
         yield f"{model} {who} step, us", 1e6 * min(seconds)
 
 
-def restarts() -> Iterator[tuple[str, float]]:
-    """`pod` of the nominal run whose control periods begin at a measured state."""
-    for restart in ("projected", "full_model"):
-        settings: dict[str, Any] = {"restart": restart, "amplitude": 1.2, "training": "nominal"}
-        run = vm.simulate("independent_suspension_vehicle", "pod", **settings)
-        yield f"restart {restart} 1.2, m", run["rms_error"].sel(output=ASIDE).item()
-
-
 def store(values: Values, title: str, path: Path, runs: pd.DataFrame | None = None) -> None:
     """Write values named `name, unit`, and what there is to know of single runs."""
     names, units = zip(*(name.rsplit(", ", 1) for name in values), strict=True)
@@ -167,7 +159,7 @@ def store(values: Values, title: str, path: Path, runs: pd.DataFrame | None = No
 
 def measured() -> Values:
     """Values of every part."""
-    values: Values = dict(restarts())
+    values: Values = {}
     with one_thread():
         values |= dict(batches())
         for model in VEHICLES:

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from claims import claim_rows, stored_results
 from mesh_sizes import size_rows
 
 import vehiclemor as vm
 from vehiclemor.registry import names
-from vehiclemor.report.comparison import stored_rows
 from vehiclemor.report.frames import frame
+from vehiclemor.report.printed_numbers import number_rows
 from vehiclemor.report.published import load_published, rms_numbers
 from vehiclemor.report.unseen import count_rows, protocol_rows
 
@@ -207,9 +208,12 @@ def sizes(dataset: xr.Dataset) -> Iterator[Entry]:
 
 def comparison(results: Path) -> Iterator[Entry]:
     """Every number and claim of the paper as reproduced, from equilibrium."""
-    for row in stored_rows(results):
+    stored = stored_results(results)
+    for row in number_rows(stored):
         for name in ("reproduced", "signal_rms"):
             yield slug("comparison", row["id"], row["variant"], name), row[name], row["unit"]
+    for row in claim_rows(stored):
+        yield slug("comparison", row["id"], row["variant"], "reproduced"), row["reproduced"], "1"
 
 
 def published() -> Iterator[Entry]:

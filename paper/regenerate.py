@@ -17,13 +17,12 @@ from typing import Any
 import matplotlib
 import numpy as np
 import xarray as xr
+from claims import claim_rows, claims, stored_results
 from drawings.catalogue import FIGURES, Entry
 
 from vehiclemor import VehiclemorError
 from vehiclemor.files import write_text
-from vehiclemor.report.comparison import stored_rows
 from vehiclemor.report.figures import theme
-from vehiclemor.report.published import load_published
 
 PAPER = Path(__file__).parent
 STYLE = str(PAPER / "figures.mplstyle")
@@ -49,10 +48,9 @@ def draw(entry: Entry, results: Path, path: Path) -> Path:
         return theme.save_figure(figure, path)
 
 
-def claims(results: Path) -> Iterator[dict[str, Any]]:
+def judged_claims(results: Path) -> Iterator[dict[str, Any]]:
     """Every claim of the paper that can be measured, with bound, both variants and verdicts."""
-    known = load_published().claims
-    measured = (row for row in stored_rows(results) if row["id"] in known and row["measure"])
+    known, measured = claims(), claim_rows(stored_results(results))
     for claim, group in groupby(measured, key=lambda row: row["id"]):
         rows = list(group)
         yield {
@@ -84,7 +82,7 @@ def regenerate(results: Path, folder: Path, only: Sequence[str] = ()) -> list[Pa
             print(f"{name}.svg stays as it is: {error.filename} is missing", file=sys.stderr)
     if not only:
         try:
-            text = json.dumps([*claims(results)], indent=1, ensure_ascii=False) + "\n"
+            text = json.dumps([*judged_claims(results)], indent=1, ensure_ascii=False) + "\n"
         except FileNotFoundError as error:
             print(f"claims.json stays as it is: {error.filename} is missing", file=sys.stderr)
         else:

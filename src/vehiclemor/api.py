@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import file_path, flag, number, quoted, real_array
+from vehiclemor.arguments import file_path, flag, quoted, real_array
 from vehiclemor.exceptions import InputError, UnreachableError, VehiclemorError
 from vehiclemor.registry import component, names
 
@@ -61,11 +61,7 @@ def studies() -> dict[str, str]:
     return {name: read_study(study_path(name)).title for name in data_names("studies")}
 
 
-def describe(
-    name: str | Path,
-    parameters: Mapping[str, object] | None = None,
-    parameter_file: str | Path | None = None,
-) -> dict[str, object]:
+def describe(name: str | Path) -> dict[str, object]:
     """What a model, method, maneuver or study declares; lists of dictionaries are tables.
 
     Parameters
@@ -73,18 +69,15 @@ def describe(
     name
         Registered name, name or TOML file of a study, or `study-schema`,
         `parameter-schema` for the keys of such a file.
-    parameters, parameter_file
-        As of `model()`.
 
     Raises
     ------
     VehiclemorError
-        If nothing has that name, or a parameter is wrong.
+        If nothing has that name.
     """
     from vehiclemor.report.description import description
 
-    path = None if parameter_file is None else file_path("parameter_file", parameter_file)
-    return description(str(file_path("name", name)), parameters, path)
+    return description(str(file_path("name", name)))
 
 
 def model(
@@ -167,7 +160,7 @@ def reduce(
     with first_use(f"{ready.name} with {method}"), one_thread():
         runs = [training_run(ready, scenario) for scenario in scenarios]
         reduced = fitted(definition, ready, runs, complete)
-    known = known_inputs(ready, scenarios, definition.follows_time)
+    known = known_inputs(ready, scenarios)
     return ReducedOrderModel(ready, method, complete.model_dump(), scenarios, reduced, known)
 
 
@@ -182,7 +175,6 @@ def simulate(
     preset: str = "recommended",
     training: Given = "matched",
     training_set: Sequence[tuple[float, float]] = (),
-    rtol: float | None = None,
     errors: bool = True,
     **settings: object,
 ) -> xr.Dataset:
@@ -211,12 +203,10 @@ def simulate(
         model's protocol), `set`; or a list of these.
     training_set
         (frequency, amplitude) factors on the maneuver, of `set`.
-    rtol
-        Tolerance of the solver; for a kinematic model the largest step of the last iteration.
     errors
         Whether to compare with the full-order solution; else only the method runs.
     **settings
-        Settings of the method, such as `rank=3`.
+        Settings of the method, such as `rank=3`, and `tolerance` of its solver.
 
     Returns
     -------
@@ -228,7 +218,6 @@ def simulate(
     VehiclemorError
         If the input is wrong or can't be reached.  A model that diverges is a result.
     """
-    import vehiclemor.report.result_accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.model import Model
     from vehiclemor.study.evaluate import evaluate
@@ -237,10 +226,6 @@ def simulate(
 
     ready = model if isinstance(model, Model) else kept_build(model)
     flag("errors", errors)
-    if rtol is not None:
-        if "tolerance" in settings:
-            raise InputError("rtol and tolerance are the same setting: give one of them")
-        settings["tolerance"] = number("rtol", rtol)
     chosen = complete_settings(ready, method, settings, preset)
     test = _scenario(ready, maneuver, start, (frequency, amplitude))
     trained = training_of(ready, method, training, test, _pairs(training_set))
@@ -318,7 +303,6 @@ def run_study(
         run of its studies on the dimension `cell`, without histories; the datasets of the studies
         are in the folder `studies`.
     """
-    import vehiclemor.report.result_accessor  # noqa: F401  (results draw themselves)
     from vehiclemor.progress import listening
     from vehiclemor.study.plans.results import flattened
     from vehiclemor.study.run import run_studies
@@ -361,7 +345,7 @@ def plot(
     results: str | Path = RESULTS,
     **at: object,
 ) -> Figure:
-    """Draw a result; a dataset draws itself by `dataset.vehiclemor.plot(...)`.
+    """Draw a result.
 
     Parameters
     ----------
@@ -370,7 +354,7 @@ def plot(
     *beside
         The full-order run of the same input, to be drawn with the run; or the kind.
     kind
-        `histories`, `paths`, `errors`, `frequency_response` of a sweep, or `sine_with_dwell`.
+        `histories`, `paths` or `errors`.
     out
         Picture to write (PNG, SVG or PDF).
     results
@@ -386,8 +370,8 @@ def plot(
     """
     import xarray as xr
 
-    from vehiclemor.report.result_accessor import ResultAccessor
-    from vehiclemor.report.result_selection import dataset_of, stored_result
+    from vehiclemor.report.figures.result_plot import plot_result
+    from vehiclemor.report.result_selection import dataset_of, select_point, stored_result
     from vehiclemor.simulation.trajectory import Trajectory
 
     if isinstance(result, str | Path):
@@ -397,4 +381,5 @@ def plot(
     if not isinstance(result, xr.Dataset):
         raise InputError(f"result is {quoted(result)}; it must be a run, a dataset, file or study")
     kind = next((str(given) for given in beside if isinstance(given, str)), kind)
-    return ResultAccessor(result).plot(kind, out, **at)
+    dataset, _ = select_point(result, kind, at)
+    return plot_result(dataset, None if out is None else file_path("out", out), kind)

@@ -79,15 +79,6 @@ def compiling(what: str, slow: bool = True) -> Iterator[None]:
             use.seconds += perf_counter() - begin
 
 
-@contextmanager
-def announced(what: str) -> Iterator[None]:
-    """Anything else that takes long."""
-    begin = perf_counter()
-    _LOG.info(what)
-    yield
-    _LOG.info("%s: done in %.1f s", what, perf_counter() - begin)
-
-
 # Called with (study or other work, finished parts, all parts).
 Progress = Callable[[str, int, int], None]
 _LISTENER: ContextVar[Progress | None] = ContextVar("progress", default=None)

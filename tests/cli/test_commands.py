@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,11 +21,13 @@ from vehiclemor.cli import main, studies
 from vehiclemor.cli.app import COMMANDS, ended
 from vehiclemor.cli.options import key_values
 from vehiclemor.exceptions import MachineError
+from vehiclemor.files import data_names
 from vehiclemor.parameters import load_parameters
 from vehiclemor.reduction.methods import replay
 from vehiclemor.registry import component, names
 from vehiclemor.report.description import SCHEMAS
 from vehiclemor.study import run as study_run
+from vehiclemor.study.plans.loading import load_studies
 
 
 @pytest.fixture
@@ -132,9 +135,15 @@ def test_a_model_shows_all_that_it_declares(name):
     assert shown["starts"] == list(model.starts)
     accepting = [m for m in names("method") if component("method", m).accepts(model)[0]]
     assert shown["methods"] == accepting
-    rows = vm.describe("double_wishbone", {"wheel_centre": [0.0, 0.8, -0.1]})["parameters"]
-    (row,) = [row for row in rows if row["name"] == "wheel_centre"]
-    assert (row["value"], row["source"]) == ([0.0, 0.8, -0.1], "override")
+
+
+def test_a_study_shows_its_file_and_its_members():
+    for name in data_names("studies"):
+        shown, definitions = vm.describe(name), load_studies(name)
+        assert Path(shown["file"]).stem == name
+        assert {row["study"]: row["runs"] for row in shown["studies"]} == {
+            member: definition.points for member, definition in definitions.items()
+        }
 
 
 STUDY = """

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.parameters import parameter_path
 
@@ -15,7 +16,7 @@ WRONG = [
     (f"{TRAVEL} --parameter upper_arm_front_pivot=-0.25,0.51,0.11", "can't be assembled"),
     (f"{POD} rank", "key=value"),
     (f"{POD} rank=3 --set rank=4", "rank is given twice"),
-    ("figures --only vehicles,errors-double_wishbone", "--only vehicles errors-double_wishbone"),
+    ("figures --only vehicles,figure-11", "--only vehicles figure-11"),
     (f"{TRAVEL} --training nominal,matched", "--training nominal matched"),
     (f"{TRAVEL} --colour red", "--colour"),
     (f"{TRAVEL} --co\x1b[31mlour red", r"\x1b[31m"),
@@ -62,7 +63,8 @@ def test_wrong_values_are_one_line_and_leave_nothing(fails, command, word, tmp_p
 def test_files_that_are_wrong_are_named(fails, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(parameter_path("double_wishbone").read_text().replace('"m"', '"mm"'))
-    fails([*TRAVEL.split(), "--parameter-file", path], str(path), "'mm'")
+    with pytest.raises(vm.VehiclemorError, match="'mm'"):
+        vm.model("double_wishbone", parameter_file=path)
     path.write_bytes(bytes(range(256)))
     fails(["run", path], str(path), "UTF-8")
 

@@ -39,12 +39,12 @@ def _declares(method, model):
 
 PAIRS = [(m, method) for m in names("model") for method in METHODS if _declares(method, m)]
 # What they leave out or linearise shows in a lane change: findings, no defects.
-LINEAR = ("linear_single_track", "modal_truncation", "balanced_truncation", "irka")
+LINEAR = ("linear_single_track", "modal_truncation", "balanced_truncation")
 LEARNED = (
     *("operator_inference", "sparse_identification", "dynamic_mode_decomposition"),
     *("gaussian_process", "neural_network", "single_track", "trajectory_network"),
 )
-ROUGH = ("fixed_basis", "deim", *LINEAR, *LEARNED)
+ROUGH = ("fixed_basis", *LINEAR, *LEARNED)
 # One run doesn't determine what these fit: (frequency, amplitude) factors of their training.
 TRAINED_ON: dict[str, tuple[tuple[float, float], ...]] = dict.fromkeys(
     ("slow_manifold", "guarded"),
@@ -56,9 +56,6 @@ TRAINED_ON: dict[str, tuple[tuple[float, float], ...]] = dict.fromkeys(
 SETTINGS: dict[str, dict[str, object]] = {
     "slow_manifold": {"steps": 1},
     "guarded": {"steps": 1},
-    "deim": {"rank": 2, "rows": 4},
-    # With four it has a mode of 550 1/s, which takes long at tight tolerances.
-    "irka": {"rank": 2},
     **{name: {"rank": 4, "steps": 1} for name in LEARNED},
     "single_track": {"iterations": 2},
     "trajectory_network": {"rank": 4, "epochs": 2},

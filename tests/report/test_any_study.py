@@ -117,6 +117,18 @@ def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     figure = plot_result(data, None, "errors")
     assert "a run has failed" in [text.get_text() for text in figure.legends[0].get_texts()]
     checked(figure)
+    # What a protocol would not trust has the status ok, a mark and a remark.
+    data["warned"].loc[there | {"frequency_factor": 1.0}] = True
+    # The template's method reads no training: a mark that it could have.
+    data["in_training"].loc[there | {"frequency_factor": 1.0}] = True
+    data["remark"] = data["remark"].astype(object)
+    data["remark"].loc[there | {"frequency_factor": 1.0}] = "not driven; not to be trusted on Mars"
+    data["remark"].loc[there | {"frequency_factor": 0.8}] = "not driven"
+    now = {(r["label"], r["start"], r["output"]): r["warned"] for r in grid_rows(data)}
+    more = {key[:2] for key, count in now.items() if count != before[key]["warned"]}
+    assert more == {("mine", "dropped")}
+    data["status"][:] = "diverged"
+    assert {row["failures"] for row in grid_rows(data)} == {"3 diverged", "6 diverged"}
 
 
 def test_a_protocol_is_judged_by_its_own_targets(place, said):
@@ -187,11 +199,14 @@ def test_a_model_is_compared_by_every_method_and_output(folder, capsys):
 def test_figures_are_those_of_every_model(folder, tmp_path, capsys, monkeypatch):
     # One picture of each figure is enough here.
     monkeypatch.setattr(theme, "FORMATS", ("png",))
-    names = [f"{kind}-{CAR}" for kind in ("histories", "errors", "map", "pareto")]
-    arguments = ["--results", str(folder), "--out", str(tmp_path), "--only", *names]
+    names = [f"{CAR}-nominal", f"{CAR}-perturbed", f"predictive-{CAR}"]
+    files = [str(folder / "studies" / f"{name}.toml") for name in names]
+    arguments = ["--results", str(folder), "--out", str(tmp_path), "--only", *files]
     assert main(["figures", *arguments]) == 0
     written = capsys.readouterr().out.split()
-    assert written == [str(tmp_path / f"figure-{name}.png") for name in names]
+    pictures = ["nominal-errors", "nominal-histories", "perturbed-errors"]
+    pictures = [f"{CAR}-{picture}" for picture in pictures] + [f"predictive-{CAR}-pareto"]
+    assert written == [str(tmp_path / f"figure-{picture}.png") for picture in pictures]
     assert all(np.fromfile(path, dtype=np.uint8).size > 10_000 for path in written)
 
 

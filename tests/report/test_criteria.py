@@ -2,15 +2,13 @@
 
 from dataclasses import replace
 
+import claims
 import numpy as np
 import pytest
+from claims import ANGLE, CRITERIA, DISPLACEMENT, OF_SUBSPACES, VISIBLE
 
 from vehiclemor.inputs.suspension import sine_travel
-from vehiclemor.report import criteria
 from vehiclemor.report.comparison import at_published_start
-from vehiclemor.report.criteria import ANGLE, DISPLACEMENT, OF_SUBSPACES
-from vehiclemor.report.findings import CRITERIA, VISIBLE
-from vehiclemor.report.published import load_published
 
 
 @pytest.fixture(scope="module")
@@ -144,14 +142,14 @@ def test_a_criterion_fails_on_a_counterexample(judged, claim):
 def test_every_criterion_has_a_counterexample_and_a_claim():
     of_subspaces = {claim for claim, each in CRITERIA.items() if each.variants == OF_SUBSPACES}
     assert set(COUNTEREXAMPLES) | of_subspaces | OF_TIMES == set(CRITERIA)
-    assert set(CRITERIA) <= set(load_published().claims)
+    assert set(CRITERIA) <= set(claims.claims())
 
 
 def test_subspaces_are_compared_by_their_principal_angles(judged, monkeypatch):
     criterion = CRITERIA["dw_fig12_basis_insensitive_to_amplitude"]
     finding = criterion.judge(judged, "pod")
     assert 0.0 < finding.reproduced < np.pi / 2.0
-    monkeypatch.setattr(criteria, "SIMILAR_SUBSPACES", finding.reproduced / 2.0)
+    monkeypatch.setattr(claims, "SIMILAR_SUBSPACES", finding.reproduced / 2.0)
     assert not criterion.judge(judged, "pod").within
 
 
@@ -160,7 +158,7 @@ def test_energy_that_modes_hold_is_measured_in_their_subspaces(judged, monkeypat
     criterion = CRITERIA["dw_fig14_dropped_modes_excited"]
     finding = criterion.judge(judged, "pod")
     assert not finding.within
-    fitted = criteria.trained(1.0, 1.0)
+    fitted = claims.trained(1.0, 1.0)
     states = fitted.model.simulate(sine_travel.perturbed(frequency=2.0)).coordinates
     left_out = total = 0.0
     for basis, part in zip(fitted.bases, (states[:500], states[500:]), strict=True):
@@ -170,7 +168,7 @@ def test_energy_that_modes_hold_is_measured_in_their_subspaces(judged, monkeypat
     assert 1.0 - finding.reproduced == pytest.approx(left_out / total, rel=1e-6)
     # Directions in which nothing moves hold none of it.
     still = [replace(b, vectors=np.linalg.svd(b.vectors)[0][:, 4:]) for b in fitted.bases]
-    monkeypatch.setattr(criteria, "trained", lambda *_: replace(fitted, bases=tuple(still)))
+    monkeypatch.setattr(claims, "trained", lambda *_: replace(fitted, bases=tuple(still)))
     assert criterion.judge(judged, "pod").within
 
 

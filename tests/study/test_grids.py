@@ -1,16 +1,14 @@
 """Grids: places are complete, experiments are made once, parameters are axes."""
 
 import numpy as np
-import pytest
 
 import vehiclemor as vm
 from tests.models import CAR, WISHBONE
 from tests.study.small import small_study
-from vehiclemor.study.plans.grid import expand, sampled
+from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.loading import load_studies, read_study, write_study
 from vehiclemor.study.plans.results import flattened
 from vehiclemor.study.plans.study_file import GridFile
-from vehiclemor.study.plans.study_runs import Sampling
 from vehiclemor.study.run import run_studies
 
 
@@ -45,35 +43,6 @@ grid = { "parameters.sprung_mass" = [900.0, 1100.0], "parameters.initial_speed" 
         here = found.sel({"parameters.sprung_mass": mass, "label": "pod"}).squeeze()
         for name in ("rms_error", "floor_rms_error", "signal_range", "rms_speed_error"):
             np.testing.assert_array_equal(here[name], alone[name])
-
-
-def test_samples_are_a_dimension_with_the_sampled_values(tmp_path):
-    text = """
-keep = "metrics"
-[sampling]
-plan = "latin_hypercube"
-count = 5
-seed = 3
-ranges = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], amplitude_factor = [0.5, 1.0] }
-"""
-    found = vm.run_study(small_study(tmp_path, text, "full_order"), results=tmp_path)
-    assert found["status"].values.ravel().tolist() == ["ok"] * 5
-    at = found.isel(sample=4).squeeze()
-    car = vm.model(WISHBONE, {"tie_rod_inner.z": float(at["parameters.tie_rod_inner.z"])})
-    alone = vm.simulate(car, amplitude=float(at["amplitude_factor"]))
-    np.testing.assert_array_equal(at["signal_range"], alone["signal_range"])
-
-
-@pytest.mark.parametrize("plan", ["latin_hypercube", "sobol"])
-def test_a_plan_has_one_point_in_every_slice_of_every_range(plan):
-    ranges = {"parameters.a": [2.0, 4.0], "amplitude_factor": [0.0, 9.0]}
-    given = Sampling(plan=plan, count=64, seed=1, ranges=ranges)
-    for name, values in sampled(given).items():
-        low, high = ranges[name]
-        slices = np.floor(64 * (np.array(values) - low) / (high - low))
-        assert sorted(slices) == list(range(64))
-    assert sampled(given) == sampled(given)
-    assert sampled(given) != sampled(given.model_copy(update={"seed": 2}))
 
 
 def test_rows_of_different_models_keep_their_units_and_counts(tmp_path):

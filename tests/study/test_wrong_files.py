@@ -83,7 +83,6 @@ PROTOCOLS = {
     '"full_order"': [('"full_ordr"', "unknown method")],
 }
 MASSES = '{ "parameters.sprung_mass" = [1e3, 1e5] }'
-SAMPLES = f'{{ plan = "sobol", count = 2, seed = 1, ranges = {MASSES} }}'
 LARGE = """[grid]
 frequency_factor = { first = 0.7, last = 1.3, count = 600 }
 amplitude_factor = { first = 0.5, last = 0.9, count = 60 }
@@ -95,7 +94,6 @@ GRIDS = [
     (WISHBONE, LARGE, "GB"),
     (CAR, 'grid = { maneuver = ["lane_change", "step_steer"] }', "metrics"),
     (CAR, f"grid = {MASSES}", "sprung_mass = 100000"),
-    (CAR, f"sampling = {SAMPLES}", "sprung_mass = "),
 ]
 GRID = 'title = "for the tests"\nmodel = "{}"\n{}\n[[methods]]\nmethod = "full_order"\n'
 DRAWN = "frequency = [0.7, 2.0], amplitude = [0.5, 1.1]"

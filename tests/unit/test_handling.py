@@ -207,22 +207,6 @@ def test_reduced_vehicles_have_the_numbers_of_the_full_ones(name, prefix):
         assert float(value) == pytest.approx(float(full[number]), rel=1e-3), number
 
 
-def test_pictures_show_the_numbers_of_both_models():
-    model, rom = vm.model(CAR), vm.rom(CAR)
-    full, reduced = (each.simulate(vm.maneuver("sine_sweep")) for each in (model, rom))
-    panels = vm.plot(reduced, full, kind="frequency_response").axes
-    for line, run in zip(panels[0].lines, (full, reduced), strict=True):
-        np.testing.assert_allclose(line.get_ydata(), vm.metrics(run)["yaw_rate_gain"])
-    phase = np.degrees(vm.metrics(full)["lateral_acceleration_phase"])
-    np.testing.assert_allclose(panels[3].lines[0].get_ydata(), phase)
-    run = model.simulate(vm.maneuver("sine_with_dwell"))
-    lower = vm.plot(run, kind="sine_with_dwell").axes[1]
-    history, *marks = lower.lines
-    np.testing.assert_allclose(history.get_ydata(), run["yaw_rate"])
-    for mark, after in zip(marks, (1.0, 1.75), strict=True):
-        assert mark.get_xdata()[0] == pytest.approx(1.0 + 1.0 / 0.7 + 0.5 + after, abs=0.02)
-
-
 def test_what_has_no_numbers_is_refused():
     run = run_of(TIMES, 0.01 * ONES, "lane_change")
     refused(lambda: vm.metrics(run), "lane_change", "step_steer")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from vehiclemor import api
-from vehiclemor.cli.options import All, Json, ParameterFile, Parameters, key_values
+from vehiclemor.cli.options import All, Json
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import data_folder, data_names, write_whole
 from vehiclemor.registry import GROUPS, names
@@ -52,8 +52,6 @@ def list_components(
 def show(
     name: str,
     *,
-    parameter: Parameters = None,
-    parameter_file: ParameterFile = None,
     every: All = False,
     json_output: Json = False,
 ) -> None:
@@ -67,7 +65,7 @@ def show(
     every
         Print all rows of long tables of a model, not only the first ones.
     """
-    described = api.describe(name, key_values("--parameter", parameter), parameter_file)
+    described = api.describe(name)
     if json_output:
         print(json.dumps(described, indent=2))
         return

@@ -37,9 +37,6 @@ Parameters = Annotated[
         "one component as name.z=value. `vehiclemor show MODEL` has names, units and bounds.",
     ),
 ]
-ParameterFile = Annotated[
-    Path | None, Parameter(help="Parameter file; the model's public data by default.")
-]
 
 
 def strict(wanted: Any, tokens: Sequence[Token]) -> Any:

@@ -11,14 +11,12 @@ from vehiclemor.api import RESULTS
 from vehiclemor.cli.options import (
     FAILED,
     Json,
-    ParameterFile,
     Parameters,
     Results,
     Settings,
     Several,
     check_names,
     key_values,
-    new_file,
     picture_file,
     result_file,
 )
@@ -51,10 +49,8 @@ def simulate(
     preset: str = "recommended",
     training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = ("matched",),
     parameter: Parameters = None,
-    parameter_file: ParameterFile = None,
     out: Path | None = None,
     plot: Annotated[list[Path] | None, Several] = None,
-    animate: Path | None = None,
     all_outputs: bool = False,
 ) -> int:
     """Simulate a model with a method; errors are against the full-order solution.
@@ -86,8 +82,6 @@ def simulate(
         netCDF file for the result.
     plot
         Draw the result into this file, or into MODEL-METHOD.png here.
-    animate
-        GIF file for a film of the moving vehicle, reduced and full order together.
     all_outputs
         Print errors of every output, not only of those that tables show.
     """
@@ -96,11 +90,9 @@ def simulate(
     for key in inspect.signature(vm.simulate).parameters.keys() & chosen.keys():
         raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
     picture = _picture(plot, f"{model}-{method}.png")
-    if animate is not None:
-        new_file("--animate", animate, (".gif",))
     if out is not None:
         result_file("--out", out)
-    ready = vm.model(model, key_values("--parameter", parameter), parameter_file)
+    ready = vm.model(model, key_values("--parameter", parameter))
     how: dict[str, Any] = {"maneuver": _maneuver(maneuver, csv), "start": start, "preset": preset}
     how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
     dataset = vm.simulate(ready, method, **how, **chosen)
@@ -109,11 +101,11 @@ def simulate(
 
     shown = ready.outputs if all_outputs else tabled_outputs(ready.definition)
     print(simulation_text(dataset, shown, ready.counts))
-    _write(dataset, out, picture, animate)
+    _write(dataset, out, picture)
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
-def _write(dataset: Any, out: Path | None, picture: Path | None, film: Path | None) -> None:
+def _write(dataset: Any, out: Path | None, picture: Path | None) -> None:
     """Write a run to those files that are asked for, and say so."""
     if out is not None:
         from vehiclemor.netcdf_file import write_dataset
@@ -123,9 +115,7 @@ def _write(dataset: Any, out: Path | None, picture: Path | None, film: Path | No
     if picture is not None:
         vm.plot(dataset, out=picture)
         print(f"written: {picture}")
-    if film is not None:
-        print(f"written: {vm.animate(dataset, out=film)}")
-    if out is None and picture is None and film is None:
+    if out is None and picture is None:
         print("nothing is saved: --out FILE.nc saves the result, --plot draws it")
 
 
@@ -206,10 +196,9 @@ def plot(
     kind: Kind = "histories",
     select: Annotated[list[str] | None, Several] = None,
     out: Path | None = None,
-    animate: Path | None = None,
     results: Results = RESULTS,
 ) -> None:
-    """Draw a stored result: histories of the outputs, paths, or errors; or a film of it.
+    """Draw a stored result: histories of the outputs, paths, or errors.
 
     Parameters
     ----------
@@ -222,33 +211,17 @@ def plot(
         values are the first, errors are over all and methods all drawn.
     out
         Picture (PNG, SVG or PDF); RESULT-KIND.png here by default.
-    animate
-        GIF file for a film of the moving vehicle; with --out a picture too.
     """
-    if animate is not None:
-        new_file("--animate", animate, (".gif",))
-    picture = None
-    if out is not None or animate is None:
-        picture = picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
+    picture = picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
     from vehiclemor.report.figures.result_plot import plot_result
     from vehiclemor.report.result_selection import select_point, stored_result
 
     stored, chosen = stored_result(result, results), key_values("--select", select)
-    if picture is not None:
-        dataset, point = select_point(stored, kind, chosen)
-        plot_result(dataset, picture, kind)
-        _print_point(point)
-        print(f"written: {picture}")
-    if animate is not None:
-        dataset, point = select_point(stored, "histories", chosen)
-        film = vm.animate(dataset, out=animate)
-        _print_point(point)
-        print(f"written: {film}")
-
-
-def _print_point(point: str) -> None:
+    dataset, point = select_point(stored, kind, chosen)
+    plot_result(dataset, picture, kind)
     if point:
         print(wrapped(f"at {point}; --select dimension=value draws another point", 0, 2))
+    print(f"written: {picture}")
 
 
 def export(
@@ -274,7 +247,7 @@ def export(
         Registered name, or file of a reduced model.
     to
         c: a folder with C99 sources; fmu: a functional mock-up unit by FMI 2.0; casadi: a function
-        that CasADi loads.
+        that CasADi loads.  For jax and rollouts see vm.export in Python.
     method
         Reduce the model by this method first, of which --set may give preset and training (nominal,
         protocol) too; shipped: the reduced model that ships with the package.  The full model by

@@ -115,7 +115,7 @@ def compare(
         that they have not seen), the name of a model (every method that fits it), or a study,
         collection or protocol by its name or TOML file.
     every
-        Of the comparison with the paper: print every claim with its reason, and the costs.
+        Of the comparison with the paper: print the costs too.
     check
         Exit with status 1 if a bound of the paper or a target of a protocol is missed.
     """
@@ -134,8 +134,6 @@ def figures(
     out: Path | None = None,
     results: Results = RESULTS,
     jobs: Jobs = 1,
-    style: str = "",
-    dpi: int | None = None,
 ) -> int:
     """Draw the figures of any study; studies that are missing are run first.
 
@@ -143,21 +141,16 @@ def figures(
     ----------
     only
         One or several: a study, collection or protocol by name or TOML file, of which is drawn
-        what its dimensions ask for; or histories-, errors-, map- or pareto- and the name of a
-        model.  The studies of the paper by default.
+        what its dimensions ask for.  The studies of the paper by default.
     out
         Folder of the figures; by default `figures` in the results folder.
-    style
-        Name or file of a Matplotlib style on top of the package's.
-    dpi
-        Dots an inch of PNG files; 200 by default.
     """
     if only is not None and not only:
         raise InputError("--only names no figure")
     check_names("--only", only or ())
     failed: dict[str, str] = {}
     with shown_progress():
-        written = vm.figures(only or (), out, results, jobs, style=style, dpi=dpi, failed=failed)
+        written = vm.figures(only or (), out, results, jobs, failed=failed)
     for path in written:
         print(path)
     for name, why in failed.items():

@@ -1,1 +1,1 @@
-"""Models for other tools: C, functional mock-up units (FMU), CasADi, JAX, SymPy."""
+"""Models for other tools: C, functional mock-up units (FMU), CasADi, JAX."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # What a file, or a folder, is written for; the others are objects alone.
 FileTarget = Literal["c", "fmu", "casadi"]
-Target = Literal[FileTarget, "jax", "sympy", "rollouts"]
+Target = Literal[FileTarget, "jax", "rollouts"]
 TARGETS: tuple[str, ...] = Target.__args__
 Integrator = Literal["rk4", "ros2"]
 Precision = Literal["double", "single"]
@@ -66,12 +66,12 @@ def export(
         `c`: a folder with C99 sources.  `fmu`: a functional mock-up unit by FMI 2.0 for model
         exchange and co-simulation, with sources, and a binary for this platform where there is a C
         compiler.  `casadi`: a `Function` (x, u, p) -> (dx, y), where p of a full model is its
-        `parameter_values`.  `jax`: a function (x, u, p) -> (dx, y).  `sympy`: expressions.
+        `parameter_values`.  `jax`: a function (x, u, p) -> (dx, y).
         `rollouts`: a function (states, inputs, period) -> outputs of many runs at once, `Rollouts`.
     out
         File or folder to write.  Without it C and FMU go under the model's name into the working
         folder; of the others the object is returned.  With it CasADi writes its file for
-        `Function.load`; for JAX and SymPy there is no file.
+        `Function.load`; for JAX there is no file.
     overwrite
         Whether an export that is there is replaced.
     step
@@ -90,7 +90,7 @@ def export(
 
     Returns
     -------
-    pathlib.Path, or casadi.Function, callable, Expressions, Rollouts
+    pathlib.Path, or casadi.Function, callable, Rollouts
         What was written, or the object.
 
     Raises
@@ -114,7 +114,7 @@ def export(
     path: Any = None
     if out is not None or to in FILES:
         path = destination(system.name, to, out, overwrite)
-    if len(system.table) and to in ("casadi", "sympy"):
+    if len(system.table) and to == "casadi":
         raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
     settings = CSettings(step, integrator, precision)
     return _exported(system, to, path, settings)

@@ -22,7 +22,6 @@ from vehiclemor.codegen.operations import (
     Value,
     needed,
     padded,
-    uses,
 )
 
 # Functions of a system.
@@ -176,15 +175,14 @@ def evaluated(
     function: StraightLine,
     arrays: Mapping[str, Any],
     functions: Mapping[str, Callable[..., Any]],
-    let: Callable[[Any], Any] | None = None,
 ) -> list[Any]:
     """Results of a function over values of another system: symbols, or arrays of a batch.
 
     Arrays have the values of their entries; functions are those of `FUNCTIONS`, `select` and, of a
-    table, `entry`; `let` gives what stands for a value that is used more than once.
+    table, `entry`.
     """
     computed = OPERATORS | dict(functions)
-    counts, known = uses(function.operations), {}
+    known = {}
     for number in function.needed:
         kind, arguments, detail = function.operations[number]
         values = [known[n] for n in arguments]
@@ -196,7 +194,5 @@ def evaluated(
             value = functions["entry"](*values, detail)
         else:
             value = computed[kind](*values)
-            if let and counts[number] > 1:
-                value = let(value)
         known[number] = value
     return [known[number] for number in function.results]

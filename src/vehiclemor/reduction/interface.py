@@ -158,9 +158,6 @@ class Method(ShortRepr):
     band
         Name of the setting up to whose frequency in Hz a structure's inputs are known, of a method
         that reads nothing.
-    follows_time
-        Whether what it fits belongs to the times of the training runs, as a basis for each control
-        period does: then a run is known where its inputs are those of a training run.
     variant_of
         Name of the method with the same `fit`, if this one differs from it in defaults alone.
     check
@@ -185,7 +182,6 @@ class Method(ShortRepr):
     learns_from: Literal["runs", "inputs", "nothing"] = "runs"
     own_limits: bool = False
     band: str = ""
-    follows_time: bool = False
     variant_of: str = ""
     presets: Mapping[str, Presets] = field(default_factory=dict)
     packages: tuple[str, ...] = ()

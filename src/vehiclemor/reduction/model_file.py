@@ -34,7 +34,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 
 # Of the layout of these files.
-SCHEMA = 7
+SCHEMA = 8
 # Texts beside the arrays.
 TEXTS = ("parts", "settings", "training", "parameters")
 # Parts of a reduced model and their types.

@@ -1,6 +1,6 @@
 """What the settings of all methods share: one pydantic class by method and kind of model."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -22,8 +22,6 @@ class Settings(BaseModel):
     """Settings of a method: a subclass declares each with its type, default, bounds and meaning."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-    # Former name of a setting -> its name.
-    renamed: ClassVar[Mapping[str, str]] = {}
     # Settings that `fit` only hands on: the reduced model, a dataclass, has fields of these names.
     integration: ClassVar[tuple[str, ...]] = ()
 

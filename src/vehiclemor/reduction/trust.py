@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vehiclemor.arguments import check_shapes, require
+from vehiclemor.arguments import check_shapes
 from vehiclemor.inputs.checks import completed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.simulation.model import Model
@@ -35,9 +35,6 @@ EDGE = 1.0 + 1e-6
 NOTHING = 1e-12
 # Least part of the speed by which a run may start faster or slower.
 SPEED_SLACK = 0.01
-# Part of the largest input by which one may differ from that of a training run at the same time,
-# where the model follows the times of its training.
-CLOSE = 0.01
 
 
 def trust_of(times: np.ndarray, used: np.ndarray, names: Sequence[str]) -> Trust:
@@ -118,17 +115,10 @@ class InputRange:
     reach: float
     # Duration of the longest run in s; any is known of a model without memory.
     longest: float
-    # Inputs of the training runs (runs, samples, inputs) at equidistant times of the first, where
-    # the model follows the times of its training; else none.
-    histories: np.ndarray | None = None
 
     def check_sizes(self) -> None:
-        """Raise `ValueError` if the magnitudes or the histories are no tables of floats."""
+        """Raise `ValueError` if the magnitudes are no table of floats."""
         check_shapes("largest", (self.largest, len(self.largest), *self.largest.shape[1:2]))
-        if self.histories is not None:
-            runs_and_samples = self.histories.shape[:2]
-            require(min(runs_and_samples) > 0, "histories")
-            check_shapes("histories", (self.histories, *runs_and_samples, self.largest.shape[1]))
 
     @property
     def _sizes(self) -> np.ndarray:
@@ -148,8 +138,6 @@ class InputRange:
             ranges["initial speed"] = off, 0.0 if off > 1.0 else np.inf
         lasts = maneuver.duration / self.longest
         ranges["duration"] = lasts, self.longest if lasts > 1.0 else np.inf
-        if self.histories is not None:
-            ranges["history of the inputs"] = self._unlike(maneuver)
         return trust_in(ranges)
 
     def _bands(self, names: Sequence[str], maneuver: Excitation) -> dict[str, tuple[float, float]]:
@@ -158,20 +146,6 @@ class InputRange:
         words = ["", *(f", {low:g} to {high:g} Hz" for low, high in pairwise(BANDS))]
         labels = [f"input {name}{word}" for name in names for word in words]
         return ranges_of(np.zeros(1), used.T.reshape(1, -1), labels)
-
-    def _unlike(self, maneuver: Excitation) -> tuple[float, float]:
-        """How far inputs are from those of the nearest training run, and since when (s)."""
-        assert self.histories is not None
-        times, inputs = maneuver.recorded_inputs
-        count = int(np.searchsorted(times, self.longest, side="right"))
-        times, inputs, off = times[:count], inputs[:count], []
-        known = np.linspace(0.0, self.longest / EDGE, self.histories.shape[1])
-        for history in self.histories:
-            then = [np.interp(times, known, column) for column in history.T]
-            off.append(np.abs((inputs - np.transpose(then)) / self._sizes[0]).max(axis=1) / CLOSE)
-        nearest = min(off, key=np.max)
-        beyond = np.flatnonzero(nearest > 1.0)
-        return float(nearest.max()), float(times[beyond[0]]) if len(beyond) else np.inf
 
     def trust_of_inputs(self, names: Sequence[str], inputs: np.ndarray) -> Trust:
         """How far inputs (samples, inputs) go in the range, each for itself."""
@@ -184,26 +158,17 @@ class InputRange:
         return ranges_of(times, inputs / self._sizes[0], [f"input {name}" for name in names])
 
 
-def input_range(
-    model: Model, runs: Sequence[tuple[Excitation, float]], follows_time: bool = False
-) -> InputRange:
-    """Range of some training runs, each a maneuver and an initial speed in m/s.
-
-    Of `follows_time` see `Method`.
-    """
+def input_range(model: Model, runs: Sequence[tuple[Excitation, float]]) -> InputRange:
+    """Range of some training runs, each a maneuver and an initial speed in m/s."""
     maneuvers = [completed(maneuver, model.definition) for maneuver, _ in runs]
     speeds = [speed for _, speed in runs]
     low, high = min(speeds), max(speeds)
     middle = 0.5 * (low + high)
     reach = EDGE * (max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0)
     longest = max(maneuver.duration for maneuver in maneuvers)
-    histories = None
-    if follows_time:
-        times = np.linspace(0.0, longest, maneuvers[0].samples)
-        histories = np.array([maneuver.at(times) for maneuver in maneuvers])
     largest_of = largest_bands if model.kind == "structural" else largest_samples
-    lasts = np.inf if model.kind == "ae" and not follows_time else EDGE * longest
-    return InputRange(largest_of(maneuvers), middle, reach, lasts, histories)
+    lasts = np.inf if model.kind == "ae" else EDGE * longest
+    return InputRange(largest_of(maneuvers), middle, reach, lasts)
 
 
 def band_range(model: Model, highest: float) -> InputRange:

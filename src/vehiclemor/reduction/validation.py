@@ -37,7 +37,6 @@ def validated(
     presets = method.presets_of(kind)
     choice(f"preset of {method.name}", preset, presets)
     declared = method.settings.get(kind, Settings)
-    given = {declared.renamed.get(name, name): value for name, value in given.items()}
     for name in given:
         choice(f"setting of {method.name}", name, declared.model_fields)
     chosen: dict[str, Any] = dict(presets[preset])
@@ -46,7 +45,7 @@ def validated(
             if coordinates is not None and AT_MOST_COORDINATES in field.metadata:
                 chosen[name] = min(chosen.get(name, field.default), coordinates)
         try:
-            return declared.model_validate(chosen | given)
+            return declared.model_validate(chosen | dict(given))
         except ValidationError as error:
             first = error.errors()[0]
             name = first["loc"][0] if first["loc"] else "settings"

@@ -1,7 +1,6 @@
 """Comparisons: with the paper, of every model, of any study; costs, and handling tests."""
 
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,6 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-import vehiclemor.report.criteria  # noqa: F401 - fills CRITERIA
 from vehiclemor.arguments import count, file_path
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import data_names
@@ -18,29 +16,20 @@ from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction.reduced_model import ReducedOrderModel
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.findings import CRITERIA, Criterion, Finding, Results, judged
 from vehiclemor.report.frames import frame, grid_rows
 from vehiclemor.report.labels import of_kind, timing_cases
-from vehiclemor.report.printed_numbers import (
-    TIMING,
-    number_criterion,
-    printed_errors_and_savings,
-)
-from vehiclemor.report.published import Claim, Number, load_published
+from vehiclemor.report.printed_numbers import TIMING, number_rows, printed_errors_and_savings
 from vehiclemor.report.result_selection import result_kind
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.experiment import complete_settings, make_experiment
-from vehiclemor.study.plans.loading import is_study, load_studies
+from vehiclemor.study.plans.loading import is_study
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
-from vehiclemor.study.store import combined_path
 from vehiclemor.study.timing import timed_starts
 
 PAPER = "paper"
-ALL_MODELS = "all three models"
-NOTHING_MEASURED = "an explanation or a judgement; the paper prints nothing that could be measured"
 # The paper says nothing of another start.
 PUBLISHED_START = "equilibrium"
 # Hz: frequencies of a response that are printed.
@@ -73,11 +62,11 @@ def compare(
     Returns
     -------
     pandas.DataFrame
-        Of `paper` a row for each published number or claim and variant of the method (`default`,
-        `literal`: the paper's words, or what differs from them): its id, model, item, the published
-        number, a `verdict` (`met`, `missed`, `not_comparable`), the columns of `findings.Finding`,
-        and `replay`, the same number of the training-trajectory baseline.  The others are described
-        at `model_comparison` and `study_comparison` in `vehiclemor.report.comparison`.
+        Of `paper` a row for each published number and variant of the method (`default`, `literal`:
+        the paper's words): its id, model, item, the published number, a `verdict` (`met`, `missed`,
+        `not_comparable`), the columns of `printed_numbers.Finding`, and `replay`, the same number
+        of the training-trajectory baseline.  The others are described at `model_comparison` and
+        `study_comparison` in `vehiclemor.report.comparison`.
     """
     what, folder = str(file_path("what", what)), file_path("results", results)
     jobs = count("jobs", jobs)
@@ -94,36 +83,12 @@ def compare(
 
 
 def paper_comparison(folder: Path, jobs: int = 1) -> pd.DataFrame:
-    """Every number and claim of the paper, by model, with verdict and reason; see `compare`."""
+    """Every number of the paper, by model, with verdict and reason; see `compare`."""
     results = dict(run_studies(PAPER, folder, jobs))
     results |= {timing: timing_of(model, folder) for model, timing in TIMING.items()}
-    models = [*dict.fromkeys(number.model for number in printed_errors_and_savings()), ALL_MODELS]
-    return pd.DataFrame(sorted(published_rows(results), key=lambda row: models.index(row["model"])))
-
-
-def published_rows(results: Results) -> Iterator[Row]:
-    """Numbers, then claims of the paper, by the results of its studies and timings by name."""
     results = {name: at_published_start(dataset) for name, dataset in results.items()}
-    for number in printed_errors_and_savings():
-        yield from rows_of(number, number_criterion(number), results)
-    for claim in load_published().claim:
-        yield from rows_of(claim, claim_criterion(claim), results)
-
-
-def stored_rows(results: Path) -> Iterator[Row]:
-    """As `published_rows`, of what a results folder holds; nothing is checked or computed."""
-    known = (*load_studies(PAPER), *TIMING.values())
-    yield from published_rows(
-        {name: xr.load_dataset(combined_path(results, name)) for name in known}
-    )
-
-
-def claim_criterion(claim: Claim) -> Criterion:
-    """The criterion of a claim; without one nothing is measured."""
-    if claim.id in CRITERIA:
-        return CRITERIA[claim.id]
-    finding = Finding(math.nan, math.nan, None, "", NOTHING_MEASURED, "", "-")
-    return Criterion(lambda *_: finding, variants={"": ""}, applies_to_replay=False)
+    models = [*dict.fromkeys(number.model for number in printed_errors_and_savings())]
+    return pd.DataFrame(sorted(number_rows(results), key=lambda row: models.index(row["model"])))
 
 
 def at_published_start(dataset: xr.Dataset) -> xr.Dataset:
@@ -131,26 +96,6 @@ def at_published_start(dataset: xr.Dataset) -> xr.Dataset:
     if PUBLISHED_START in dataset.indexes.get("start", ()):
         return dataset.sel(start=PUBLISHED_START)
     return dataset
-
-
-def rows_of(entry: Number | Claim, criterion: Criterion, results: Results) -> Iterator[Row]:
-    """A row for each variant of the method."""
-    published = replay = math.nan
-    if isinstance(entry, Number):
-        item, published = entry.item, entry.value
-        if entry.figure:
-            item = f"{item} (figure {entry.figure})"
-    else:
-        item = entry.statement
-        if entry.figure:
-            item = f"figure {entry.figure}: {item}"
-    head = {"id": entry.id, "model": entry.model or ALL_MODELS, "item": item}
-    if criterion.applies_to_replay:
-        replay = criterion.judge(results, "replay").reproduced
-    for label, variant in criterion.variants.items():
-        finding = criterion.judge(results, label)
-        outcome = {"variant": variant, "verdict": judged(finding.within), "replay": replay}
-        yield head | {"published": published} | outcome | finding._asdict()
 
 
 def model_comparison(name: str, folder: Path, jobs: int = 1) -> pd.DataFrame:
@@ -216,17 +161,13 @@ def cost_table(model: str, folder: Path) -> pd.DataFrame:
     counts = of_kind(component("model", model).kind).counts
     derived = {
         "us_per_run": 1e6 * seconds,
-        "ns_per_sample": 1e9 * runs["seconds_per_sample"],
         "quartile_spread": (spread / seconds).where(seconds > 0.0, 0.0),
-        "loop_us": 1e6 * runs["loop_seconds"],
         "offline_us": 1e6 * offline,
         "break_even": break_even(runs, "speed_up"),
         "break_even_strongest": break_even(runs, "speed_up_strongest"),
     }
-    speed_ups = ["speed_up", "speed_up_strongest"]
-    columns = ["start", "case", "label", "status", "rank", "us_per_run", "ns_per_sample", *counts]
-    columns += ["tolerance", "quartile_spread", *speed_ups]
-    columns += ["loop_us", *(f"loop_{name}" for name in speed_ups)]
+    columns = ["start", "case", "label", "status", "rank", "us_per_run", *counts]
+    columns += ["tolerance", "quartile_spread", "speed_up", "speed_up_strongest"]
     columns += [*(renamed[name] for name in errors)]
     columns += ["offline_us", "break_even", "break_even_strongest"]
     return runs.assign(**derived).rename(columns=renamed)[columns]

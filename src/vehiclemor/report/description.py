@@ -1,31 +1,21 @@
 """What a name stands for: model, method, maneuver, study, or the schema of a file."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
 from vehiclemor.files import data_names
 from vehiclemor.inputs.excitation import FACTORS
-from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition, with_overrides
+from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path
 from vehiclemor.reduction.interface import never_refused
 from vehiclemor.reduction.model_file import training_of
 from vehiclemor.reduction.reduced_model import shipped_folder
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.simulation.build import build_derived
-from vehiclemor.study.plans.loading import is_study, load_studies, read_study, study_path
-from vehiclemor.study.plans.logs import Log
-from vehiclemor.study.plans.study_file import (
-    SETS,
-    CollectionFile,
-    GridFile,
-    ProtocolEntry,
-    ProtocolFile,
-    StudyFile,
-)
-from vehiclemor.study.plans.study_runs import values
+from vehiclemor.study.plans.loading import is_study, load_studies, study_path
+from vehiclemor.study.plans.study_file import CollectionFile, GridFile, ProtocolFile
 from vehiclemor.toml_files import read_toml
 
 Description = dict[str, Any]
@@ -55,17 +45,12 @@ QUANTITIES = (
     "constraints",
     "ports",
 )
-# Values of an axis that are printed.
-SHOWN = 40
 
 
-def description(
-    name: str, parameters: Mapping[str, object] | None = None, parameter_file: Path | None = None
-) -> Description:
+def description(name: str) -> Description:
     """What a name stands for; lists of dictionaries are the rows of tables."""
-    if name in names("model"):
-        return _model(name, parameters, parameter_file)
     known = {
+        **dict.fromkeys(names("model"), _model),
         **dict.fromkeys(names("method"), _method),
         **dict.fromkeys(names("maneuver"), _maneuver),
         **dict.fromkeys(data_names("studies"), _study),
@@ -74,18 +59,15 @@ def description(
     known |= {name: _maneuver} if name.partition(":")[0] in names("maneuver") else {}
     describe = _study if is_study(name) else known.get(name)
     if describe is None:
-        raise unknown("name", name, {*known, *names("model")})
+        raise unknown("name", name, known)
     return describe(name)
 
 
-def _model(
-    name: str, overrides: Mapping[str, object] | None, parameter_file: Path | None
-) -> Description:
+def _model(name: str) -> Description:
     """Kind, parameters, starts, inputs, outputs and states of a model, and what reduces it."""
-    overrides = {} if overrides is None else overrides
-    definition: ModelDefinition = with_overrides(component("model", name), overrides)
-    path = parameter_file or definition.parameter_file or parameter_path(name)
-    parameters = load_parameters(name, definition.parameters, path, overrides)
+    definition: ModelDefinition = component("model", name)
+    path = definition.parameter_file or parameter_path(name)
+    parameters = load_parameters(name, definition.parameters, path)
     accepted = {method: _accepts(method, definition)[0] for method in names("method")}
     # Initial conditions, as far as they are known without deriving the model.
     if model := build_derived(name):
@@ -195,70 +177,13 @@ def _maneuver(name: str) -> Description:
 
 
 def _study(name: str) -> Description:
-    """Grid and methods of a study, its members if it is a collection, or its sets of runs."""
+    """File, title and number of runs of a study, or of the members of a collection."""
     path = study_path(name)
-    study = read_study(path)
-    head: Description = {"study": path.stem, "summary": study.title, "file": str(path)}
-    if isinstance(study, CollectionFile):
-        rows = [
-            {"study": member, "runs": content.points, "summary": content.title}
-            for member, content in load_studies(name).items()
-        ]
-        return {**head, "runs": sum(row["runs"] for row in rows), "studies": rows}
-    runs = _grid(study) if isinstance(study, GridFile) else _sets(study)
-    return {**head, "model": study.model, **runs, "methods": _methods(study)}
-
-
-def _methods(study: StudyFile) -> list[Description]:
-    """A row for each method of a study."""
-    rows: list[Description] = []
-    for entry in study.methods:
-        row: Description = {"label": entry.name, "method": entry.method, "preset": entry.preset}
-        row["settings"] = _listed(entry.settings)
-        if isinstance(entry, ProtocolEntry):
-            row |= {"role": entry.role, "candidates": len(entry.candidates)}
-        rows.append(row)
-    return rows
-
-
-def _grid(study: GridFile) -> Description:
-    """What a study varies; of a long axis both ends."""
-    grid = []
-    for key, entry in study.grid.items():
-        axis = [str(value) for value in values(entry)]
-        ends = f"{axis[0]}, {axis[1]}, ..., {axis[-1]} ({len(axis)} values)" if axis[1:] else ""
-        grid.append({"dimension": key, "values": ends if len(axis) > SHOWN else ", ".join(axis)})
-    if plan := study.sampling:
-        how = f"{plan.plan}, {plan.count} points, seed {plan.seed}"
-        for key, (low, high) in plan.ranges.items():
-            grid.append({"dimension": key, "values": f"{low} to {high} ({how})"})
-    return {
-        "maneuver": study.maneuver or component("model", study.model).maneuver,
-        "starts": study.start or ["the model's first"],
-        "training": study.trained_on,
-        "parameters": _listed(study.parameters),
-        "logs": [log.log for log in study.logs],
-        "grid points": study.points,
-        "keeps": study.keep,
-        "grid": grid,
-    }
-
-
-def _sets(study: ProtocolFile) -> Description:
-    """What a study with bounds trains, chooses by and tests; scenarios are counted."""
-    counted = {s: sum(g.scenarios for g in getattr(study, s)) for s in SETS}
-    logs = [part.log for s in SETS for part in getattr(study, s) if isinstance(part, Log)]
-    counted |= {name.replace("_", " "): draw.runs for name, draw in study.draws.items()}
-    return {
-        "runs": [f"{count} {purpose}" for purpose, count in counted.items() if count],
-        "logs": [*dict.fromkeys(logs)],
-        "seed": study.seed,
-        "version": study.version,
-        "bounds": [
-            {"output": output, "measure": b.measure, "bound": b.bound, "reason": b.reason}
-            for output, b in study.bounds.items()
-        ],
-    }
+    rows = [
+        {"study": member, "runs": study.points, "summary": study.title}
+        for member, study in load_studies(name).items()
+    ]
+    return {"study": path.stem, "file": str(path), "studies": rows}
 
 
 def schema_description(name: str) -> Description:

@@ -165,7 +165,7 @@ def _errors(ended: Any, output: str, varied: list[str]) -> dict[str, Any]:
 
 
 def _grid_text(dataset: xr.Dataset) -> str:
-    """The grid's dimensions with their values, and the ranges of a sample."""
+    """The grid's dimensions with their values."""
     parts: list[str] = []
     for name in map(str, dataset["status"].dims):
         if name in ("label", "start"):
@@ -175,9 +175,6 @@ def _grid_text(dataset: xr.Dataset) -> str:
             parts.append(f"{name} {values[0]} to {values[-1]} ({len(values)})")
         elif values != ["1"]:
             parts.append(f"{name} {', '.join(values)}")
-    for name, values in dataset.coords.items():
-        if values.dims == ("sample",) and name != "sample":
-            parts.append(f"{name} {float(values.min()):.4g} to {float(values.max()):.4g}")
     return "; ".join(parts)
 
 

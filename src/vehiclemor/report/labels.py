@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # What is drawn of a run, or of a point of a grid.
-Kind = Literal["histories", "paths", "errors", "frequency_response", "sine_with_dwell"]
+Kind = Literal["histories", "paths", "errors"]
 # What results are converted to.
 Format = Literal["zarr", "parquet", "csv"]
 # What is said of a run that was in its own training, and the mark of it in a legend.

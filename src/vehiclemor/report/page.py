@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pandas as pd
 import xarray as xr
@@ -20,13 +20,11 @@ from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
 from vehiclemor.report.comparison import paper_comparison, result_rows
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.figures.result_plot import PICTURES, pictures_of, plot_result, shown_outputs
+from vehiclemor.report.figures.result_plot import PICTURES, pictures_of, plot_result
 from vehiclemor.report.figures.theme import METADATA, styled
-from vehiclemor.report.frames import counted_ends, frame
-from vehiclemor.report.labels import TRAINED, Column, trained_runs, unit_of
-from vehiclemor.report.printing import Table
+from vehiclemor.report.frames import counted_ends
 from vehiclemor.report.result_selection import KINDS, select_point
-from vehiclemor.report.screens import Part, claim_parts, paper_parts, study_parts
+from vehiclemor.report.screens import Part, paper_parts, study_parts
 from vehiclemor.study.plans.loading import refuse_doubles
 from vehiclemor.study.run import run_studies
 
@@ -35,9 +33,6 @@ BEGINNING = b"""<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta name="generator" content="vehiclemor">"""
-# More runs of a study are not listed.
-MOST_ROWS = 200
-COUNTS = ("effective_rank", "rhs_calls", "iterations", "steps")
 
 
 class Section(NamedTuple):
@@ -152,8 +147,7 @@ def _page(sections: Sequence[Section], left_out: Mapping[str, str]) -> str:
 
 def _paper(folder: Path, jobs: int) -> Section:
     """Verdicts on what the paper prints."""
-    rows = paper_comparison(folder, jobs)
-    parts = paper_parts(rows) + claim_parts(rows)
+    parts = paper_parts(paper_comparison(folder, jobs))
     return Section("published", "Published beside reproduced", parts)
 
 
@@ -164,10 +158,6 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
     kinds = pictures_of(dataset)
     if "errors" in kinds:
         parts.append(f"Study of {dataset.attrs['model']}: {counted_ends(dataset)}.")
-        runs = error_table(dataset)
-        shown = {column: Column(str(column).replace("_", " "), ".3g") for column in runs}
-        few = len(runs) <= MOST_ROWS
-        parts.append(Table(runs, shown, "Every run") if few else f"{len(runs)} runs: see convert")
     for kind in kinds:
         caption, draw = PICTURES[kind]
         if kind not in KINDS:
@@ -182,26 +172,6 @@ def _section(name: str, dataset: xr.Dataset, left_out: dict[str, str]) -> Sectio
         drawn += attempt_apart(f"{caption}, {name}", left_out, partial(_svg, caption, draw))
     parts = study_parts(pd.DataFrame(result_rows(dataset))) + parts
     return Section(name, str(dataset.attrs["title"]), parts, drawn, dataset.attrs)
-
-
-def error_table(dataset: xr.Dataset) -> pd.DataFrame:
-    """Errors of every run of a study, with its status and file."""
-    units = {output: unit_of(dataset, output) for output in shown_outputs(dataset)}
-    heads = {f"rms_error.{o}": f"RMS error of {o} ({unit})" for o, unit in units.items()}
-    runs: Any = frame(dataset.assign(trained=trained_runs(dataset))).rename(columns=heads)
-    # Points of the grid that a method does not depend on are one run.
-    runs = runs.drop_duplicates(["label", "cell_key"])
-    said = runs["message"] + runs["remark"].where(runs["warned"] & (runs["status"] == "ok"), "")
-    marks = runs["trained"].map({True: f" ({TRAINED})", False: ""})
-    status = runs["status"] + marks + said.map(lambda text: f": {text}" if text else "")
-    axes = [str(d) for d in dataset["status"].dims if d != "label" and dataset.sizes[d] > 1]
-    axes += [n for n, c in dataset.coords.items() if c.dims == ("sample",) and n not in axes]
-    for axis in axes:
-        fixed = runs.groupby("label")[axis].transform("nunique") == 1
-        runs[axis] = runs[axis].astype(object).mask(fixed, "")
-    counts = [name for name in COUNTS if name in runs]
-    shown = runs[["label", *axes, *heads.values(), *counts]]
-    return shown.assign(status=status, cell=runs["cell_key"])
 
 
 def _svg(caption: str, draw: Callable[[], Figure]) -> tuple[str, str]:

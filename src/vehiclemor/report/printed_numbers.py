@@ -1,24 +1,15 @@
-"""The paper's printed errors and savings of time as criteria, and the claims that rest on them."""
+"""The paper's printed errors and savings of time beside ours, with verdicts."""
 
-from functools import partial
-from typing import get_args
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import xarray as xr
 
 from vehiclemor.registry import component
 from vehiclemor.report.default_studies import of_paper
-from vehiclemor.report.findings import (
-    IN_WORDS,
-    PRINTED,
-    VARIANTS,
-    Criterion,
-    Finding,
-    Results,
-    at_point,
-    criterion,
-    scatter,
-)
+from vehiclemor.report.findings import at_point, judged, scatter
 from vehiclemor.report.labels import timing_cases
 from vehiclemor.report.published import Model, Number, load_published, rms_numbers
 
@@ -26,24 +17,56 @@ NOMINAL_ERROR = "nominal-only: trained on the run that it is tested on, where re
 SAVED = "share of the time of {} that is saved; the paper names neither its {} nor its machine"
 OF_INTEGRATION = SAVED.format("the same integrator's full run at equal tolerance", "integrator")
 OF_ITERATION = SAVED.format("Newton with fresh Jacobians and generated elimination", "solver")
+# Label of a method in the paper's studies -> what its rows are called, preset.
+VARIANTS = {"pod": "default", "pod_literal": "literal"}
 PRESETS = {"pod": "recommended", "pod_literal": "literal"}
 # Of the timing of a model, beside those of studies.
 TIMING = {model: f"timing-{model}" for model in get_args(Model)}
+# Studies and timings by name.
+Results = Mapping[str, xr.Dataset]
+
+
+class Finding(NamedTuple):
+    """A number that stands beside a printed one, which is its bound, and whether it is met.
+
+    That is None if it can't be judged.  `measure` says what the number is, `reason` what else was
+    seen.  An error has beside it that of the best approximation in the subspaces (`floor`) and the
+    RMS of the signal (a bound above that is empty: zero would meet it); a time the time over that
+    of the `strongest` full-order solver.
+    """
+
+    reproduced: float
+    bound: float
+    within: bool | None
+    measure: str
+    reason: str
+    unit: str
+    floor: float = math.nan
+    signal_rms: float = math.nan
+    strongest: float = math.nan
 
 
 def printed_errors_and_savings() -> list[Number]:
     """Printed errors, then savings of time."""
     numbers = load_published().numbers.values()
-    judged = [n for n in numbers if n.kind in ("rms_error", "time_reduction")]
-    return sorted(judged, key=lambda number: number.kind)
+    compared = [n for n in numbers if n.kind in ("rms_error", "time_reduction")]
+    return sorted(compared, key=lambda number: number.kind)
 
 
-def number_criterion(number: Number) -> Criterion:
-    """The criterion that a printed number is."""
-    if number.kind == "rms_error":
-        return Criterion(partial(judge_rms_error, number), VARIANTS)
-    timed = {label: variant for label, variant in VARIANTS.items() if case_of(number, label)}
-    return Criterion(partial(time_saved, number), timed, applies_to_replay=False)
+def number_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """A row for each printed number and variant of the method."""
+    for number in printed_errors_and_savings():
+        item = f"{number.item} (figure {number.figure})" if number.figure else number.item
+        head = {"id": number.id, "model": number.model, "item": item, "published": number.value}
+        is_error = number.kind == "rms_error"
+        replay = judge_rms_error(number, results, "replay").reproduced if is_error else math.nan
+        for label, variant in VARIANTS.items():
+            if not is_error and not case_of(number, label):
+                continue
+            judge = judge_rms_error if is_error else time_saved
+            finding = judge(number, results, label)
+            outcome = {"variant": variant, "verdict": judged(finding.within), "replay": replay}
+            yield head | outcome | finding._asdict()
 
 
 def judge_rms_error(number: Number, results: Results, label: str) -> Finding:
@@ -64,7 +87,6 @@ def judge_rms_error(number: Number, results: Results, label: str) -> Finding:
         status == "ok" and reproduced <= number.value,
         NOMINAL_ERROR,
         failed + counts,
-        PRINTED,
         number.unit,
         floor=float(point["floor_rms_error"]),
         signal_rms=float(np.sqrt(np.mean(signal**2))),
@@ -90,7 +112,7 @@ def time_saved(number: Number, results: Results, label: str) -> Finding:
         f"{strongest:.2f} times that of the best full-order solver"
     )
     wrong = _missed_errors(number.model, run)
-    scattered = "" if wrong else _scatter(timing, case, "baseline")
+    scattered = "" if wrong else timing_scatter(timing, case, "baseline")
     beside = beside if run["status"].item() == "ok" else ""
     return Finding(
         saved,
@@ -98,7 +120,6 @@ def time_saved(number: Number, results: Results, label: str) -> Finding:
         None if scattered else not wrong and saved >= number.value,
         OF_ITERATION if algebraic else OF_INTEGRATION,
         "; ".join(filter(None, (wrong, scattered, beside))),
-        PRINTED,
         number.unit,
         strongest=strongest,
     )
@@ -126,42 +147,7 @@ def _missed_errors(model: str, run: xr.Dataset) -> str:
     return f"counts only with errors that are met: {', '.join(missed)}" if missed else ""
 
 
-def _scatter(timing: xr.Dataset, *cases: str) -> str:
+def timing_scatter(timing: xr.Dataset, *cases: str) -> str:
+    """Why the times of some cases can't be compared; empty if they can."""
     spread = (timing["seconds_upper"] - timing["seconds_lower"]) / timing["seconds"]
     return scatter({case: float(spread.sel(case=case)) for case in cases})
-
-
-@criterion("dw_fig14_six_slower_than_three", {"pod_literal": "literal"}, applies_to_replay=False)
-def six_slower(results: Results, label: str) -> Finding:
-    """Figure 14: six states take more time than three, but less than the full model."""
-    timing = results[TIMING["double_wishbone"]]
-    numbers = load_published().numbers
-    few, many = (case_of(numbers[f"dw_time_reduction_{n}"], label) for n in (3, 6))
-    row = timing.sel(case=many)
-    slower = float(row["seconds"] / timing["seconds"].sel(case=few))
-    seen = (
-        f"six states take {1.0 / float(row['speed_up']):.2f} times the time of Newton with fresh "
-        f"Jacobians ({int(row['iterations'])} iterations against "
-        f"{int(timing['iterations'].sel(case='baseline'))})"
-    )
-    scattered = _scatter(timing, few, many, "baseline")
-    met = None if scattered else slower > 1.0 and float(row["speed_up"]) > 1.0
-    text = "time with six states as a multiple of that with three; and less than the full model's"
-    reason = "; ".join(filter(None, (scattered, seen)))
-    return Finding(slower, 1.0, met, text, reason, IN_WORDS)
-
-
-@criterion("all_close_agreement_less_time", applies_to_replay=False)
-def agree_and_save(results: Results, label: str) -> Finding:
-    """Conclusion: reduced models agree closely and take substantially less time."""
-    numbers = printed_errors_and_savings()
-    agree = all(judge_rms_error(n, results, label).within for n in numbers if n.kind == "rms_error")
-    timed = [n for n in numbers if n.kind == "time_reduction" and case_of(n, label)]
-    saved = [time_saved(n, results, label) for n in timed]
-    number, least = min(zip(timed, saved, strict=True), key=lambda pair: pair[1].reproduced)
-    bound = min(finding.bound for finding in saved)
-    text = "least share of time that is saved, if all published errors are met"
-    seen = f"{number.model}; errors {'met' if agree else 'missed'}"
-    scattered = [f.reason for f in saved if f.within is None and agree]
-    met = None if scattered else agree and least.reproduced >= bound
-    return Finding(least.reproduced, bound, met, text, next(iter(scattered), seen), PRINTED)

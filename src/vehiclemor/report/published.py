@@ -1,4 +1,4 @@
-"""What the paper prints: its numbers and claims, each with its page; and how to cite."""
+"""What the paper prints: its numbers, each with its page; and how to cite."""
 
 from functools import cache
 from importlib.metadata import version
@@ -40,32 +40,15 @@ class Number(Printed):
     note: Line | None = None
 
 
-class Claim(Printed):
-    """A printed statement in our words; without a model it is about all three.
-
-    A `result` is what the paper says it saw, an `expectation` what it explains without showing it.
-    """
-
-    model: Model | None = None
-    kind: Literal["result", "expectation"]
-    statement: Line
-
-
 class Published(FileSchema):
-    """Schema of `data/published/*.toml`: the paper's numbers and claims."""
+    """Schema of `data/published/masoudi2015.toml`: the paper's numbers."""
 
     number: list[Number]
-    claim: list[Claim]
 
     @property
     def numbers(self) -> dict[str, Number]:
         """Id -> number, in the order of the file."""
         return {number.id: number for number in self.number}
-
-    @property
-    def claims(self) -> dict[str, Claim]:
-        """Id -> claim, in the order of the file."""
-        return {claim.id: claim for claim in self.claim}
 
 
 class FixedSets(FileSchema):

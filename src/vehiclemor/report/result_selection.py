@@ -1,4 +1,4 @@
-"""Results: which run is meant, of a file or at a point of a study's grid; they draw themselves."""
+"""Results: which run is meant, of a file or at a point of a study's grid."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Comparisons as paragraphs and tables, for the terminal and for the page of a report."""
 
 import math
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from itertools import groupby
 from operator import itemgetter
@@ -11,17 +10,8 @@ from typing import Any
 import pandas as pd
 
 from vehiclemor.registry import component, names
-from vehiclemor.report.comparison import ALL_MODELS, PAPER, cost_table, timing_of
-from vehiclemor.report.findings import (
-    IN_WORDS,
-    INDISTINGUISHABLE,
-    LARGEST_SPREAD,
-    MISSED,
-    OWN,
-    VERDICTS,
-    VISIBLE,
-    counted,
-)
+from vehiclemor.report.comparison import PAPER, cost_table, timing_of
+from vehiclemor.report.findings import VERDICTS, counted
 from vehiclemor.report.frames import ERRORS
 from vehiclemor.report.labels import ERROR, Column, column, main_outputs, of_kind
 from vehiclemor.report.printing import Table, format_value, wrapped
@@ -34,16 +24,15 @@ MEASURES = {"max": "largest", "rms": "RMS", "relative": "RMS of its range"}
 
 
 def comparison_text(what: str, rows: pd.DataFrame, folder: Path, show_all: bool = False) -> str:
-    """A comparison as text; of that with the paper all claims with reasons, and costs."""
+    """A comparison as text; of that with the paper costs too, if all is shown."""
     if what == PAPER:
         parts = paper_parts(rows)
         if show_all:
-            parts += claim_parts(rows)
-            *models, last = [model for model in rows["model"].unique() if model != ALL_MODELS]
+            *models, last = rows["model"].unique()
             parts += [cost_text(model, folder, brief=True) for model in models]
             parts.append(cost_text(last, folder))
         else:
-            parts.append("vehiclemor compare --all: every claim with its reason, and the costs")
+            parts.append("vehiclemor compare --all: the costs too")
     elif what in names("model"):
         parts = _model_parts(what, rows, folder)
     else:
@@ -63,23 +52,12 @@ def _groups(rows: Iterable[Row], key: str) -> dict[Any, list[Row]]:
 
 
 def paper_parts(rows: pd.DataFrame) -> list[Part]:
-    """One screen: the printed errors and times, counts of the verdicts, what is missed."""
+    """The printed errors and times beside those of this suite."""
     records: list[Row] = rows.to_dict("records")
     errors = [row for row in records if "_rms_" in row["id"]]
-    times = [row for row in records if "_time_reduction" in row["id"]]
-    claims = [row for row in records if row not in errors and row not in times]
+    times = [row for row in records if row not in errors]
     title = "Masoudi, Uchida, McPhee (2015), doi:10.1115/1.4029390, beside this suite"
-    counts: list[Row] = []
-    for model, group in _groups(claims, "model").items():
-        number = Counter(row["verdict"] for row in group)
-        counts.append({"claims": model.replace("_", " ")} | {v: number[v] for v in VERDICTS})
-    return [
-        wrapped(f"{title}: {counted(rows['verdict'])}."),
-        _errors(errors),
-        _times(times),
-        Table(counts),
-        _missed(claims),
-    ]
+    return [wrapped(f"{title}: {counted(rows['verdict'])}."), _errors(errors), _times(times)]
 
 
 def _printed(rows: list[Row], text: Callable[[Row], str]) -> list[Row]:
@@ -115,55 +93,6 @@ def _times(rows: list[Row]) -> Table:
         line["paper_time"] = f"{line['of']}{states.replace(' with ', ', ')}"
     columns = ("paper_time", "published_time", "pod_default", "pod_literal", "strongest")
     return Table(lines, columns)
-
-
-def _missed(rows: list[Row]) -> Table:
-    """What is missed and by how much, for each claim."""
-    lines: list[Row] = []
-    missed = (row for row in rows if row["verdict"] == MISSED)
-    for group in _groups(missed, "id").values():
-        first = group[0]
-        # A claim without a threshold is explained by what was seen.
-        text = first["reason"]
-        if first["threshold_source"] != IN_WORDS:
-            values = [f"{format_value(r['reproduced'], '.3g')} ({r['variant']})" for r in group]
-            measure, bound = first["measure"].split("; ")[0], format_value(first["bound"], ".3g")
-            text = f"{measure}: {', '.join(values)}; bound {bound}"
-        lines.append({"missed_claims": f"- {first['item']}: {text}"})
-    return Table(lines)
-
-
-def claim_parts(rows: pd.DataFrame) -> list[Part]:
-    """All rows with their reasons, by model."""
-    note = (
-        "The paper's parameters were never published; these models use public data.  default: "
-        "settings of POD chosen by a sweep over the runs that are judged here; literal: the "
-        "paper's words.  A bound with * is added here, since the paper gives none: "
-        f"{100 * VISIBLE:g} % of a signal's range is visible in a figure (2 mm on a curve 40 mm "
-        f"high), {100 * INDISTINGUISHABLE:g} % is not.  "
-        "replay: returns the training run.  Times are medians of interleaved rounds, not "
-        f"comparable with an interquartile range above {100 * LARGEST_SPREAD:g} % of the median."
-    )
-    columns = ("variant", "limit", "reproduced", "best", "replay", "word")
-    parts: list[Part] = [wrapped(note)]
-    for model, group in _groups(rows.to_dict("records"), "model").items():
-        lines: list[Row] = []
-        for row in group:
-            unit = "" if row["unit"] in ("1", "-") else f", {row['unit']}"
-            measure = f" ({row['measure']})" if row["measure"] else ""
-            about = {"of": f"{row['item']}{unit}{measure}", "best": row["floor"]}
-            lines.append(row | _verdict(row) | about)
-        parts.append(Table(lines, columns, model.replace("_", " "), group="of", note="reason"))
-    return parts
-
-
-def _verdict(row: Row) -> Row:
-    """Bound, with a mark if it is added here, and verdict of a row as they are printed."""
-    mark = "*" if row["threshold_source"] == OWN else ""
-    return {
-        "limit": format_value(float(row["bound"]), ".3g") + mark,
-        "word": VERDICTS[row["verdict"]],
-    }
 
 
 # A model.
@@ -293,7 +222,7 @@ def _protocol_parts(rows: Mapping[str, list[Row]], explain: bool) -> list[Part]:
         head += f", {first['apart']:.0f} more not judged: full order fails or is sensitive there"
     parts: list[Part] = [] if winner else [wrapped(head)]
     if winner:
-        parts += _winner_parts(head, winner, rows["target"], rows["bound"], explain)
+        parts += _winner_parts(head, winner, rows["target"], rows["bound"])
     against = {*winner["equal_rows"].split(", "), winner["within"]} if winner else set()
     named: list[Row] = []
     for row in sorted(methods, key=lambda row: row["role"] != FULL_ORDER):
@@ -315,11 +244,12 @@ def _protocol_parts(rows: Mapping[str, list[Row]], explain: bool) -> list[Part]:
     return parts
 
 
-def _winner_parts(
-    head: str, winner: Row, targets: list[Row], bounds: list[Row], explain: bool
-) -> list[Part]:
+def _winner_parts(head: str, winner: Row, targets: list[Row], bounds: list[Row]) -> list[Part]:
     """What validation has chosen: its targets, and its errors beside their bounds."""
-    outcomes = [row | _verdict(row) | {"target": row["item"]} for row in targets]
+    outcomes: list[Row] = []
+    for row in targets:
+        words = {"target": row["item"], "word": VERDICTS[row["verdict"]]}
+        outcomes.append(row | words | {"limit": format_value(float(row["bound"]), ".3g")})
     for row in bounds:
         kind = MEASURES[row["measure"]]
         row["output"] = f"{row['item'].replace('_', ' ')}, {kind}"
@@ -328,5 +258,4 @@ def _winner_parts(
     errors = {"output": Column(f"errors of {winner['label']}, SI units")}
     errors |= {name: column(name) for name in ("bound", "worst", "most")}
     errors["reason"] = Column("bound from")
-    below = "*: bound added here" if explain else ""
-    return [Table(outcomes, columns, head, below=below), Table(bounds, errors)]
+    return [Table(outcomes, columns, head), Table(bounds, errors)]

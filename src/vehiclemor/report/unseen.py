@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from vehiclemor.report.findings import NOT_COMPARABLE, OWN, judged, scatter
+from vehiclemor.report.findings import NOT_COMPARABLE, judged, scatter
 from vehiclemor.report.labels import unit_of
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import errors_by, outcomes
@@ -296,8 +296,7 @@ def target_rows(dataset: xr.Dataset, protocol: ProtocolFile, methods: list[Row])
 def _target(item: str, bound: float, measured: float, reason: str, sign: float = 1.0) -> Row:
     """What is at most a bound, or at least with the sign -1."""
     row = {"item": item, "bound": bound, "measured": measured, "unit": "1", "reason": reason}
-    verdict = judged(sign * measured <= sign * bound)
-    return row | {"verdict": verdict, "threshold_source": OWN}
+    return row | {"verdict": judged(sign * measured <= sign * bound)}
 
 
 def _speed_target(target: SpeedTarget, winner: Row, methods: list[Row]) -> Row:

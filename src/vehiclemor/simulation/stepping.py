@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from ctypes import c_double
-from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -41,14 +40,13 @@ class StepSpace(NamedTuple):
     """A workspace of one step at a time, and what is overwritten for each.
 
     Times are arrays that end with the length of the step; window is an index (1,), coefficients
-    (1, 6, inputs) are of the inputs, means (windows, n) of the subspaces, first is the first step.
+    (1, 6, inputs) are of the inputs, first is the first step.
     """
 
     space: Workspace
     times: tuple[np.ndarray, ...]
     window: np.ndarray
     coefficients: np.ndarray
-    means: np.ndarray
     first: c_double
 
 
@@ -72,11 +70,6 @@ class SteppedSystem:
         spaces: Any
         solver: str
         tolerance: float
-
-    @property
-    def moved(self) -> bool:
-        """Whether the state at the beginning is the origin of the window's subspace."""
-        return False
 
     def step(
         self,
@@ -108,8 +101,6 @@ class SteppedSystem:
                 array[-1] = length
             held.first.value = length
             held.window[0] = window
-            if self.moved:
-                held.means[window] = start
             output.counts.fill(0)
             status = space.call()
             if status:
@@ -142,16 +133,14 @@ class SteppedSystem:
         counts, one = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64), np.array([0, 1])
         signal = ready(Pieces(edges, one, np.empty(0), coefficients))
         spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
-        path, windows = np.empty((1, len(self.system.error_scale))), self.spaces
-        if self.moved:
-            windows = replace(windows, means=windows.means.copy())
+        path = np.empty((1, len(self.system.error_scale)))
         drive = RunInputs(signal, spans, np.empty((0, 0)))
         output = Output.of(sample, path, counts)
-        space = self.system.packed(windows, Solver(self.solver, self.tolerance), drive, output)
+        space = self.system.packed(self.spaces, Solver(self.solver, self.tolerance), drive, output)
         words = space.call.words
         first = c_double.from_buffer(words, 8 * space.call.address("control.first"))
         times = edges, span, sample
-        return StepSpace(space, times, window, coefficients, windows.means, first)
+        return StepSpace(space, times, window, coefficients, first)
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """Time derivative (n,) of a state; of a projected one where its subspace is nearest."""
@@ -189,10 +178,7 @@ class SteppedSystem:
         """State where a subspace is nearest."""
         (mean, trial, test), (n, half) = subspace, (len(state), subspace[1].shape[1])
         change = kernels.seeds(n)
-        q, dq = state[:half], change[:half]
-        # Where the state itself is the origin, it lies in the subspace.
-        if not self.moved:
-            q, dq = mean + test @ (q - mean) @ trial, trial.T @ (test @ dq)
+        q, dq = mean + test @ (state[:half] - mean) @ trial, trial.T @ (test @ change[:half])
         if half == n:
             return q, dq
         rates, drates = kernels.of("derivative", state, change, n)

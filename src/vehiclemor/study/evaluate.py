@@ -260,7 +260,7 @@ def _tested(
     judged = run
     if not method.own_limits:
         judged = judged_by_error(run, simulate, (scenario.maneuver, start))
-    trained = partial(known_inputs, model, experiment.training, method.follows_time)
+    trained = partial(known_inputs, model, experiment.training)
     # A model that is silent is not trusted beyond the inputs that its method knows.
     if not judged.trust and (known := method.known_range(model, experiment.settings, trained)):
         judged = run.judged(known.trust(model, scenario.maneuver, speed_of(model, scenario)))
@@ -295,7 +295,7 @@ def for_run(reduced: Any, tested: Model) -> Any:
 
 
 @lru_cache(maxsize=64)
-def known_inputs(model: Model, training: tuple[Scenario, ...], follows_time: bool) -> InputRange:
+def known_inputs(model: Model, training: tuple[Scenario, ...]) -> InputRange:
     """Range of the inputs of training scenarios, see `input_range`."""
     runs = [(scenario.maneuver, speed_of(model, scenario)) for scenario in training]
-    return input_range(model, runs, follows_time)
+    return input_range(model, runs)

@@ -14,7 +14,7 @@ import xarray as xr
 
 from vehiclemor.arguments import MOST_JOBS, count
 from vehiclemor.exceptions import FileError, InputError
-from vehiclemor.progress import announced, tell
+from vehiclemor.progress import tell
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
@@ -25,8 +25,6 @@ from vehiclemor.study.plans.study_file import MOST_SEED, ProtocolFile, StudyFile
 from vehiclemor.study.store import combined_path, read_run, result_path, run_path, stored
 from vehiclemor.study.workers import Engine, Workers, cluster
 
-# Grids of so many points are announced before they are expanded.
-LARGE = 10_000
 LATER = "then the chosen ones are tested"
 # What differs from run to run of one reason.
 NUMBER = re.compile(r"-?\d[\d.e+-]*")
@@ -83,10 +81,7 @@ def _plan(name: str, path: Path, definition: StudyFile, seed: int | None) -> Pla
         protocol = load_protocol(str(path), own_seed, name)
         keys = partial(validation_keys, protocol)
         return Plan(protocol.study, definition, partial(run_protocol, protocol), keys, LATER)
-    large = definition.points >= LARGE
-    text = f"{name}: checking {definition.points} grid points"
-    with announced(text) if large else nullcontext():
-        grid = expand(name, definition, path.parent)
+    grid = expand(name, definition, path.parent)
     return Plan(name, definition, partial(run_grid, grid), grid.experiments.keys)
 
 

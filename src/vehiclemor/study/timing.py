@@ -49,14 +49,9 @@ INPUTS, INPUTS_OF_LONG, LONG_RUN = 3, 2, 2e-3
 # Fits whose median counts, as long as they take no more than these seconds together; and the length
 # (s) of a fit beside which loading machine code is nothing.
 FITS, FIT_SECONDS, LONG_FIT = 9, 2.0, 1.0
-# Variable -> case against which it is the speed-up, and what of a run; quantiles of its seconds.
 CALL, REPEATED, LOOP = 0, 1, 2
-SPEED_UPS = {
-    "speed_up": ("baseline", CALL),
-    "speed_up_strongest": ("strongest", CALL),
-    "loop_speed_up": ("baseline", LOOP),
-    "loop_speed_up_strongest": ("strongest", LOOP),
-}
+# Variable -> case against which it is the speed-up of a call; quantiles of its seconds.
+SPEED_UPS = {"speed_up": "baseline", "speed_up_strongest": "strongest"}
 QUANTILES = {"seconds_median": 0.5, "seconds_lower": 0.25, "seconds_upper": 0.75}
 
 
@@ -84,8 +79,8 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
     """Time experiments on the one run that all are tested on.
 
     The case `baseline` is the paper's kind of full-order run and `strongest` the best full-order
-    solver, for every model.  Beside what `timed_tests` has there are seconds for a time point,
-    speed-ups against these two, counts, rank and status; errors on `output` too.
+    solver, for every model.  Beside what `timed_tests` has there are speed-ups against
+    these two, counts, rank and status; errors on `output` too.
     """
     first = next(iter(experiments.values()))
     samples, start = first.test[0].maneuver.samples, first.test[0].start
@@ -99,15 +94,15 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
     times = _dataset(experiments, seconds, offline, f"{samples} time points")
     dataset = dataset.merge(times.isel(scenario=0, drop=True))
     columns: dict[str, object] = {
-        "seconds_per_sample": dataset["seconds"].values / samples,
         "tolerance": [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()],
     }
     # Round by round, so that a burst of other load on the machine hits both alike.
-    measured = np.where(seconds[:, :, 0] > 0.0, seconds[:, :, 0], np.nan)
-    for name, (against, part) in SPEED_UPS.items():
+    calls = seconds[:, :, 0, CALL]
+    calls = np.where(calls > 0.0, calls, np.nan)
+    for name, against in SPEED_UPS.items():
         if against in experiments:
-            baseline = measured[:, [list(experiments).index(against)], part]
-            columns[name] = np.median(baseline / measured[:, :, part], axis=0)
+            baseline = calls[:, [list(experiments).index(against)]]
+            columns[name] = np.median(baseline / calls, axis=0)
     return dataset.assign(variables(columns, "case")).assign_attrs(times.attrs)
 
 

@@ -90,7 +90,7 @@ def test_what_has_no_equations_to_export(model, nominal, monkeypatch):
     with pytest.raises(vm.VehiclemorError, match="double_wishbone_pod"):
         vm.export(ReducedOrderModel(model, "pod", {}, (), reduced), "casadi")
     with pytest.raises(vm.VehiclemorError, match="table"):
-        vm.export(vm.rom("double_wishbone"), "sympy")
+        vm.export(vm.rom("double_wishbone"), "casadi")
     # Missing packages are named.
     monkeypatch.setattr(libraries, "find_spec", lambda _: None)
     with pytest.raises(vm.VehiclemorError, match=r"vehiclemor\[casadi\]"):

@@ -105,7 +105,7 @@ def test_parts_are_what_they_were(monkeypatch):
 
 def test_parameters_settings_and_training_come_along(tmp_path):
     mass = {"sprung_mass": 1400.0}
-    given: dict[str, Any] = {"training": "nominal", "rank": 4, "restart": "full_model"}
+    given: dict[str, Any] = {"training": "nominal", "rank": 4}
     made = vm.reduce(build(CAR, overrides=mass), "pod", **given)
     again = vm.load(made.save(tmp_path / "model.nc"))
     assert again.parameters["sprung_mass"] == 1400.0

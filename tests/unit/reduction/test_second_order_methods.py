@@ -36,7 +36,7 @@ def response(model, structure, frequency):
 
 
 def response_error(model, reduced):
-    full, small = model.system.structure, projected(model.system.structure, reduced.bases[0])
+    full, small = model.system.structure, projected(model.system.structure, reduced.basis)
     exact, found = ([response(model, x, f) for f in (0.5, 2, 8, 20, 50)] for x in (full, small))
     return max(np.linalg.norm(a - b) / np.linalg.norm(a) for a, b in zip(exact, found, strict=True))
 

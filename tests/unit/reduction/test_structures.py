@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 import vehiclemor as vm
 from tests.models import TRUCK
 from vehiclemor.exceptions import InputError
-from vehiclemor.reduction.projection.structural import ReducedStructure, modes_within
+from vehiclemor.reduction.projection.structural import modes_within
 from vehiclemor.registry import component, names
 from vehiclemor.simulation.structures.model import relative_error
 
@@ -75,7 +75,7 @@ def test_frequencies_come_down_to_those_of_the_full_structure(model):
         rom = vm.reduce(
             model, "craig_bampton", training=[signal()], highest=highest, tolerance=1e-4
         )
-        first = rom.reduced.periods.systems[0]
+        first = rom.reduced.system
         found = squares(first.structure, first.law, model)[:3]
         assert (exact * (1.0 - 1e-9) <= found).all()
         assert (found <= before * (1.0 + 1e-9)).all()
@@ -97,27 +97,8 @@ def test_more_vectors_of_pod_are_better_until_they_are_all(model):
     assert errors[0] > 2 * errors[1] > 4 * errors[2] > 8 * errors[3]
     any_basis = np.random.default_rng(0).standard_normal((model.size, model.size))
     modes = modes_within(model.system.structure, any_basis)
-    exact = replace(rom.reduced, bases=(modes,), tolerance=1e-4)
+    exact = replace(rom.reduced, basis=modes, tolerance=1e-4)
     assert relative_error(exact.simulate(test, "equilibrium").outputs, full.outputs) < 1e-7
-
-
-def test_control_periods_hand_over_what_moves(model):
-    run = model.run(signal())
-    how = {"training": [signal()], "tolerance": 3e-3}
-    periods = vm.reduce(model, "pod", rank=8, control_period=0.25, **how)
-    assert periods.reduced.edges == pytest.approx((0.25, 0.5, 0.75))
-    found = periods.simulate(signal())
-    assert relative_error(found.outputs, run.outputs) < 1e-3
-    # Whole spaces of other vectors one after another, between output times too: nothing is lost.
-    rng, n = np.random.default_rng(1), model.size
-    structure = model.system.structure
-    bases = tuple(modes_within(structure, rng.standard_normal((n, n))) for _ in range(3))
-    cut = ReducedStructure(model, bases, (0.3, 0.7), periods.reduced.offline, 3e-3)
-    whole = cut.simulate(signal(), "equilibrium")
-    np.testing.assert_allclose(whole.outputs, run.outputs, rtol=1e-5, atol=1e-6)
-    assert periods.states == ()
-    with pytest.raises(InputError, match="pod has no state: it gives whole runs alone"):
-        periods.state()
 
 
 # States
@@ -151,7 +132,7 @@ def test_another_payload_keeps_the_basis_and_other_parameters_make_anew(model):
     for method, settings in (("craig_bampton", {"highest": 60.0}), ("fixed_basis", {"rank": 5})):
         rom = vm.reduce(model, method, training=[signal()], tolerance=1e-4, **settings)
         other = rom.for_parameters(heavy)
-        (modes,), (others,) = rom.reduced.bases, other.reduced.bases
+        modes, others = rom.reduced.basis, other.reduced.basis
         assert (
             np.linalg.matrix_rank(np.hstack([modes, others])) == modes.shape[1] == others.shape[1]
         )
@@ -177,24 +158,10 @@ def test_a_rougher_road_than_trained_is_not_trusted():
     assert "road_FL is 0.6; the model holds" in rom.trust(rom.state(), np.full(8, 0.6)).reason
 
 
-def test_a_coarse_mesh_is_the_model_with_that_mesh():
-    fine = vm.model(TRUCK, {"elements_per_bay": 2.0})
-    rom = vm.reduce(fine, "coarse_mesh", training=[bumps()])
-    coarse = vm.model(TRUCK, {"elements_per_bay": 1.0})
-    assert rom.reduced.order == coarse.size < fine.size
-    np.testing.assert_array_equal(rom.simulate(bumps()).outputs, coarse.run(bumps()).outputs)
-    loaded = rom.for_parameters({"payload": 100.0}).simulate(bumps())
-    both = vm.model(TRUCK, {"elements_per_bay": 1.0, "payload": 100.0})
-    np.testing.assert_array_equal(loaded.outputs, both.run(bumps()).outputs)
-
-
 WRONG = [
     ("craig_bampton", {"highest": 1e-3}, "no mode is below 0.001 Hz: the first has"),
-    ("pod", {"control_period": 0.01}, "control_period is below 0.1 s"),
+    ("pod", {}, "flexible_truck is of kind structural"),
     ("slow_manifold", {}, "flexible_truck is of kind structural"),
-    ("coarse_mesh", {"parameters": {"elements_per_bay": 1.5}}, "elements_per_bay is 1.5"),
-    ("coarse_mesh", {"parameters": "elements_per_bay"}, "coarse_mesh: parameters "),
-    ("full_order", {"parameters": {"payload": 3.0}}, "payload is set for each run"),
 ]
 
 
@@ -251,10 +218,3 @@ def test_training_that_is_never_read_changes_no_status(method):
         found[-1] += (dataset["remark"].item(),)
     assert found[0] == found[1]
     assert found[0][0] == "ok"
-
-
-def test_bases_of_control_periods_are_not_trusted_on_another_road():
-    rom = vm.reduce(truck(), "pod", training=[ROAD], rank=5, **SHORT)
-    assert rom.simulate(ROAD).status == "ok"
-    run = rom.simulate(vm.road("B", 4))
-    assert (run.status, "history of the inputs" in run.message) == ("untrusted", True)

@@ -117,7 +117,7 @@ def test_an_export_has_the_inputs_that_it_is_asked_for(tmp_path):
     assert all(name in header for name in ("delta", *BRAKES))
     assert "friction_FL" not in header
     with pytest.raises(InputError, match="brake_torque_XX"):
-        vm.export(CAR, "sympy", inputs=["brake_torque_XX"])
+        vm.export(CAR, "casadi", inputs=["brake_torque_XX"])
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,10 @@ from scipy.sparse.linalg import spsolve
 import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
-from vehiclemor.simulation.structures.model import Periods, relative_error
+from vehiclemor.simulation.structures.model import (
+    first_samples,
+    relative_error,
+)
 
 TRUCK, HEIGHTS = "flexible_truck", ("road_FL", "road_FR", "road_RL", "road_RR")
 # Nothing takes energy away, and the tire, which is one-sided and damped, is gone.
@@ -69,7 +72,7 @@ def test_a_run_is_that_of_another_integrator_and_of_second_order(chain):
         expected = np.column_stack([x[n - 1], x[-1], np.array(slopes)[:, -1]])
         errors = []
         for every in (20, 40, 320):
-            found = Periods((model.system,)).steps_of(complete, every, 101)[0]
+            found = first_samples(model.system, complete, every, 101)[0]
             errors.append(relative_error(found[:, :3], expected))
         assert errors[-1] < tight
         if size < 0.1:
@@ -119,7 +122,7 @@ def test_the_step_that_is_chosen_meets_the_tolerance(chain):
     for given in (signal(), sharp):
         model, steps = chain(), []
         complete = whole(given, model)
-        exact = Periods((model.system,)).steps_of(complete, 320, complete.samples)[0]
+        exact = first_samples(model.system, complete, 320, complete.samples)[0]
         for tolerance in (1e-2, 1e-3, 1e-4):
             run = model.simulate(given, tolerance=tolerance)
             assert relative_error(run.outputs, exact) < tolerance

@@ -61,7 +61,7 @@ def fit(
     """Static shapes and modes; no training run is looked at.  `InputError` if no mode is slow."""
     began = time.process_time()
     basis = np.hstack(fixed_modes(model, settings.highest))
-    return reduced(model, [basis], settings, began)
+    return reduced(model, basis, settings, began)
 
 
 METHOD = Method(

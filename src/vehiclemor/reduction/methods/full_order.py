@@ -1,18 +1,14 @@
-"""The full-order model itself: the baseline of every comparison.
-
-A structure on a coarse mesh, `coarse_mesh`, is their null model: larger elements make a cheaper
-model, too.
-"""
+"""The full-order model itself: the baseline of every comparison."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from vehiclemor.exceptions import ConvergenceError, InputError
+from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import Method, OfflineCost, Presets
 from vehiclemor.reduction.projection.structural import StructuralRuns, StructuralSettings
@@ -27,12 +23,12 @@ from vehiclemor.reduction.settings import (
 )
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
-from vehiclemor.simulation.build import reparametrised
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import By
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.structures.model import SOLVER, USUAL, StructuralModel
+from vehiclemor.simulation.structures.system import StructuralSystem
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -61,17 +57,6 @@ class FullStructureSettings(StructuralSettings):
     integration = ("solver", "tolerance")
     solver: Literal["generalised_alpha"] = Field(
         SOLVER, description="of order 2, one step size a run, damped at infinity"
-    )
-    parameters: dict[str, float] = Field(
-        {}, description="values that differ from the model's, of its mesh for example"
-    )
-
-
-class CoarseMeshSettings(FullStructureSettings):
-    """The same with the parameters of a coarse mesh."""
-
-    parameters: dict[str, float] = Field(
-        {"elements_per_bay": 1, "shell_size": 0}, description="parameters of the mesh"
     )
 
 
@@ -157,44 +142,27 @@ class FullOrderStructure(StructuralRuns, FullOrder):
 
     model: StructuralModel
     step_size: float = 0.0
-    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def system(self) -> StructuralSystem:
+        """The structure itself."""
+        return self.model.system
 
     @property
     def order(self) -> int:
         """Number of coordinates."""
-        return self.remade.size
-
-    @cached_property
-    def remade(self) -> Any:
-        """The model with the parameters that differ."""
-        return reparametrised(self.model, self.parameters) if self.parameters else self.model
-
-    @property
-    def solved(self) -> tuple[StructuralModel, None]:
-        """The model with these parameters, in its coordinates."""
-        return self.remade, None
+        return self.model.size
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """The states themselves; another mesh has others."""
-        return None if self.parameters else states
-
-
-def check(model: Model, settings: Any) -> None:
-    """Raise `InputError` if the model can't have the parameters that differ."""
-    different = getattr(settings, "parameters", {})
-    for name in different:
-        if name in model.definition.online:
-            raise InputError(f"parameters: {name} is set for each run, not for a method")
-    if different:
-        reparametrised(model, different)
+        """The states themselves."""
+        return states
 
 
 def fit(model: Any, training: Training, settings: Any) -> FullOrder:
     """Nothing is fitted, and no training run is looked at."""
     solver = settings.solver, settings.tolerance
     if model.kind == "structural":
-        further = {"step_size": settings.step_size, "parameters": settings.parameters}
-        return FullOrderStructure(model, *solver, **further)
+        return FullOrderStructure(model, *solver, step_size=settings.step_size)
     kind = FullOrderMechanism if model.kind == "ae" else FullOrderSystem
     return kind(model, *solver)
 
@@ -214,15 +182,6 @@ METHOD = Method(
         "structural": _presets(SOLVER, 1e-2, paper={"tolerance": USUAL}),
     },
     fit=fit,
-    check=check,
     learns_from="nothing",
     own_limits=True,
-)
-
-COARSE_MESH = replace(
-    METHOD,
-    name="coarse_mesh",
-    summary="no reduction: larger elements, the null model of structures",
-    settings={"structural": CoarseMeshSettings},
-    presets={},
 )

@@ -75,7 +75,7 @@ def fit(model: StructuralModel, training: Training, settings: KrylovSettings) ->
     """Krylov vectors; no training run is looked at."""
     began = time.process_time()
     basis = krylov_vectors(model, settings.frequency, settings.moments)
-    return reduced(model, [basis], settings, began)
+    return reduced(model, basis, settings, began)
 
 
 METHOD = Method(

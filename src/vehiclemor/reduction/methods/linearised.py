@@ -1,4 +1,4 @@
-"""Reductions of the linearised model, without training: single track, modes, balanced, IRKA.
+"""Reductions of the linearised model, without training: single track, modes, balanced.
 
 A vehicle is linearised at straight running:
 
@@ -13,13 +13,11 @@ stays that of the start, and the dynamics are those at the speed of the model.
 Reductors choose coordinates of the lateral modes, those that steering moves:
 
 - `modal_truncation` (E. Davison, IEEE Trans. Autom. Control 11 (1966), 93-101) takes the slow
-  modes.  The others are dropped, or follow the steering without delay (static correction), so that
+  modes.  The others follow the steering without delay (static correction), so that
   steady cornering is that of the linearisation.  Of a structure it takes all modes up to a
   frequency, linearised at the static state.
-- `balanced_truncation` (B. C. Moore, IEEE Trans. Autom. Control 26 (1981), 17-32) and `irka`
-  (S. Gugercin, A. C. Antoulas, C. Beattie, SIAM J. Matrix Anal. Appl. 30 (2008), 609-638) are
-  pyMOR's; their outputs are the yaw rate and the lateral speed.  Of structures pyMOR has the same
-  iteration in second-order form (SOR-IRKA), which did not converge on the truck.
+- `balanced_truncation` (B. C. Moore, IEEE Trans. Autom. Control 26 (1981), 17-32) is pyMOR's; its
+  outputs are the yaw rate and the lateral speed.
 
 The single-track car (P. Riekert, T. E. Schunck, Ing.-Arch. 11 (1940), 210-224; M. Mitschke,
 H. Wallentowitz, Dynamik der Kraftfahrzeuge, Springer) has the lateral speed V and the yaw rate r at
@@ -39,8 +37,7 @@ Velocity and acceleration of the rack are left out, and so are heave and pitch.
 
 import time
 from collections.abc import Callable
-from importlib import import_module
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -78,17 +75,12 @@ MARGIN = 3.0
 SPEED, HEADING, POSITION = 10.0, 1.0, 10.0
 # Lateral speed (m/s) of a typical maneuver.
 SIDEWARD = 0.5
-# Module and class of pyMOR by reductor.
-PYMOR = {"balanced_truncation": ("bt", "BTReductor"), "irka": ("h2", "IRKAReductor")}
 
 
 class ModalVehicleSettings(FallbackSettings):
     """Settings for a vehicle."""
 
     fastest: float = Field(45.0, gt=0.0, description="modes of up to this |lambda| in 1/s are kept")
-    static_correction: Literal["yes", "no"] = Field(
-        "yes", description="dropped modes follow the steering without delay"
-    )
 
 
 class RankedVehicleSettings(FallbackSettings):
@@ -123,7 +115,7 @@ def truncated(
     if not slow.any():
         limit = settings.fastest
         raise InputError(f"fastest is {limit:g} 1/s: no mode that steering moves is that slow")
-    if settings.static_correction == "yes" and not slow.all():
+    if not slow.all():
         steady = np.linalg.solve(modes.rates[~slow][:, ~slow], modes.input_matrix[~slow])
         static_response = static_response.copy()
         static_response[:, 0] -= modes.right[:, ~slow] @ steady
@@ -131,35 +123,26 @@ def truncated(
     return within(modes, chosen, chosen.T), static_response
 
 
-def by_pymor(name: str) -> Reductor:
-    """A reductor of pyMOR; `InputError` if pyMOR is missing."""
-    module, kind = PYMOR[name]
+def balanced_modes(
+    shape: VehicleShape,
+    modes: SlowModes,
+    static_response: np.ndarray,
+    settings: RankedVehicleSettings,
+) -> tuple[SlowModes, np.ndarray]:
+    """The modes in pyMOR's bases; `InputError` if pyMOR is missing or the rank is too high."""
     with installed("pyMOR"):
-        reductor = getattr(import_module(f"pymor.reductors.{module}"), kind)
-
-    def projected(
-        shape: VehicleShape,
-        modes: SlowModes,
-        static_response: np.ndarray,
-        settings: RankedVehicleSettings,
-    ) -> tuple[SlowModes, np.ndarray]:
-        """The modes in pyMOR's bases; `InputError` if the rank is too high."""
         from pymor.core.logger import log_levels
         from pymor.models.iosys import LTIModel
-
-        if settings.rank >= (most := len(modes.rates)):
-            raise InputError(
-                f"rank is {settings.rank}; {shape.model.name} allows at most {most - 1}"
-            )
-        outputs = shape.linearised.velocity_a[[0, 2]] @ modes.right
-        full = LTIModel.from_matrices(modes.rates, modes.input_matrix[:, None], outputs)
-        with log_levels({"pymor": "ERROR"}):
-            projection = reductor(full)
-            projection.reduce(settings.rank)
-        trial, test = projection.V.to_numpy(), projection.W.to_numpy()
-        return within(modes, np.linalg.solve(test.T @ trial, test.T), trial), static_response
-
-    return projected
+        from pymor.reductors.bt import BTReductor
+    if settings.rank >= (most := len(modes.rates)):
+        raise InputError(f"rank is {settings.rank}; {shape.model.name} allows at most {most - 1}")
+    outputs = shape.linearised.velocity_a[[0, 2]] @ modes.right
+    full = LTIModel.from_matrices(modes.rates, modes.input_matrix[:, None], outputs)
+    with log_levels({"pymor": "ERROR"}):
+        projection: Any = BTReductor(full)
+        projection.reduce(settings.rank)
+    trial, test = projection.V.to_numpy(), projection.W.to_numpy()
+    return within(modes, np.linalg.solve(test.T @ trial, test.T), trial), static_response
 
 
 def linear_vehicle(model: DynamicModel, settings: Any, reductor: Reductor) -> ReducedVehicle:
@@ -270,21 +253,14 @@ def modal(model: Any, training: Training, settings: Any) -> ReducedVehicle | Red
     if model.kind != "structural":
         return linear_vehicle(model, settings, truncated)
     began = time.process_time()
-    return reduced(model, [free_modes(model, settings.highest)], settings, began)
+    return reduced(model, free_modes(model, settings.highest), settings, began)
 
 
 def balanced(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
     """Balance and truncate; `InputError` if pyMOR is missing."""
     if model.kind != "structural":
-        return linear_vehicle(model, settings, by_pymor("balanced_truncation"))
+        return linear_vehicle(model, settings, balanced_modes)
     return balanced_structure(model, settings)
-
-
-def interpolated(
-    model: DynamicModel, training: Training, settings: RankedVehicleSettings
-) -> ReducedVehicle:
-    """Interpolate by IRKA; `InputError` if pyMOR is missing."""
-    return linear_vehicle(model, settings, by_pymor("irka"))
 
 
 def no_linear_model(model: Any) -> str:
@@ -327,17 +303,6 @@ BALANCED_TRUNCATION = Method(
     refusal=no_linear_model,
     fit=balanced,
     check=check_balancing,
-    learns_from="nothing",
-    packages=("pymor",),
-)
-
-IRKA = Method(
-    name="irka",
-    summary="lateral dynamics that interpolate the linearised ones best (IRKA), by pyMOR",
-    reference="10.1137/060666123",
-    settings=dict.fromkeys(("ode", "dae"), RankedVehicleSettings),
-    refusal=no_steered_vehicle,
-    fit=interpolated,
     learns_from="nothing",
     packages=("pymor",),
 )

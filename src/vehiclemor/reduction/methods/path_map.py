@@ -12,7 +12,6 @@ import time
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
-from typing import Literal
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -82,11 +81,6 @@ class PathMapSettings(Settings):
 
     degree: int = Field(3, ge=1, description="total degree of the polynomials in a cell")
     cells: int = Field(16, ge=1, description="equal cells along each input that moves in training")
-    outside: Literal["extrapolate", "stop"] = Field(
-        "extrapolate",
-        description="extrapolate: a run that leaves the inputs of training goes on; "
-        "stop: it has diverged",
-    )
 
 
 @dataclass(frozen=True)
@@ -101,7 +95,6 @@ class PathMapModel(ReducedMechanism):
     cells: Cells
     # Column of the coefficients for each coordinate and output; equal ones share one.
     columns: tuple[int, ...]
-    stops: bool  # Whether a run ends where it leaves the ranges.
     offline: OfflineCost
 
     def check_sizes(self) -> None:
@@ -186,14 +179,9 @@ class PathMapModel(ReducedMechanism):
         space = np.empty(size + inputs.shape[1])
         call = self._pool.taken(given, lambda: self._packed(given, len(space)))
         call.words[call.address("space")] = address_of_array(space)
-        left, seconds = timed(call)
+        _, seconds = timed(call)
         self._pool.give_back(given, call)
         table = space[:size].reshape(samples, -1)
-        status, message = "ok", ""
-        if self.stops and left < samples:
-            status = "diverged"
-            message = f"{self._outside(inputs[left])}, from t = {times[left]:.4g} s on"
-            table[left:] = np.nan
         n = len(model.coordinates)
         return Trajectory.of(
             times=times,
@@ -203,8 +191,6 @@ class PathMapModel(ReducedMechanism):
             outputs=table[:, n:],
             counts=dict.fromkeys(model.counts, 0),
             seconds=seconds,
-            status=status,
-            message=message,
             names=model.outputs,
             model=model,
         )
@@ -216,25 +202,16 @@ class PathMapModel(ReducedMechanism):
         names = [f"input {name}" for name in self.model.inputs]
         return trust_of(np.zeros(len(inputs)), used, names)
 
-    def _outside(self, inputs: np.ndarray) -> str:
-        return (
-            f"input {_named(self.model, inputs[:, None])} is outside of training "
-            f"({_named(self.model, self.ranges)})"
-        )
-
     def for_model(self, model: AlgebraicModel) -> "PathMapModel":
         """The map of another mechanism, between the same inputs."""
         number = int(self.cells.numbers.max())
-        return _mapped(model, self.ranges, self.degree, number, self.stops)
+        return _mapped(model, self.ranges, self.degree, number)
 
 
-def _named(model: AlgebraicModel, values: np.ndarray) -> str:
-    """Values or ranges (inputs, 1 or 2) of the inputs by their names and units."""
-    texts = []
-    for quantity, row in zip(model.definition.inputs, values, strict=True):
-        ends = " to ".join(f"{value:.5g}" for value in dict.fromkeys(row.tolist()))
-        texts.append(f"{quantity.name} {ends} {quantity.unit}")
-    return ", ".join(texts)
+def _named(model: AlgebraicModel, ranges: np.ndarray) -> str:
+    """Ranges (inputs, 2) of the inputs by their names and units."""
+    pairs = zip(model.definition.inputs, ranges, strict=True)
+    return ", ".join(f"{q.name} {low:.5g} to {high:.5g} {q.unit}" for q, (low, high) in pairs)
 
 
 def check(model: Model, settings: PathMapSettings) -> None:
@@ -258,13 +235,10 @@ def fit(model: AlgebraicModel, training: Training, settings: PathMapSettings) ->
     low, high = every.min(axis=0), every.max(axis=0)
     margins = MARGIN * (high - low)
     ranges = np.column_stack([low - margins, high + margins])
-    stops = settings.outside == "stop"
-    return _mapped(model, ranges, settings.degree, settings.cells, stops)
+    return _mapped(model, ranges, settings.degree, settings.cells)
 
 
-def _mapped(
-    model: AlgebraicModel, ranges: np.ndarray, degree: int, number: int, stops: bool
-) -> PathMapModel:
+def _mapped(model: AlgebraicModel, ranges: np.ndarray, degree: int, number: int) -> PathMapModel:
     """The map of a mechanism between the ranges (inputs, 2), in so many cells along each input."""
     began = time.process_time()
     centres, widths = ranges.mean(axis=1), np.ptp(ranges, axis=1)
@@ -292,7 +266,7 @@ def _mapped(
     )
     cost = offline_cost(began, model, [solved])
     varied = tuple(moving.tolist())
-    return PathMapModel(model, ranges, varied, degree, cells, columns, stops, cost)
+    return PathMapModel(model, ranges, varied, degree, cells, columns, cost)
 
 
 def _distinct(values: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:

@@ -5,7 +5,7 @@ the Proper Orthogonal Decomposition, J. Comput. Nonlinear Dyn. 10(3), 031007 (20
 L. Sirovich, Turbulence and the dynamics of coherent structures, Quart. Appl. Math. 45 (1987).
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, create_model
@@ -18,27 +18,17 @@ from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.model import Model
 
-PROJECTIONS = {"ae": algebraic, "ode": dynamic, "dae": dynamic, "structural": structural}
+PROJECTIONS = {"ae": algebraic, "ode": dynamic, "dae": dynamic}
 SETTINGS: dict[str, type[Settings]] = {
     "ae": algebraic.AlgebraicPodSettings,
     "ode": dynamic.DynamicPodSettings,
     "dae": dynamic.ConstrainedPodSettings,
-    "structural": structural.StructuralPodSettings,
 }
 # Lengths in s of the paper's control periods, and the shortest: no motion of a vehicle happens in
 # less.
-PERIODS = {"ae": 5.0, "ode": 0.5, "dae": 0.1, "structural": 0.5}
-SHORTEST_PERIOD = {"ae": 1e-3, "ode": 1e-2, "dae": 1e-2, "structural": 0.1}
+PERIODS = {"ae": 5.0, "ode": 0.5, "dae": 0.1}
+SHORTEST_PERIOD = {"ae": 1e-3, "ode": 1e-2, "dae": 1e-2}
 ControlPeriod = Annotated[float, Field(gt=0.0, description="length of a control period in s")]
-Restart = Annotated[
-    Literal["own", "projected", "full_model"],
-    Field(
-        description="where a control period starts: own: where the one before has ended; "
-        "projected: at the full model's state, projected onto the period's subspace (paper, step "
-        "6); full_model: at that state itself, the origin of the subspace from there on, as in a "
-        "model-predictive controller; the full model runs beside both"
-    ),
-]
 # As many snapshots of one basis as the paper's control periods have together.
 SNAPSHOTS = {"ae": 20, "ode": 500, "dae": 500}
 DYNAMIC_LITERAL = {"formulation": "state", "inner_product": "euclidean", "rank_tolerance": 0.0}
@@ -52,22 +42,20 @@ PRESETS = {
 
 def _in_periods(kind: str) -> type[Settings]:
     """Settings of POD in control periods."""
-    fields: dict[str, Any] = {"control_period": (ControlPeriod, PERIODS[kind])}
-    if kind in ("ode", "dae"):
-        fields["restart"] = Restart, "own"
-    return create_model("PodSettings", __base__=SETTINGS[kind], **fields)
+    period: Any = ControlPeriod, PERIODS[kind]
+    return create_model("PodSettings", __base__=SETTINGS[kind], control_period=period)
 
 
 def _of_one_basis(kind: str) -> type[Settings]:
     """Settings of POD with one basis."""
-    fields: dict[str, Any] = {}
-    if kind in SNAPSHOTS:
-        fields["snapshots"] = Snapshots, SNAPSHOTS[kind]
-    return create_model("FixedBasisSettings", __base__=SETTINGS[kind], **fields)
+    snapshots: Any = Snapshots, SNAPSHOTS[kind]
+    return create_model("FixedBasisSettings", __base__=SETTINGS[kind], snapshots=snapshots)
 
 
 def check(model: Model, settings: Any) -> None:
-    """Raise `InputError` if the settings don't fit the model."""
+    """Raise `InputError` if the settings don't fit the model; every rank fits a structure."""
+    if model.kind == "structural":
+        return
     PROJECTIONS[model.kind].check_subspace(model, settings)
     period, shortest = getattr(settings, "control_period", np.inf), SHORTEST_PERIOD[model.kind]
     if period < shortest:
@@ -76,6 +64,8 @@ def check(model: Model, settings: Any) -> None:
 
 def fit(model: Model, training: Training, settings: Any) -> FittedModel:
     """One POD subspace for each control period of the training runs, or for the whole of them."""
+    if model.kind == "structural":
+        return structural.fit_basis(model, training, settings)  # type: ignore[arg-type]
     duration = training[0].maneuver.duration
     edges = window_edges(duration, getattr(settings, "control_period", duration))
     return PROJECTIONS[model.kind].fit_windows(model, training, edges, settings)
@@ -90,13 +80,13 @@ METHOD = Method(
     refusal=dynamic.further_states_refused,
     check=check,
     fit=fit,
-    follows_time=True,
 )
 FIXED_BASIS = Method(
     name="fixed_basis",
     summary="POD with one mean and basis for the whole run",
     reference="10.1090/qam/910462",
-    settings={kind: _of_one_basis(kind) for kind in SETTINGS},
+    settings={kind: _of_one_basis(kind) for kind in SETTINGS}
+    | {"structural": structural.StructuralPodSettings},
     presets=PRESETS,
     refusal=dynamic.further_states_refused,
     check=check,

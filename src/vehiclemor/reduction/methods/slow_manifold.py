@@ -15,9 +15,8 @@ since a heading that is off is a lateral position that is off.
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -88,11 +87,6 @@ class SlowManifoldSettings(FallbackSettings):
 
 class GuardedSettings(SlowManifoldSettings):
     """The same settings with a fallback."""
-
-    renamed: ClassVar[Mapping[str, str]] = {
-        "safe_solver": "fallback",
-        "safe_tolerance": "fallback_tolerance",
-    }
 
     fallback: AnyIntegrator = Field(
         "etdrk4", description="integrator of the full order for runs that are not to be trusted"

@@ -78,4 +78,4 @@ def balanced_structure(
     with log_levels({"pymor": "ERROR"}):
         reductor: Any = SOBTfvReductor(full)
         reductor.reduce(settings.rank)
-    return reduced(model, [reductor.V.to_numpy()], settings, began)
+    return reduced(model, reductor.V.to_numpy(), settings, began)

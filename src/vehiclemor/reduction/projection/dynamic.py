@@ -7,7 +7,7 @@ compared.
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal
@@ -17,7 +17,6 @@ from pydantic import Field
 
 from vehiclemor.arguments import require
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.bases import (
     Basis,
@@ -33,9 +32,9 @@ from vehiclemor.reduction.settings import ProjectedSolver, Settings, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.simulation.control_periods import ControlPeriods
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.evaluation import STATE
+from vehiclemor.simulation.stepping import Sensitivity
 from vehiclemor.simulation.system import System
-from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS, Start, Trajectory
-from vehiclemor.simulation.workspaces import Solver
 
 # A state whose range is below this share of the largest one is noise, not motion.
 SMALLEST_RANGE = 1e-6
@@ -84,14 +83,7 @@ class ConstrainedPodSettings(DynamicPodSettings):
 
 @dataclass(frozen=True, eq=False)
 class DynamicProjection(ReducedSystem):
-    """Projected equations of motion on affine subspaces, one in each window.
-
-    Where a window starts from the full model's state, as onboard model-predictive controllers do,
-    which the paper's control periods resemble (section 3.1), errors grow within it alone.  But
-    projected onto the subspace of the training run (step 6) that state becomes one of that run
-    again, wherever the vehicle is: where it is the origin of the subspace, only the change within
-    the window is in the span of the training's.
-    """
+    """Projected equations of motion on affine subspaces, one in each window."""
 
     model: DynamicModel
     spaces: ControlPeriods
@@ -101,7 +93,6 @@ class DynamicProjection(ReducedSystem):
     # Basis of each window, orthonormal in its inner product: of the states for `state`, else of the
     # coordinates; `spaces` are the same for the compiled loops.
     bases: tuple[Basis, ...] = ()
-    restart: str = "own"  # Where a window starts, as in the settings of `pod`.
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if the subspaces are of other states than the model's."""
@@ -117,41 +108,6 @@ class DynamicProjection(ReducedSystem):
     def order(self) -> int:
         """Largest number of basis vectors in any window."""
         return max(basis.rank for basis in self.bases)
-
-    @property
-    def moved(self) -> bool:
-        """Whether the state at the beginning of a window is the origin of its subspace."""
-        return self.restart == "full_model"
-
-    def simulate(
-        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
-    ) -> Trajectory:
-        """Each window from where the one before has ended, or from the state of the full model.
-
-        That runs first, and counts and seconds are of both.  A sample at the edge of two windows is
-        the end of the first one.
-        """
-        if self.restart == "own":
-            return super().simulate(maneuver, start, outputs)
-        model, times = self.model, maneuver.times
-        edges = np.array([0.0, *self.spaces.edges[1:-1], times[-1]])
-        edges = np.unique(edges[edges <= times[-1]])
-        full = model.simulate(maneuver, start, edges, self.solver, self.tolerance)
-        counts = np.array([full.counts[name] for name in DYNAMIC_COUNTS])
-        states = np.full((len(times), full.states.shape[1]), np.nan)
-        first, seconds, failure, spaces = 0, full.seconds, "", self.spaces
-        for (left, right), state in zip(pairwise(edges), full.states, strict=False):
-            end = int(np.searchsorted(times, right + 1e-9 * (right - left)))
-            if end == first or failure:
-                continue
-            if self.moved:
-                spaces = replace(spaces, means=np.tile(state, (len(spaces.means), 1)))
-            how = Solver(self.solver, self.tolerance, times[first:end], begin=left)
-            run = self.system.run(maneuver, state, spaces, how)
-            states[first:end], failure = run.recorded_states, run.failure
-            counts, seconds, first = counts + run.counts, seconds + run.seconds, end
-        run = model.trajectory(times, maneuver.at(times), states, counts, seconds, failure)
-        return run if outputs is None else run.chosen(outputs)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray:
         """Projection of states (samples of equidistant times, 2 n) onto the subspaces."""
@@ -181,40 +137,16 @@ class DynamicProjection(ReducedSystem):
         model says that the projection is unstable.  NaN where the training was at
         rest: a window of rank 0 has no eigenvalue.
         """
-        model, spaces = self.model, self.spaces
-        rates = np.full(len(self.bases), np.nan)
+        spaces, rates = self.spaces, np.full(len(self.bases), np.nan)
+        middles = 0.5 * (spaces.edges[1:] + spaces.edges[:-1])
+        no_input, by_state = self.model.inputs_at_rest, Sensitivity(STATE)
         for k in np.flatnonzero(spaces.ranks).tolist():
-            y = np.zeros(spaces.ranks[k])
-            if spaces.formulation == "coordinates":
-                # Rates are coordinates too, and the test basis has nothing of speeds.
-                rank, no_input = spaces.ranks[k] // 2, np.zeros((1, len(model.inputs)))
-                (of_mean,) = model.rhs_at(spaces.means[k : k + 1], no_input)
-                of_mean[len(model.coordinates) :] = 0.0
-                y[rank:] = spaces.test_basis[k, :rank, :] @ of_mean
-            rates[k] = np.linalg.eigvals(self.reduced_jacobian(k, y)).real.max()
+            jacobian = self.rate_sensitivities(spaces.means[k], no_input, middles[k], by_state)
+            eigenvalues = np.linalg.eigvals(jacobian)
+            # The others are zero: nothing moves out of the subspace.
+            within = np.argsort(np.abs(eigenvalues))[-spaces.ranks[k] :]
+            rates[k] = eigenvalues[within].real.max()
         return rates
-
-    def reduced_jacobian(self, window: int, y: np.ndarray) -> np.ndarray:
-        """Jacobian of one window's reduced system at y (dim,) by differences, all inputs zero."""
-        columns = []
-        for step in 1e-6 * np.maximum(1.0, np.abs(y)) * np.eye(len(y)):
-            above, below = (self._reduced_rates(window, side) for side in (y + step, y - step))
-            columns.append((above - below) / (2.0 * step.sum()))
-        return np.column_stack(columns)
-
-    def _reduced_rates(self, window: int, y: np.ndarray) -> np.ndarray:
-        """Rates of the reduced states y (dim,) of one window, all inputs zero."""
-        model, spaces, n, dim = self.model, self.spaces, len(self.model.coordinates), len(y)
-        mean, no_input = spaces.means[window], model.inputs_at_rest
-        trial, test = spaces.trial_basis[window, :dim], spaces.test_basis[window, :dim]
-        if spaces.formulation == "state":
-            return test @ model.rhs(mean + y @ trial, no_input)
-        basis, rates = trial[: dim // 2, :n], y[dim // 2 :]
-        x = np.concatenate([mean[:n] + y[: dim // 2] @ basis, rates @ basis])
-        x[n:] = model.speeds_of_rates(x)
-        table = model.evaluated("second_order", x, no_input)
-        mass, force = basis @ table[:, :-1] @ basis.T, basis @ table[:, -1]
-        return np.concatenate([rates, np.linalg.solve(mass, force)])
 
     @property
     def spectral_abscissa(self) -> float:
@@ -251,7 +183,7 @@ def fit_windows(
     means = np.array([part.mean(axis=0) for part in snapshots])
     spaces = _spaces(model, edges, means, bases, (weight, settings.formulation))
     offline = offline_cost(began, model, histories)
-    how = settings.solver, settings.tolerance, tuple(bases), getattr(settings, "restart", "own")
+    how = settings.solver, settings.tolerance, tuple(bases)
     return DynamicProjection(model, spaces, offline, *how)
 
 

@@ -7,16 +7,14 @@ to solve in a step has few entries.
 """
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import Field, field_validator
 
-from vehiclemor.arguments import require
+from vehiclemor.arguments import check_shapes
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import Structure
@@ -31,7 +29,6 @@ from vehiclemor.simulation.structures.model import (
     FIRST_STEP,
     REASONS,
     USUAL,
-    Periods,
     StructuralModel,
 )
 from vehiclemor.simulation.structures.system import StructuralSystem, factored
@@ -113,11 +110,7 @@ class StructuralRuns(ShortRepr):
         model: StructuralModel
         tolerance: float
         step_size: float  # In s, instead of the tolerance; 0: by that.
-
-    @property
-    def solved(self) -> tuple[StructuralModel, Periods | None]:
-        """The model that is solved, and in which bases."""
-        return self.model, None
+        system: Any  # The `StructuralSystem` that is solved.
 
     def for_model(self, model: StructuralModel) -> Any:
         """The same for a model whose online parameters are others."""
@@ -128,8 +121,7 @@ class StructuralRuns(ShortRepr):
     ) -> Trajectory:
         """A run at the maneuver's output times; it may have diverged."""
         self.model.start(start)
-        model, periods = self.solved
-        return model.run(maneuver, periods, self.tolerance, outputs, step=self.step_size)
+        return self.model.run(maneuver, self.system, self.tolerance, outputs, step=self.step_size)
 
     def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
         """Runs have no coordinates to project."""
@@ -138,60 +130,39 @@ class StructuralRuns(ShortRepr):
 
 @dataclass(frozen=True, eq=False)
 class ReducedStructure(StructuralRuns):
-    """A structure in one basis, or in another one in each control period."""
+    """A structure in one basis, as a function of its states too."""
 
     model: StructuralModel  # The full one.
-    bases: tuple[np.ndarray, ...]  # Modes (n, r) of each period, see `modes_within`.
-    edges: tuple[float, ...]  # Times in s at which the next period begins.
+    basis: np.ndarray  # Modes (n, r), see `modes_within`.
     # Cost of making it; error by the step size, as of the full model.
     offline: OfflineCost
     tolerance: float
     step_size: float = 0.0  # In s, instead of the tolerance; 0: by that.
 
     def check_sizes(self) -> None:
-        """Raise `ValueError` if there is no basis of the model's coordinates for each period."""
-        n = self.model.size
-        require(len(self.bases) == len(self.edges) + 1 > 0, "edges")
-        require(all(basis.ndim == 2 and len(basis) == n for basis in self.bases), "bases")
+        """Raise `ValueError` if the basis is of other coordinates than the model's."""
+        check_shapes("basis", (self.basis, self.model.size, self.order))
 
     @property
     def order(self) -> int:
-        """Largest number of reduced coordinates in any period."""
-        return max(basis.shape[1] for basis in self.bases)
+        """Number of reduced coordinates."""
+        return self.basis.shape[1]
 
     def for_model(self, model: StructuralModel) -> Any:
-        """The same for a model whose online parameters are others, its modes in the same bases."""
-        modes = tuple(modes_within(model.system.structure, basis) for basis in self.bases)
-        return replace(self, model=model, bases=modes)
+        """The same for a model whose online parameters are others, its modes in the same basis."""
+        return replace(self, model=model, basis=modes_within(model.system.structure, self.basis))
 
     @cached_property
-    def periods(self) -> Periods:
-        """Reduced structures, and how coordinates pass from one to the next: nearest by mass."""
-        structure, law = self.model.system.structure, self.model.system.law
-        systems = tuple(StructuralSystem(projected(structure, modes), law) for modes in self.bases)
-        pairs = pairwise(self.bases)
-        passed = tuple(after.T @ (structure.mass @ before) for before, after in pairs)
-        return Periods(systems, self.edges, passed)
-
-    @property
-    def solved(self) -> tuple[StructuralModel, Periods | None]:
-        """The model in its bases."""
-        return self.model, self.periods
-
-
-@dataclass(frozen=True, eq=False)
-class SteppedStructure(ReducedStructure):
-    """A structure in one basis, which is a function of its states too."""
+    def system(self) -> StructuralSystem:
+        """The reduced structure."""
+        full = self.model.system
+        return StructuralSystem(projected(full.structure, self.basis), full.law)
 
     @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the modal coordinates and, after them, of their rates."""
-        r = self._first.structure.size
-        return tuple(f"{name}{k}" for name in ("mode_", "mode_rate_") for k in range(1, r + 1))
-
-    @property
-    def _first(self) -> StructuralSystem:
-        return self.periods.systems[0]
+        numbers = range(1, self.order + 1)
+        return tuple(f"{name}{k}" for name in ("mode_", "mode_rate_") for k in numbers)
 
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
         """State (2 r,) of the static state."""
@@ -219,7 +190,7 @@ class SteppedStructure(ReducedStructure):
         moved = np.array([state[:r], state[r:], self.rates(state, inputs)[r:]])
         # Rounded, so that a loop whose times are rounded factors once.
         h = float(f"{dt / count:.12g}")
-        reason = self._first.integrate(moved, path, h, count, radius=1.0)[3]
+        reason = self.system.integrate(moved, path, h, count, radius=1.0)[3]
         if reason:
             raise ConvergenceError(f"{self.model.name}: {REASONS[reason]}, from t = {time:g} s on")
         return np.concatenate(moved[:2])
@@ -227,7 +198,7 @@ class SteppedStructure(ReducedStructure):
     @cached_property
     def _linear(self) -> tuple[np.ndarray, ...]:
         """Matrices of x' = A x + B f and y = C x + D f, f the forces of the ports; ports (r, p)."""
-        s = self._first.structure
+        s = self.system.structure
         ports, dampers, elastic = s.ports.toarray(), s.dampers.toarray(), s.stiffness.toarray()
         positions, rates, accelerations, forces = (matrix.toarray() for matrix in s.outputs)
         nothing, one = np.zeros_like(elastic), np.eye(len(elastic))
@@ -239,7 +210,7 @@ class SteppedStructure(ReducedStructure):
     def _forces(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Port forces and their derivatives (p, 3)."""
         deflections, rates = state.reshape(2, -1) @ self._linear[-1]
-        return self._first.law.at(deflections, rates, inputs)
+        return self.system.law.at(deflections, rates, inputs)
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
         """Time derivative (2 r,) of a state."""
@@ -251,7 +222,7 @@ class SteppedStructure(ReducedStructure):
         """Outputs (samples, outputs) of states (samples, 2 r) at inputs (samples, inputs)."""
         _, _, c, d, _ = self._linear
         forces = [self._forces(x, u)[:, 0] for x, u in zip(states, inputs, strict=True)]
-        static = self._first.structure.outputs[-1] @ self._first.law.static[1]
+        static = self.system.structure.outputs[-1] @ self.system.law.static[1]
         return states @ c.T + np.array(forces) @ d.T + static
 
     def sensitivities(
@@ -269,7 +240,7 @@ class SteppedStructure(ReducedStructure):
             return direct + by_force @ np.hstack(
                 [slopes[:, [1]] * ports.T, slopes[:, [2]] * ports.T]
             )
-        law, (deflections, rates) = self._first.law, state.reshape(2, -1) @ ports
+        law, (deflections, rates) = self.system.law, state.reshape(2, -1) @ ports
         arrays = np.concatenate([law.static[0] + deflections, rates]), inputs, law.constants
         forces = partial(law.kernels, "port_forces", arrays, 3 * len(rates), PLACES["inputs"])
         return by_force @ forces.reshape(len(rates), 3, -1)[:, 0]
@@ -277,7 +248,7 @@ class SteppedStructure(ReducedStructure):
     def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Coordinates (samples, n) about the static state of states (samples, 2 r)."""
         del inputs
-        return states[:, : self.order] @ self.bases[0].T
+        return states[:, : self.order] @ self.basis.T
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> None:
         """Its inputs tell how far it goes in what it knows."""
@@ -286,18 +257,15 @@ class SteppedStructure(ReducedStructure):
 
 def reduced(
     model: StructuralModel,
-    bases: Sequence[np.ndarray],
+    basis: np.ndarray,
     settings: StructuralSettings,
     began: float,
     evaluations: int = 0,
-    edges: Sequence[float] | np.ndarray = (),
 ) -> ReducedStructure:
-    """The structure in its bases; offline cost from `began` (`time.process_time()`) on."""
-    modes = tuple(modes_within(model.system.structure, basis) for basis in bases)
+    """The structure in a basis; offline cost from `began` (`time.process_time()`) on."""
+    modes = modes_within(model.system.structure, basis)
     cost = OfflineCost(time.process_time() - began, evaluations)
-    kind = SteppedStructure if len(modes) == 1 else ReducedStructure
-    ends = tuple(map(float, edges))
-    return kind(model, modes, ends, cost, settings.tolerance, settings.step_size)
+    return ReducedStructure(model, modes, cost, settings.tolerance, settings.step_size)
 
 
 def port_rates(model: StructuralModel) -> tuple[np.ndarray, np.ndarray]:
@@ -349,35 +317,20 @@ def _hertz(square: float) -> float:
 class StructuralPodSettings(StructuralSettings):
     """POD of the motion about the static state, which replaces the mean."""
 
-    rank: int = Field(21, ge=1, description="basis vectors in each control period")
+    rank: int = Field(21, ge=1, description="basis vectors")
     rank_tolerance: RankTolerance = 1e-10
 
 
-def check_subspace(model: StructuralModel, settings: StructuralPodSettings) -> None:
-    """Every rank fits: there are never more vectors than coordinates."""
-    del model, settings
-
-
-def fit_windows(
-    model: StructuralModel,
-    training: Training,
-    edges: np.ndarray,
-    settings: StructuralPodSettings,
+def fit_basis(
+    model: StructuralModel, training: Training, settings: StructuralPodSettings
 ) -> ReducedStructure:
-    """POD bases of all training runs between edges (windows + 1,) in s.
-
-    Snapshots are the coordinates at the output times.
-    """
-    began, evaluations, parts = time.process_time(), 0, []
+    """POD basis of all training runs: snapshots are the coordinates at the output times."""
+    began, evaluations, paths = time.process_time(), 0, []
     for run in training:
         full: Any = run.model
         recorded = full.run(run.maneuver, recorded=True)
         evaluations += recorded.counts["port_evaluations"]
-        parts.append((recorded.times, recorded.coordinates))
-    bases = []
-    for first, last in pairwise(edges):
-        within = [q[(t >= first - 1e-9) & (t <= last + 1e-9)] for t, q in parts]
-        vectors, values, _ = np.linalg.svd(np.vstack(within).T, full_matrices=False)
-        large = values[: settings.rank] > settings.rank_tolerance * values[0]
-        bases.append(vectors[:, : settings.rank][:, large])
-    return reduced(model, bases, settings, began, evaluations, edges[1:-1])
+        paths.append(recorded.coordinates)
+    vectors, values, _ = np.linalg.svd(np.vstack(paths).T, full_matrices=False)
+    large = values[: settings.rank] > settings.rank_tolerance * values[0]
+    return reduced(model, vectors[:, : settings.rank][:, large], settings, began, evaluations)

@@ -15,7 +15,6 @@ from vehiclemor.reduction.vehicle.decoding import Decoding
 from vehiclemor.reduction.vehicle.features import (
     PLANAR,
     Features,
-    feature_columns,
     feature_system,
     needed_parameters,
 )
@@ -25,8 +24,6 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 
-# Step of the reduced coordinates in differences.
-DIFFERENCE = 1e-6
 NO_COST = OfflineCost()
 
 
@@ -78,17 +75,6 @@ class ReducedVehicle(ReducedSystem):
     def order(self) -> int:
         """Number of integrated states, heading and position included."""
         return self.features.states + PLANAR
-
-    @cached_property
-    def spectral_abscissa(self) -> float:
-        """Largest real part (1/s) of the shape's eigenvalues at straight running."""
-        k = self.features.states
-        steps = DIFFERENCE * np.vstack([np.eye(k), -np.eye(k)])
-        no_input = np.tile(self.model.inputs_at_rest, (2 * k, 1))
-        columns = feature_columns(self.features, steps, no_input, self.parameters)
-        rates = columns @ self.coefficients[:, :k]
-        jacobian = (rates[:k] - rates[k:]).T / (2.0 * DIFFERENCE)
-        return float(np.linalg.eigvals(jacobian).real.max())
 
     @cached_property
     def system(self) -> System:

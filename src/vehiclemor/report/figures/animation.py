@@ -1,8 +1,8 @@
-"""Runs seen moving, full order and reduced together, as a GIF: lines in space of each mechanism."""
+"""Cars seen moving, full order and reduced together, as a GIF: lines in space."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from vehiclemor.arguments import file_path, number, quoted, within
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import begins_with, replaceable, write_whole
-from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component
 from vehiclemor.report.figures.result_plot import by_method, configuration, model_name
@@ -26,17 +25,18 @@ FRAMES_PER_SECOND, DOTS, DURATIONS, FACTORS = 12, 100, (0.5, 60.0), (0.01, 1000.
 # Half of what is seen of the road from above; and least and most of it from behind (m).
 ALONG, ACROSS, NARROWEST, WIDEST = 16.0, 7.0, 3.0, 6.5
 PLACE = ("longitudinal_position", "lateral_position", "yaw")
+NEEDED = (*PLACE, "pitch", "roll")
 # ISO 8855.
 AXES = "X, forward (m)", "Y, left (m)", "Z, up (m)"
 # Histories (frames,) and parameters by name.
 Values = Mapping[str, Any]
-# For the drawing only: sizes of a car whose parameters have other names, and of bodies (m).
+# For the drawing only: sizes of a car whose parameters have other names, and of its body (m).
 CAR = {"front_axle_distance": 1.2, "rear_axle_distance": 1.4, "front_track": 1.5}
 CAR |= {"tire_radius": 0.32, "tire_stiffness": 2e5}
 SECTION = ((-0.8, 0.3), (0.8, 0.3), (0.8, 0.8), (0.6, 1.4), (-0.6, 1.4), (-0.8, 0.8), (-0.8, 0.3))
-CAB = ((-0.8, 1.2), (1.0, 1.2), (1.0, 2.9), (-0.8, 2.9), (-0.8, 1.2))
-OVERHANG, RIM, TRUCK_RADIUS, SPRING, PLATFORM = 0.8, 0.1, 0.6, 0.4, 1.4
-SIDES = (1.0, -1.0)
+OVERHANG, RIM = 0.8, 0.1
+# Factor on roll, pitch and bounce.
+MAGNIFY = 3.0
 
 
 def line(*points: Sequence[Any] | np.ndarray) -> np.ndarray:
@@ -95,83 +95,15 @@ def car(h: Values, p: Values, magnify: float) -> np.ndarray:
     return turned(joined(parts), "Z", h["yaw"]) + position
 
 
-def truck(h: Values, p: Values, magnify: float) -> np.ndarray:
-    """Cab, platform and frame above axles and wheels, and the road below each wheel."""
-    parts, rails, plates = [], {}, {}
-    for y in (-0.9, 0.9):
-        parts += [line(*((x, y, z + magnify * h["driver_height"]) for x, z in CAB))]
-    for end, x in (("front", 0.0), ("rear", -p["wheelbase"])):
-        names = [f"{end[0].upper()}{side}" for side in "LR"]
-        texts = ("Fz_{}", "road_{}", "deflection_{}", "platform_{}_height")
-        moving = [[h[text.format(name)] for name in names] for text in texts]
-        load, road, bent, plate = magnify * np.array(moving)
-        axle = road - (load - load[:, :1]) / p["tire_stiffness"]
-        # Springs stand on the axle inside of the wheels.
-        inside = p[f"{end}_spring_offset"] / p["wheel_offset"]
-        rail = TRUCK_RADIUS + axle.mean(0) + inside * (axle - axle.mean(0)) - bent + SPRING
-        hubs = [(x, s * p["wheel_offset"], TRUCK_RADIUS + axle[k]) for k, s in enumerate(SIDES)]
-        parts += [line(*hubs), *(line(hub) + wheel(TRUCK_RADIUS) for hub in hubs)]
-        for k, side in enumerate(SIDES):
-            y, z = side * p["wheel_offset"], road[k]
-            parts += [line((x - 0.5, y, z), (x + 0.5, y, z))]
-            parts += [line((x, y - 0.3, z), (x, y + 0.3, z))]
-            rails[end, k] = x, side * p["rail_spacing"] / 2.0, rail[k]
-            along, y = -p[f"platform_{end}"], side * p["platform_width"] / 2.0
-            plates[end, k] = along, y, PLATFORM + plate[k]
-    around = (("front", 0), ("front", 1), ("rear", 1), ("rear", 0), ("front", 0))
-    parts += [line(*(corners[key] for key in around)) for corners in (rails, plates)]
-    return joined(parts)
-
-
-def suspension(h: Values, p: Values, magnify: float) -> np.ndarray:
-    """Arms, carrier, tie rod and wheel: outputs say how the carrier stands."""
-    eta, tilt = h["second_euler_angle"], np.sin(h["camber"]) / np.cos(h["second_euler_angle"])
-    xi = np.arcsin(np.clip(tilt, -1.0, 1.0))
-    zeta, centre = h["toe"] + np.arctan2(np.sin(eta) * tilt, np.cos(xi)), p["wheel_centre"]
-    moved = line(centre) + magnify * line((h["spindle_x"], h["spindle_y"], h["z"]))
-
-    def carried(part: np.ndarray) -> np.ndarray:
-        return turned(part, "ZYX", zeta, eta, xi) + moved
-
-    names = ("upper_ball_joint", "wheel_centre", "lower_ball_joint", "tie_rod_outer")
-    joints = [carried(line(p[name] - centre)) for name in names]
-    parts = [carried(wheel(CAR["tire_radius"])), chained(*joints)]
-    for arm, joint in (("upper", joints[0]), ("lower", joints[2])):
-        front, rear = (line(p[f"{arm}_arm_{end}_pivot"]) for end in ("front", "rear"))
-        parts += [chained(front, joint, rear)]
-    inner = line(p["tie_rod_inner"]) + line((0.0 * eta, h["rack"], 0.0 * eta))
-    return joined([*parts, chained(joints[3], inner)])
-
-
-class Scene(NamedTuple):
-    """How runs with some quantities are drawn, and from where beside from behind."""
-
-    draw: Callable[[Values, Values, float], np.ndarray]
-    view: str
-    columns: list[int]
-    magnify: float
-    needed: tuple[str, ...]
-
-
-TRUCK = ("driver_height", *(f"{q}_{w}" for q in ("road", "Fz", "deflection") for w in WHEELS))
-TRUCK = (*TRUCK, *(f"platform_{w}_height" for w in WHEELS))
-LINKAGE = ("spindle_x", "spindle_y", "second_euler_angle", "toe", "camber", "rack", "z")
-SCENES = {
-    "a car": Scene(car, "from above", [0, 1], 3.0, (*PLACE, "pitch", "roll")),
-    "a truck": Scene(truck, "from the right", [0, 2], 10.0, TRUCK),
-    "a suspension": Scene(suspension, "from above", [0, 1], 1.0, LINKAGE),
-}
-
-
 def animate(
     run: Trajectory | xr.Dataset,
     *beside: Trajectory | xr.Dataset,
     labels: Sequence[str] = (),
     duration: float = 8.0,
-    magnify: float | None = None,
+    magnify: float = MAGNIFY,
     out: str | Path = "car.gif",
 ) -> Path:
-    """Write a film of runs of the same input, together in colours.
+    """Write a film of runs of a car with the same input, together in colours.
 
     Parameters
     ----------
@@ -184,14 +116,14 @@ def animate(
     duration
         Of the film in s; the run is shown faster or slower.
     magnify
-        Factor on roll, bounce and deflections, which the title names.
+        Factor on roll, pitch and bounce, which the title names; 3 by default.
     out
         GIF file.
 
     Raises
     ------
     InputError
-        If the runs are of several inputs, or the model lacks outputs that a drawing needs.
+        If the runs are of several inputs, or lack outputs that the drawing of a car needs.
     """
     path = file_path("out", out)
     if path.suffix.lower() != ".gif":
@@ -209,12 +141,14 @@ def animate(
         texts[-1] = FULL_ORDER
     if len(texts) != len(runs):
         raise InputError(f"labels: {len(runs)} runs are drawn, not {len(texts)}")
-    scene, followed = _scene(runs), runs[-1]
+    followed = runs[-1]
+    lacking = [name for name in NEEDED if any(name not in h for h in runs)]
+    if lacking:
+        raise InputError(f"no film of these runs: to draw a car it lacks {', '.join(lacking)}")
     if not all(np.array_equal(followed["time"], h["time"]) for h in runs):
         raise InputError("the runs have several times; a film shows runs of one input")
-    factor = scene.magnify if magnify is None else number("magnify", magnify)
-    values = _parameters(run), within("magnify", factor, FACTORS)
-    finite = np.flatnonzero(np.isfinite([followed[n] for n in scene.needed]).all(0))
+    factor = within("magnify", number("magnify", magnify), FACTORS)
+    finite = np.flatnonzero(np.isfinite([followed[name] for name in NEEDED]).all(0))
     if not len(finite):
         raise InputError("the last run has no finite values; the view follows it")
     count = max(2, round(FRAMES_PER_SECOND * seconds))
@@ -222,10 +156,7 @@ def animate(
     with styled():
         looks = _styles(methods)
         frames = [{name: h[name][rows] for name in h} for h in runs]
-        try:
-            film = _film(scene, frames, texts, looks, values)
-        except KeyError as missing:
-            raise InputError(f"the drawing needs the parameter {missing} of the model") from None
+        film = _film(frames, texts, looks, _parameters(run), factor)
         writer = PillowWriter(fps=FRAMES_PER_SECOND)
         return write_whole(path, lambda part: film.save(part, writer=writer, dpi=DOTS))
 
@@ -241,19 +172,17 @@ def _styles(methods: Sequence[str]) -> list[Style]:
 
 
 def _film(
-    scene: Scene, runs: list[Any], names: Sequence[str], looks: Sequence[Style], values: Any
+    runs: list[Any], names: Sequence[str], looks: Sequence[Style], parameters: Values, factor: float
 ) -> FuncAnimation:
-    """Two views, and in each of them a line a run that moves, behind a car its path so far."""
-    followed, moves = runs[-1], scene.draw is car
+    """Two views, in each of them a line a run that moves, and from above its path so far."""
+    followed = runs[-1]
     times = followed["time"]
-    position, yaw = np.zeros((len(times), 1, 3)), 0.0 * times
-    if moves:
-        position, yaw = line((*(followed[name] for name in PLACE[:2]), 0.0)), followed["yaw"]
-    figure, grid = panels(2, 1, (5.6, 4.4)) if moves else panels(1, 2, (5.6, 3.2))
+    position, yaw = line((*(followed[name] for name in PLACE[:2]), 0.0)), followed["yaw"]
+    figure, grid = panels(2, 1, (5.6, 4.4))
     FigureCanvasAgg(figure)
-    side, back = grid.ravel()
-    views = [(side, scene.view, scene.columns), (back, "from behind", [1, 2])]
-    spaces = [scene.draw(h, *values) for h in runs]
+    above, back = grid.ravel()
+    views = [(above, "from above", [0, 1]), (back, "from behind", [1, 2])]
+    spaces = [car(h, parameters, factor) for h in runs]
     moving, paths = [], []
     for axis, title, columns in views:
         relative = [turned(s - position, "Z", -yaw) for s in spaces] if axis is back else spaces
@@ -263,18 +192,17 @@ def _film(
         every = np.concatenate([lines.reshape(-1, 2) for lines in shown])
         low, high = np.nanmin(every, axis=0), np.nanmax(every, axis=0)
         edge = 0.05 * (high - low).max()
-        if moves:
-            reach = np.clip(abs(every[:, 0]), NARROWEST, WIDEST)
-            low[0], high[0] = -np.nanmax(reach), np.nanmax(reach)
+        reach = np.clip(abs(every[:, 0]), NARROWEST, WIDEST)
+        low[0], high[0] = -np.nanmax(reach), np.nanmax(reach)
         across, up = (AXES[column] for column in columns)
         axis.set(aspect="equal", title=title, xlabel=across, ylabel=up)
         axis.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
     # The left side of a car stands at the left of who drives behind it.
     back.invert_xaxis()
-    if values[1] != 1.0:
-        back.set_title(f"from behind, motion x {values[1]:g}")
-    for h, look in zip(runs, looks, strict=True) if moves else ():
-        (path,) = side.plot([], [], **look | {"linewidth": 0.6})
+    if factor != 1.0:
+        back.set_title(f"from behind, motion x {factor:g}")
+    for h, look in zip(runs, looks, strict=True):
+        (path,) = above.plot([], [], **look | {"linewidth": 0.6})
         paths.append((path, np.stack([h[name] for name in PLACE[:2]])))
 
     def show(frame: int) -> None:
@@ -283,12 +211,11 @@ def _film(
         for path, driven in paths:
             path.set_data(*driven[:, : frame + 1])
         figure.suptitle(f"t = {times[frame]:.1f} s")
-        if moves:
-            (x, y, _) = position[frame, 0]
-            side.set(xlim=(x - ALONG, x + ALONG), ylim=(y - ACROSS, y + ACROSS))
+        x, y, _ = position[frame, 0]
+        above.set(xlim=(x - ALONG, x + ALONG), ylim=(y - ACROSS, y + ACROSS))
 
     show(0)
-    handles = [curve for curve, _ in moving if curve.axes is side]
+    handles = [curve for curve, _ in moving if curve.axes is above]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     figure.draw_without_rendering()
     # The panels stay where they are while the numbers beside them change.
@@ -320,19 +247,6 @@ def _quantities(dataset: xr.Dataset, outputs: str) -> dict[str, np.ndarray]:
             columns = dataset[variable].transpose(kind, "time").values
             quantities |= zip(map(str, dataset[kind].values), columns, strict=True)
     return quantities
-
-
-def _scene(runs: Sequence[Values]) -> Scene:
-    """What can be drawn of all runs; `InputError` names what is missing."""
-    common = set.intersection(*map(set, runs))
-    lacking: dict[str, list[str]] = {}
-    for name, scene in SCENES.items():
-        lacking[name] = [quantity for quantity in scene.needed if quantity not in common]
-        if not lacking[name]:
-            return scene
-    nearest = min(lacking, key=lambda name: len(lacking[name]) / len(SCENES[name].needed))
-    missing = ", ".join(lacking[nearest])
-    raise InputError(f"no film of these runs: to draw {nearest} it lacks {missing}")
 
 
 def _parameters(run: Any) -> dict[str, Any]:

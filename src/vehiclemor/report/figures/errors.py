@@ -1,20 +1,16 @@
-"""Errors of any study over what it varies or samples, or of one point.
+"""Errors of any study over what it varies, or of one point.
 
-Which picture it is follows from the dimensions of the study's grid, whatever model and methods it
-has: curves over one, a map over two where more varies, clouds over samples.
+Curves go over one dimension of the study's grid, whatever model and methods it has; where there
+would be too many, they show the largest error over the others.
 """
 
 import itertools
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from math import ceil
-from typing import Literal, NamedTuple
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from vehiclemor.exceptions import InputError
@@ -28,8 +24,8 @@ from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
-# Lines of a panel, and sampled quantities with panels.
-LINES, SAMPLED = 8, 3
+# Lines of a panel.
+LINES = 8
 # Letters of an axis' label in a line.
 LETTERS = 38
 # Between marks of two lines above the axes, as a share of their height.
@@ -39,23 +35,8 @@ OFF: tuple[tuple[Style, float, str, Callable[[np.ndarray], np.ndarray]], ...] = 
     (theme.CROSS, 1.0, "a run has failed", lambda errors: ~np.isfinite(errors)),
     (theme.ZERO, 0.0, "error 0, off the log axis", lambda errors: errors == 0.0),
 )
-# Of samples that have no quantity.
-SORTED = "sorted by error"
-# Columns of maps, and cells of a map with their number.
-COLUMNS, WRITTEN = 3, 100
-# In % of the cells, those whose small errors the colours leave out; part of the colours on which
-# white has more contrast than black.
-LEAST, DARK = 2.0, 120 / 256
 # Label -> text, errors on the dimensions output and the axis.
 Lines = Mapping[str, tuple[str, xr.DataArray]]
-
-
-class Picture(NamedTuple):
-    """How errors of a study are drawn: the kind, the dimensions on axes, and those left over."""
-
-    kind: Literal["curves", "cloud", "map"]
-    axes: Sequence[str]
-    rest: Sequence[str]
 
 
 def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
@@ -71,86 +52,44 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
     saturated = saturated_ranks(dataset)
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
     lines = _lines(errors, methods, varied[1:], saturated)
-    picture = choose_picture(varied, len(lines), len(methods))
-    if picture.kind != "curves":
-        errors = errors.max(picture.rest)
-        lines = {label: (text, errors.sel(label=label)) for label, text in methods.items()}
-    axis = varied[0]
-    match picture.kind:
-        case "map":
-            figure = _map(dataset, errors, methods, outputs, picture.axes)
-        case "cloud":
-            figure = _panels(dataset, axis, _sampled(dataset, axis), outputs, lines)
-        case "curves":
-            figure = _panels(dataset, axis, [ticks_of(dataset, axis)], outputs, lines)
+    notes: list[str] = []
+    if len(lines) > max(LINES, len(methods)):
+        largest = errors.max(varied[1:])
+        lines = {label: (text, largest.sel(label=label)) for label, text in methods.items()}
+        notes.append(f"the largest error over {_listed(varied[1:])}")
+    figure = _panels(dataset, varied[0], outputs, lines)
     _mark_saturation(figure, [f"{methods[m]} saturates at {r}" for m, r in saturated.items()])
-    if notes := _notes(dataset, picture, errors, methods):
-        figure.suptitle(notes, fontsize="medium")
+    trained = labels.trained_runs(dataset).sel(label=list(methods))
+    if number := int(trained.sum()):
+        notes.append(f"{number} of {trained.size} runs were in their own training")
+    if notes:
+        figure.suptitle("\n".join(notes), fontsize="medium")
     theme.legend_below(figure, figure.axes)
     return figure
-
-
-def choose_picture(varied: Sequence[str], lines: int, methods: int) -> Picture:
-    """Clouds over samples, a map over both factors or of many lines, else curves."""
-    axis, *others = varied
-    kind, axes = "curves", [axis]
-    if _is_sample(axis):
-        kind = "cloud"
-    elif set(FACTORS) <= set(varied):
-        kind, axes = "map", list(FACTORS)
-    elif lines > max(LINES, methods):
-        kind, axes = "map", [axis, others[0]]
-    return Picture(kind, axes, [name for name in others if name not in axes])
-
-
-def _notes(
-    dataset: xr.Dataset, picture: Picture, errors: xr.DataArray, methods: Mapping[str, str]
-) -> str:
-    """Lines above the panels: what is drawn, and how many runs were trained on."""
-    notes: list[str] = []
-    if picture.kind == "cloud":
-        notes.append(f"{dataset.sizes[picture.axes[0]]} samples")
-    if picture.kind != "curves" and picture.rest:
-        notes.append(f"the largest error over {_listed(picture.rest)}")
-    if picture.kind == "map" and bool(np.isinf(errors).any()):
-        notes.append("a cross where a run has failed")
-    lines = [", ".join(notes)]
-    trained = labels.trained_runs(dataset).sel(label=list(methods))
-    if count := int(trained.sum()):
-        lines.append(f"{count} of {trained.size} runs were in their own training")
-    return "\n".join(filter(None, lines))
 
 
 def _mark_saturation(figure: Figure, texts: Sequence[str]) -> None:
     """Say beside axes of ranks which methods reach their largest rank."""
     for panel in figure.axes if texts else ():
-        for axis in (panel.xaxis, panel.yaxis):
-            if axis.get_label_text() == "rank":
-                axis.set_label_text(textwrap.fill(f"rank; {', '.join(texts)}", LETTERS))
+        if panel.get_xlabel() == "rank":
+            panel.set_xlabel(textwrap.fill(f"rank; {', '.join(texts)}", LETTERS))
 
 
-def _panels(
-    dataset: xr.Dataset, axis: str, ticks: Sequence[Ticks], outputs: Sequence[str], lines: Lines
-) -> Figure:
-    """A panel for each output, or a row of them where there are several axes."""
-    cells = list(itertools.product(outputs, ticks))
-    columns = len(ticks) if len(ticks) > 1 else len(outputs)
-    rows = len(cells) // columns
-    size = (6.7 if columns < 3 else 8.5, 2.5 * rows + 0.8)
-    figure, grid = theme.panels(rows, columns, size)
-    for number, (panel, (output, at)) in enumerate(zip(grid.flat, cells, strict=True)):
+def _panels(dataset: xr.Dataset, axis: str, outputs: Sequence[str], lines: Lines) -> Figure:
+    """A panel for each output."""
+    ticks = ticks_of(dataset, axis)
+    size = 6.7 if len(outputs) < 3 else 8.5, 3.3
+    figure, grid = theme.panels(1, len(outputs), size)
+    for number, (panel, output) in enumerate(zip(grid.flat, outputs, strict=True)):
         panel.set_title(theme.letter(number))
-        _draw_panel(panel, dataset, output, axis, at, lines)
-        at.scale(panel)
-        # Of panels above each other the lowest has the label of their axis.
-        if number + columns < len(cells):
-            panel.set_xlabel("")
+        _draw_panel(panel, dataset, output, axis, ticks, lines)
+        ticks.scale(panel)
     return figure
 
 
-def _is_sample(dimension: str) -> bool:
+def _is_seed(dimension: str) -> bool:
     """Whether values of a dimension have no order."""
-    return dimension == "sample" or dimension.endswith("_seed")
+    return dimension.endswith("_seed")
 
 
 def _varied(dataset: xr.Dataset) -> list[str]:
@@ -161,7 +100,7 @@ def _varied(dataset: xr.Dataset) -> list[str]:
 
     # A factor goes before a setting with as many values.
     def order(name: str) -> tuple[bool, bool, int, bool]:
-        return _is_sample(name), name in numbers, sizes[name], name in FACTORS
+        return _is_seed(name), name in numbers, sizes[name], name in FACTORS
 
     return sorted(names, key=order, reverse=True)
 
@@ -196,42 +135,18 @@ def _lines(
     return lines
 
 
-def _sampled(dataset: xr.Dataset, sample: str) -> list[Ticks]:
-    """Sampled quantities, those first that the errors follow most (rank correlation)."""
-    names: list[str] = []
-    for name, values in dataset.coords.items():
-        is_number = name != sample and values.dims == (sample,) and values.dtype.kind == "f"
-        if is_number and np.ptp(values.values) > 0.0:
-            names.append(str(name))
-    errors = dataset["rms_error"]
-    ranks = pd.Series(errors.mean([d for d in errors.dims if d != sample])).rank()
-
-    def follows(name: str) -> float:
-        return abs(ranks.corr(pd.Series(dataset[name].values).rank()))
-
-    if names:
-        names = sorted(names, key=follows, reverse=True)[:SAMPLED]
-        return [ticks_of(dataset, name) for name in names]
-    return [Ticks(np.arange(len(ranks)), f"{_listed([sample])}, {SORTED}")]
-
-
 def _draw_panel(
     axis: Axes, dataset: xr.Dataset, output: str, dimension: str, ticks: Ticks, lines: Lines
 ) -> None:
     """Lines of one output; over perturbations the published error."""
-    cloud = _is_sample(dimension)
     methods = theme.methods_of(dataset)
     looks, marks = theme.styles(lines, methods), theme.marks(lines, methods)
     for name, (text, errors) in lines.items():
         values = errors.sel(output=output).values.ravel()
         look: Style = {**looks[name], "marker": marks[name], "markersize": 3.5}
-        # Names and samples have no order that a line could follow.
-        if ticks.names or cloud:
+        # Names and seeds have no order that a line could follow.
+        if ticks.names or _is_seed(dimension):
             look["linestyle"] = "none"
-        if cloud:
-            look |= {"alpha": 0.6, "markeredgewidth": 0.0, "rasterized": len(ticks.at) > 1000}
-        if ticks.label.endswith(SORTED):
-            values = np.sort(values)
         visible = np.isfinite(values) & (values > 0.0)
         axis.plot(ticks.at, np.where(visible, values, np.nan), label=text, **look)
         for mark, height, _, is_off in OFF:
@@ -259,83 +174,6 @@ def _draw_off(axis: Axes, at: np.ndarray, mark: Style, height: float, color: str
 
 def _count_marked(axis: Axes, mark: Style) -> int:
     return sum(line.get_marker() == mark["marker"] for line in axis.lines)
-
-
-def _map(
-    dataset: xr.Dataset,
-    errors: xr.DataArray,
-    methods: Mapping[str, str],
-    outputs: Sequence[str],
-    axes: Sequence[str],
-) -> Figure:
-    """Errors over two dimensions (across and upwards), a column for each method.
-
-    Of few cells each has its number.
-    Colours leave out the least errors, as that of the training run, far below all others.
-    """
-    errors = errors.squeeze([d for d in errors.dims if d not in ("output", "label", *axes)])
-    errors = errors.transpose("output", "label", *reversed(axes))
-    each = ceil(len(methods) / COLUMNS)
-    columns = ceil(len(methods) / each)
-    size = 3.35 * columns, 2.8 * each * len(outputs) + 0.3
-    figure, grid = theme.panels(each * len(outputs), columns, size, sharex=True, sharey=True)
-    across, up = (ticks_of(dataset, name).even() for name in axes)
-    written = across.at.size * up.at.size <= WRITTEN
-    for row, output in enumerate(outputs):
-        block = grid[row * each : (row + 1) * each]
-        values = errors.sel(output=output, label=list(methods)).values
-        colored = values[np.isfinite(values) & (values > 0.0)]
-        # A map on which nothing differs from zero, or nothing has come to its end, is still one.
-        if not colored.size:
-            colored = np.array([1.0, 10.0])
-        factor, unit = 1.0, labels.unit_of(dataset, output)
-        if written:
-            factor, unit = labels.readable_unit(float(np.median(colored)), unit)
-        low, high = factor * np.percentile(colored, (LEAST, 100.0), method="higher")
-        norm = LogNorm(low, high, clip=True)
-        for number, (axis, text) in enumerate(zip(block.flat, methods.values(), strict=False)):
-            _draw_cells(axis, across.at, up.at, factor * values[number], norm, written=written)
-            axis.set_title(theme.letter(row * len(methods) + number, text))
-        label = labels.error_label(dataset, "RMS error", output, unit)
-        extend = "min" if factor * colored.min() < low else None
-        bar = figure.colorbar(block[0, 0].collections[0], ax=block, label=label, extend=extend)
-        tick_decades(bar.ax.yaxis, low, high)
-        for axis in block[:, 0]:
-            up.tick(axis.yaxis)
-    for axis in grid.flat if each > 1 else grid[-1]:
-        across.tick(axis.xaxis)
-        axis.tick_params(labelbottom=True)
-    # They share the ticks of the others until these are set.
-    for axis in grid.flat:
-        if not axis.collections:
-            axis.remove()
-    return figure
-
-
-def _draw_cells(
-    axis: Axes, x: np.ndarray, y: np.ndarray, values: np.ndarray, norm: LogNorm, *, written: bool
-) -> None:
-    """Cells in colours, with their numbers if `written`; a run that has failed has a cross."""
-    failed = ~np.isfinite(values)
-    style: Style = {"cmap": "cividis", "shading": "nearest", "rasterized": True}
-    cells = np.where(failed, np.nan, np.maximum(values, norm.vmin or 0.0))
-    axis.pcolormesh(x, y, cells, norm=norm, **style)
-    j, i = np.nonzero(failed)
-    axis.plot(x[i], y[j], color="#D55E00", **theme.CROSS)
-    axis.grid(visible=False)
-    for j, i in np.argwhere(~failed) if written else ():
-        color = "white" if norm(cells[j, i]) < DARK else "black"
-        text: Style = {"ha": "center", "va": "center", "fontsize": 7, "color": color}
-        axis.text(float(x[i]), float(y[j]), two_digits(float(values[j, i])), **text)
-
-
-def two_digits(value: float) -> str:
-    """A number with two significant digits, below a hundredth with one, without an exponent."""
-    if value == 0.0:
-        return "0"
-    rounded = float(f"{value:.1e}")
-    decimals = (1 if rounded >= 0.01 else 0) - int(np.floor(np.log10(abs(rounded))))
-    return f"{value:.{max(0, decimals)}f}"
 
 
 def _of_a_point(dataset: xr.Dataset, methods: Mapping[str, str]) -> Figure:

@@ -13,10 +13,6 @@ from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
 from vehiclemor.report.figures.costs import figure_pareto
 from vehiclemor.report.figures.errors import figure_errors
-from vehiclemor.report.figures.handling import (
-    figure_frequency_response,
-    figure_sine_with_dwell,
-)
 from vehiclemor.report.figures.runs import PATH, figure_histories, figure_paths
 from vehiclemor.report.figures.theme import save_figure, styled, tell_empty
 from vehiclemor.report.labels import main_outputs, tabled_outputs
@@ -42,8 +38,6 @@ PICTURES = {
         ),
     ),
     "paths": Picture("Paths in the plane, distances from full order below", figure_paths),
-    "frequency_response": Picture("Gain and phase over frequency", figure_frequency_response),
-    "sine_with_dwell": Picture("Steering and yaw rate", figure_sine_with_dwell),
     "errors": Picture("RMS errors", lambda data: figure_errors(data, outputs=shown_outputs(data))),
     "pareto": Picture("Worst error over bound, over time", figure_pareto),
 }

@@ -18,9 +18,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
-from vehiclemor.arguments import count, quoted
 from vehiclemor.exceptions import InputError
-from vehiclemor.files import NO_FILE, begins_with, replaceable, write_whole
+from vehiclemor.files import begins_with, replaceable, write_whole
 from vehiclemor.report.labels import MARK, TRAINED, MethodLook, declared, raised
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
@@ -146,14 +145,6 @@ class Ticks(NamedTuple):
             panel.set_xscale("log")
         self.tick(panel.xaxis)
 
-    def even(self) -> "Ticks":
-        """Cells of one size: numbers at unequal distances become names."""
-        steps = np.diff(self.at)
-        if self.names or np.allclose(steps, steps.mean(), rtol=1e-6):
-            return self
-        names = [f"{value:.4g}".replace("-", "\N{MINUS SIGN}") for value in self.at]
-        return Ticks(np.arange(len(names)), self.label, names)
-
 
 def ticks_of(dataset: xr.Dataset, name: str) -> Ticks:
     """Ticks of a dimension of a grid, or of a coordinate on one."""
@@ -216,19 +207,9 @@ def tell_empty(figure: Figure) -> None:
             axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes)
 
 
-def styled(style: str = "", dpi: int | None = None) -> AbstractContextManager[None]:
-    """The package's style, with a style of Matplotlib (name or file) on top, and dots an inch."""
-    dots = {} if dpi is None else {"savefig.dpi": count("dpi", dpi, 10, 2400)}
-    try:
-        if style and Path(style).exists() and not Path(style).is_file():
-            raise ValueError(NO_FILE)
-        changes = [OWN_STYLE, *([style] if style else []), dots]
-        with matplotlib.style.context(changes):
-            pass
-    except (OSError, TypeError, ValueError):
-        known = ", ".join(name for name in matplotlib.style.available if name[0] != "_")
-        raise InputError(f"style is {quoted(style)}, neither a file nor one of {known}") from None
-    return matplotlib.style.context(changes)
+def styled(style: str = "") -> AbstractContextManager[None]:
+    """The package's style, with a style of Matplotlib (name or file) on top."""
+    return matplotlib.style.context([OWN_STYLE, *([style] if style else [])])
 
 
 def picture_path(path: Path) -> Path:

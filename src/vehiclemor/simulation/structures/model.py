@@ -1,8 +1,8 @@
-"""Structural models (kind `structural`) ready to run, and runs through control periods."""
+"""Structural models (kind `structural`) ready to run, and the step sizes of their runs."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -55,109 +55,86 @@ ROUNDING, SYMMETRIC = 1e-6, 1e-9
 STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 100
 
 
-@dataclass(frozen=True, eq=False)
-class Periods:
-    """Structures that follow one another in time; the full one is a single period.
+def run_of(
+    system: StructuralSystem,
+    maneuver: Excitation,
+    accuracy: tuple[float, float],
+    alike: np.ndarray,
+    recorded: bool,
+) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray, int], str]:
+    """A run from the static state, see `StructuralSystem.integrate`, and a remark on its steps.
 
-    The next one begins at an edge, a time in s, where coordinates are those before times the matrix
-    by which they are passed.
+    The accuracy is a tolerance and a step size in s; unless it is 0, the step size counts and the
+    tolerance does not.  `alike` are numbers (outputs,) of their units.
     """
+    tolerance, step = accuracy
+    if step:
+        every, remark = max(round(spacing_of(maneuver) / step), 1), ""
+    else:
+        key, known = (maneuver, tolerance), system.steps_of_runs
+        if key not in known:
+            if len(known) >= MOST_RUNS:
+                known.clear()
+            known[key] = steps_between(system, maneuver, tolerance, alike)
+        every, remark = known[key]
+    return first_samples(system, maneuver, every, maneuver.samples, recorded=recorded), remark
 
-    systems: tuple[StructuralSystem, ...]
-    edges: tuple[float, ...] = ()
-    passed: tuple[np.ndarray, ...] = ()
-    _steps: dict[Any, tuple[int, str]] = field(default_factory=dict)
 
-    def integrate(
-        self,
-        maneuver: Excitation,
-        accuracy: tuple[float, float],
-        alike: np.ndarray,
-        recorded: bool,
-    ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray, int], str]:
-        """A run from the static state, see `StructuralSystem.integrate`, and a remark on its steps.
+def first_samples(
+    system: StructuralSystem,
+    maneuver: Excitation,
+    every: int,
+    samples: int,
+    begin: int = 0,
+    recorded: bool = False,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """The first samples of a run with so many steps between output times.
 
-        The accuracy is a tolerance and a step size in s; unless it is 0, the step size counts and
-        the tolerance does not.  `alike` are numbers (outputs,) of their units.
-        """
-        tolerance, step = accuracy
-        if step:
-            every, remark = max(round(spacing_of(maneuver) / step), 1), ""
-        else:
-            key = maneuver, tolerance
-            if key not in self._steps:
-                if len(self._steps) >= MOST_RUNS:
-                    self._steps.clear()
-                self._steps[key] = self.steps(maneuver, tolerance, alike)
-            every, remark = self._steps[key]
-        return self.steps_of(maneuver, every, maneuver.samples, recorded), remark
+    One that begins at a later sample does so at rest, and its inputs are what is beyond their
+    first.
+    """
+    last = begin + samples - 1
+    inputs = inputs_at_steps(maneuver, every)[begin * every : last * every + 1]
+    if begin:
+        inputs = inputs - inputs[0]
+    state = np.zeros((3, system.structure.size))
+    return system.integrate(state, inputs, spacing_of(maneuver) / every, every, recorded)
 
-    def steps_of(
-        self, maneuver: Excitation, every: int, samples: int, recorded: bool = False, begin: int = 0
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-        """The first samples of a run with so many steps between output times.
 
-        One that begins later does so at rest, and its inputs are what is beyond their first.
-        """
-        inputs = inputs_at_steps(maneuver, every)
-        if begin:
-            inputs = inputs[begin * every :] - inputs[begin * every]
-        spacing = spacing_of(maneuver)
-        edges = [round(edge / spacing) - begin for edge in self.edges]
-        ends = [min(max(edge, 0), samples - 1) for edge in edges] + [samples - 1]
-        state, first, parts = np.zeros((3, self.systems[0].structure.size)), 0, []
-        for k, (system, end) in enumerate(zip(self.systems, ends, strict=True)):
-            if k:
-                state = state @ self.passed[k - 1].T
-            part = inputs[first * every : end * every + 1]
-            parts.append(system.integrate(state, part, spacing / every, every, recorded))
-            first = end
-            if parts[-1][3]:
-                break
-        histories = np.full((samples, parts[0][0].shape[1]), np.nan)
-        states = np.full((samples if recorded else 0, parts[0][1].shape[1]), np.nan)
-        first = 0
-        for part, end in zip(parts, ends, strict=False):
-            # The sample on an edge is of the period before: accelerations there follow from two.
-            new = int(first > 0)
-            histories[first + new : end + 1] = part[0][new:]
-            if recorded:
-                states[first + new : end + 1] = part[1][new:]
-            first = end
-        return histories, states, np.sum([part[2] for part in parts], axis=0), parts[-1][3]
+def steps_between(
+    system: StructuralSystem, maneuver: Excitation, tolerance: float, alike: np.ndarray
+) -> tuple[int, str]:
+    """Steps between output times of this accuracy, and a remark if no step is short enough.
 
-    def steps(self, maneuver: Excitation, tolerance: float, alike: np.ndarray) -> tuple[int, str]:
-        """Steps between output times of this accuracy, and a remark if no step is short enough.
-
-        A part of a run, in which its inputs change most, is repeated with half the step, as long as
-        outputs differ by more than the tolerance times their range; the method is of second order.
-        """
-        spacing = spacing_of(maneuver)
-        if spacing > LONGEST_SPACING:
-            # A few output times don't show the motion between them.
-            inner = int(np.ceil(spacing / LONGEST_SPACING))
-            every, remark = self.steps(maneuver.subdivided(inner), tolerance, alike)
-            return inner * every, remark
-        every = max(round(spacing / FIRST_STEP), 1)
-        least, most = (max(round(spacing / h), 1) for h in (LONGEST_STEP, SHORTEST_STEP))
-        samples = min(round(TRIED / spacing) + 1, maneuver.samples)
-        begin = window_of_largest_input_change(maneuver, samples)
-        coarse = self.steps_of(maneuver, every, samples, begin=begin)[0]
-        while True:
-            fine = self.steps_of(maneuver, 2 * every, samples, begin=begin)[0]
-            # Their difference is three quarters of the coarse one's error.
-            error = 4.0 / 3.0 * relative_error(coarse, fine, alike)
-            if not error > tolerance or every >= most:
-                break
-            every, coarse = min(2 * every, most), fine
-        # Errors grow with the square of the step.
-        while every > least and not every % 2 and 5.0 * error < tolerance:
-            every, error = every // 2, 4.0 * error
-        remark = ""
-        if error > tolerance:
-            left = f"an error of {error:.1e} of an output's range"
-            remark = f"steps of {spacing / every:.3g} s leave {left}"
-        return every, remark
+    A part of a run, in which its inputs change most, is repeated with half the step, as long as
+    outputs differ by more than the tolerance times their range; the method is of second order.
+    """
+    spacing = spacing_of(maneuver)
+    if spacing > LONGEST_SPACING:
+        # A few output times don't show the motion between them.
+        inner = int(np.ceil(spacing / LONGEST_SPACING))
+        every, remark = steps_between(system, maneuver.subdivided(inner), tolerance, alike)
+        return inner * every, remark
+    every = max(round(spacing / FIRST_STEP), 1)
+    least, most = (max(round(spacing / h), 1) for h in (LONGEST_STEP, SHORTEST_STEP))
+    samples = min(round(TRIED / spacing) + 1, maneuver.samples)
+    begin = window_of_largest_input_change(maneuver, samples)
+    coarse = first_samples(system, maneuver, every, samples, begin)[0]
+    while True:
+        fine = first_samples(system, maneuver, 2 * every, samples, begin)[0]
+        # Their difference is three quarters of the coarse one's error.
+        error = 4.0 / 3.0 * relative_error(coarse, fine, alike)
+        if not error > tolerance or every >= most:
+            break
+        every, coarse = min(2 * every, most), fine
+    # Errors grow with the square of the step.
+    while every > least and not every % 2 and 5.0 * error < tolerance:
+        every, error = every // 2, 4.0 * error
+    remark = ""
+    if error > tolerance:
+        left = f"an error of {error:.1e} of an output's range"
+        remark = f"steps of {spacing / every:.3g} s leave {left}"
+    return every, remark
 
 
 def spacing_of(maneuver: Excitation) -> float:
@@ -235,11 +212,6 @@ class StructuralModel(Model):
         return StructuralSystem(structure, self._static_law(structure))
 
     @cached_property
-    def _whole(self) -> Periods:
-        """The full structure, with the step sizes of its runs."""
-        return Periods((self.system,))
-
-    @cached_property
     def _alike(self) -> np.ndarray:
         """Numbers (outputs,) of the units of the outputs."""
         units = [quantity.unit for quantity in self.definition.outputs]
@@ -298,23 +270,21 @@ class StructuralModel(Model):
     def run(
         self,
         maneuver: Excitation,
-        periods: Periods | None = None,
+        system: StructuralSystem | None = None,
         tolerance: float = USUAL,
         outputs: Names = None,
         recorded: bool = False,
         step: float = 0.0,
     ) -> Trajectory:
-        """A run of the full structure, or of reduced ones by period; it records a divergence.
+        """A run of the full structure, or of a reduced one; it records a divergence.
 
         If recorded, the trajectory has all n coordinates.  With a step in s, the tolerance does not
         count.
         """
         maneuver = checked_maneuver(maneuver, self.definition)
         names = None if outputs is None else output_names(outputs)
-        periods = periods or self._whole
-        ((histories, states, counts, reason), remark), seconds = timed(
-            lambda: periods.integrate(maneuver, (tolerance, step), self._alike, recorded)
-        )
+        chosen = system or self.system, maneuver, (tolerance, step), self._alike, recorded
+        ((histories, states, counts, reason), remark), seconds = timed(lambda: run_of(*chosen))
         times, inputs = maneuver.recorded_inputs
         failure = ""
         if reason:

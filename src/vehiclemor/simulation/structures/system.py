@@ -91,11 +91,13 @@ class PortLaw:
 class StructuralSystem:
     """A structure with the law of its ports, full or reduced, as the time loop takes it.
 
-    Coordinates are those of the motion about the static state.
+    Coordinates are those of the motion about the static state.  What is cached of runs are, by
+    maneuver and tolerance, steps between output times and a remark.
     """
 
     structure: Structure
     law: PortLaw
+    steps_of_runs: dict[Any, tuple[int, str]] = field(default_factory=dict)
     _step_matrices: dict[tuple[float, float], Ready] = field(default_factory=dict)
 
     @cached_property

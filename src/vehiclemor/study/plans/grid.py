@@ -24,7 +24,7 @@ from vehiclemor.study.experiment import (
 )
 from vehiclemor.study.plans.logs import windows
 from vehiclemor.study.plans.study_file import GridFile, MethodEntry
-from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER, TEXTS, Sampling, values
+from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER, TEXTS, values
 from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Overrides, Scenario, Values, check, overrides, with_parameters
 
@@ -38,15 +38,13 @@ KEY = "S20"
 class Grid:
     """Experiments of a study on its dimensions, the last of which is `label`.
 
-    `samples` are the values on the dimension `sample`, by name; `keys` those of the experiments at
-    all points; `experiments` have each once, by its key.
+    `keys` are those of the experiments at all points; `experiments` have each once, by its key.
     """
 
     name: str
     definition: GridFile
     model: Model
     dimensions: dict[str, list[Any]]
-    samples: dict[str, list[float]]
     keys: np.ndarray
     experiments: dict[str, Experiment]
 
@@ -58,8 +56,7 @@ def expand(name: str, study: GridFile, folder: Path = Path()) -> Grid:
     """
     try:
         model = build(study.model, overrides=study.parameters)
-        samples = sampled(study.sampling) if study.sampling else {}
-        dimensions = _dimensions(model, study, samples)
+        dimensions = _dimensions(model, study)
         driven = _driven(model, study, folder)
         if study.logs:
             dimensions = {"maneuver": [*driven]} | dimensions
@@ -69,7 +66,7 @@ def expand(name: str, study: GridFile, folder: Path = Path()) -> Grid:
         experiments: dict[str, Experiment] = {}
         axes = {name: points for name, points in dimensions.items() if name != "label"}
         for number, entry in enumerate(study.methods):
-            points = _points(axes, samples)
+            points = _points(axes)
             of_method = list(_of_method(model, study, entry, points, driven))
             # Settings that a method does not have give no further experiments of it.
             experiments |= {experiment.key: experiment for experiment in of_method}
@@ -79,22 +76,18 @@ def expand(name: str, study: GridFile, folder: Path = Path()) -> Grid:
         raise
     except (InputError, GeometryError) as error:
         raise FileError(f"study {name}: {error}") from None
-    return Grid(name, study, model, dimensions, samples, keys, experiments)
+    return Grid(name, study, model, dimensions, keys, experiments)
 
 
-def _dimensions(
-    model: Model, study: GridFile, samples: Mapping[str, list[float]]
-) -> dict[str, list[Any]]:
+def _dimensions(model: Model, study: GridFile) -> dict[str, list[Any]]:
     """Name -> values of every dimension, checked."""
     settings = {s for entry in study.methods for s in default_settings(model, entry.method)}
     known = settings | {*FACTORS, *TEXTS} | {f"{PARAMETER}{n}" for n in model.parameters.entries}
     for dimension in study.grid:
         if dimension not in known and not dimension.startswith(PARAMETER):
             raise unknown("grid dimension", dimension, known)
-    dimensions: dict[str, list[Any]] = {name: [1.0] for name in FACTORS if name not in samples}
+    dimensions: dict[str, list[Any]] = {name: [1.0] for name in FACTORS}
     dimensions |= {key: values(entry) for key, entry in study.grid.items()}
-    if study.sampling:
-        dimensions["sample"] = list(range(study.sampling.count))
     dimensions.setdefault("start", list(study.start or [model.starts[0]]))
     if len(set(dimensions["start"])) != len(dimensions["start"]):
         raise InputError("start has the same value twice")
@@ -136,15 +129,10 @@ def _check_histories(
         raise InputError('maneuvers of other output times need keep = "metrics"')
 
 
-def _points(
-    dimensions: Mapping[str, list[Any]], samples: Mapping[str, list[float]]
-) -> Iterator[dict[str, Any]]:
-    """Name of a dimension, or of what is sampled -> value, at every point."""
+def _points(dimensions: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
+    """Name of a dimension -> value, at every point."""
     for coordinates in itertools.product(*dimensions.values()):
-        point = dict(zip(dimensions, coordinates, strict=True))
-        for name, values_of_samples in samples.items():
-            point[name] = values_of_samples[point["sample"]]
-        yield point
+        yield dict(zip(dimensions, coordinates, strict=True))
 
 
 def _of_method(
@@ -211,19 +199,3 @@ def _checked(
 
 
 _training = lru_cache(maxsize=4096)(training_set)
-
-
-def sampled(plan: Sampling) -> dict[str, list[float]]:
-    """Name of a range -> its values (count,) at the points of a plan, the same for the same seed.
-
-    A Latin hypercube has one point in each of `count` slices of every range (M. McKay, R. Beckman,
-    W. Conover, Technometrics 21 (1979), 239-245).  Sobol points are scrambled (A. Owen, J.
-    Complexity 14 (1998), 466-489).
-    """
-    from scipy.stats import qmc
-
-    kind = qmc.Sobol if plan.plan == "sobol" else qmc.LatinHypercube
-    points = kind(len(plan.ranges), rng=np.random.default_rng(plan.seed)).random(plan.count)
-    low, high = np.array(list(plan.ranges.values())).T
-    spread = low + (high - low) * points
-    return {name: spread[:, j].tolist() for j, name in enumerate(plan.ranges)}

@@ -81,12 +81,10 @@ def _with_attributes(
 
 
 def _coordinates(grid: Grid) -> dict[str, Any]:
-    """Values of the dimensions, and of what is sampled; with meanings."""
+    """Values of the dimensions, with meanings."""
     values: dict[str, tuple[str, list[Any]]] = {}
     for name, points in grid.dimensions.items():
         values[name] = name, points
-    for name, points in grid.samples.items():
-        values[name] = "sample", points
     values["method"] = "label", [entry.method for entry in grid.definition.methods]
     return {
         name: (dimension, points, described(grid.model, name))

@@ -19,7 +19,6 @@ from vehiclemor.study.plans.study_runs import (
     Draw,
     Group,
     Limit,
-    Sampling,
     list_of,
     table_of,
     values,
@@ -189,9 +188,6 @@ class GridFile(StudyOfModel):
         "dimension -> values; frequency_factor, amplitude_factor, parameters.NAME, "
         "maneuver, start, training, or any setting"
     )
-    sampling: Sampling | None = Field(
-        None, description="points of a dimension `sample` beside those of the grid"
-    )
 
     @property
     def trained_on(self) -> str:
@@ -202,8 +198,7 @@ class GridFile(StudyOfModel):
     def points(self) -> int:
         """Number of points; one run may stand at several of them."""
         sizes = [len(values(axis)) for axis in self.grid.values()]
-        sizes += [len(self.start) or 1, self.sampling.count if self.sampling else 1]
-        return math.prod(sizes) * len(self.methods)
+        return math.prod(sizes) * (len(self.start) or 1) * len(self.methods)
 
     @field_validator("training_set")
     @classmethod
@@ -235,18 +230,15 @@ class GridFile(StudyOfModel):
         of_study |= {name for name in ("maneuver", "start") if getattr(self, name)}
         if self.logs and "maneuver" in of_study | set(self.grid):
             raise ValueError("give a maneuver or logs, not both")
-        sampled = set(self.sampling.ranges) if self.sampling else set()
-        axes = {"grid": set(self.grid), "sampling": sampled}
-        names_by_part = axes | {"study": of_study}
+        names_by_part = {"study": of_study}
         for label, entry in self.labelled.items():
             names = set(entry.settings)
             if entry.training:
                 names.add("training")
             names_by_part[f"settings of {label}"] = names
-        for axis, part in itertools.product(axes, names_by_part):
-            double = axes[axis] & names_by_part[part]
-            if double and axis != part:
-                raise ValueError(f"{min(double)} is set twice: in the {axis} and in the {part}")
+        for part, names in names_by_part.items():
+            if double := names & self.grid.keys():
+                raise ValueError(f"{min(double)} is set twice: in the grid and in the {part}")
         return self
 
 

@@ -1,7 +1,7 @@
-"""What a study file runs: axes and samples of a grid, groups and boxes of a test."""
+"""What a study file runs: axes of a grid, groups and boxes of a test."""
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
@@ -71,31 +71,6 @@ Axis = Annotated[
     Annotated[list[int | float | str], Tag("values")] | Annotated[Span, Tag("span")],
     Discriminator(lambda value: "span" if isinstance(value, Span | dict) else "values"),
 ]
-
-
-class Sampling(FileSchema):
-    """Points spread over ranges, instead of every combination of some values."""
-
-    plan: Literal["latin_hypercube", "sobol"] = Field(description="how points are spread")
-    count: int = Field(ge=1, le=MOST_POINTS, description="how many; of sobol a power of two")
-    seed: int = Field(ge=0, description="the same seed gives the same points")
-    ranges: dict[str, list[float]] = Field(
-        description="[from, to] of parameters.NAME, frequency_factor or amplitude_factor"
-    )
-
-    @model_validator(mode="after")
-    def _sound(self) -> "Sampling":
-        if not self.ranges:
-            raise ValueError("ranges is empty")
-        for name, limits in self.ranges.items():
-            # Of a range that overflows no point could be taken.
-            if len(limits) != 2 or not 0.0 < limits[1] - limits[0] < math.inf:
-                raise ValueError(f"ranges: {name} is not [from, to]")
-            if name not in FACTORS and not name.startswith(PARAMETER):
-                raise ValueError(f"ranges: {name} is neither parameters.NAME nor a factor")
-        if self.plan == "sobol" and self.count & (self.count - 1):
-            raise ValueError(f"count: {self.count} is no power of two, as a sobol plan needs it")
-        return self
 
 
 def values(entry: Axis) -> list[int | float | str]:

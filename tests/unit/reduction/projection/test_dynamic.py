@@ -1,4 +1,4 @@
-"""Projected equations of motion: exact in the whole space; only the subspace counts; restarts."""
+"""Projected equations of motion: exact in the whole space; only the subspace counts."""
 
 from dataclasses import replace
 
@@ -10,9 +10,7 @@ from tests.models import CAR
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change, step_steer
-from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods import pod
-from vehiclemor.reduction.projection.dynamic import DynamicProjection
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
@@ -79,18 +77,15 @@ def test_projected_mechanics_keep_the_energy():
     assert np.ptp(energy) < 1e-5 * exchanged
 
 
-def test_spectral_abscissas_of_the_whole_space_are_the_eigenvalues(model):
-    reduced = fitted(model)
-    whole = in_windows(STATE, [0.0, 25.0])
-    jacobian = replace(reduced, spaces=whole).reduced_jacobian(0, model.start())
-    expected = np.linalg.eigvals(model.system.jacobian(model.start(), np.zeros(1)))
-    found = np.linalg.eigvals(jacobian)
-    fast = expected.real < -1.0
-    assert np.sort(found.real)[: fast.sum()] == pytest.approx(
-        np.sort(expected.real[fast]), rel=1e-4
-    )
-    assert len(reduced.spectral_abscissas) == 50
-    assert reduced.spectral_abscissa == reduced.spectral_abscissas.max()
+def test_spectral_abscissas_are_those_of_the_projected_jacobian(model):
+    reduced = fitted(model, "dropped", formulation="state", inner_product="euclidean")
+    spaces, expected = reduced.spaces, []
+    for k, rank in enumerate(spaces.ranks):
+        trial, test = spaces.trial_basis[k, :rank], spaces.test_basis[k, :rank]
+        small = test @ model.jacobian(spaces.means[k], [0.0]) @ trial.T
+        expected.append(np.linalg.eigvals(small).real.max())
+    np.testing.assert_allclose(reduced.spectral_abscissas, expected, rtol=1e-6, atol=1e-6)
+    assert reduced.spectral_abscissa == max(reduced.spectral_abscissas) > 100.0
 
 
 def test_divergence_is_recorded_with_its_time(model):
@@ -124,43 +119,9 @@ def maneuver():
     )
 
 
-def errors(car, maneuver, restart, **settings):
-    """Distances (samples,) of the place and heading from the full model's, in their scales."""
-    rom = vm.reduce(car, "pod", restart=restart, **settings)
-    run, full = rom.reduced.simulate(maneuver, "equilibrium"), car.simulate(maneuver)
-    apart = (run.states - full.states)[:, car.planar] / car.error_scale[car.planar]
-    return np.abs(apart).max(axis=1)
-
-
-def test_with_all_directions_it_is_the_full_model(car, maneuver):
-    means = np.random.default_rng(1).normal(size=(4, 2 * N))
-    spaces = in_windows(STATE, np.linspace(0.0, 4.0, 5), means)
-    full = car.simulate(maneuver)
-    for restart in ("full_model", "projected"):
-        reduced = DynamicProjection(car, spaces, OfflineCost(), "dopri5", 1e-9, restart=restart)
-        run = reduced.simulate(maneuver, "equilibrium")
-        np.testing.assert_allclose(run.states, full.states, rtol=1e-6, atol=1e-6)
-        assert run.counts["rhs_calls"] > full.counts["rhs_calls"]
-
-
-@pytest.mark.parametrize("formulation", ["coordinates", "state"])
-def test_errors_grow_within_a_period_alone(car, maneuver, formulation):
-    own, projected, restarted = (
-        errors(car, maneuver, restart, formulation=formulation)
-        for restart in ("own", "projected", "full_model")
-    )
-    assert own[-1] > 0.1
-    # Projected onto the training's subspace, a state is one of the training run again.
-    assert projected.max() > 0.3 * own.max()
-    # Nothing is carried on from one period to the next.
-    assert restarted[-1] < 0.01 * own[-1]
-    # A period is 25 samples: what follows an edge is better than what comes before it.
-    assert np.all(restarted[76::25] < 0.2 * restarted[75::25].max())
-
-
 @pytest.mark.parametrize("formulation", ["coordinates", "state"])
 def test_its_rates_are_those_of_its_steps_and_its_jacobian_theirs(car, maneuver, formulation):
-    rom = vm.reduce(car, "pod", restart="full_model", formulation=formulation)
+    rom = vm.reduce(car, "pod", formulation=formulation)
     x, u, t = car.simulate(maneuver).states[90], maneuver.at(np.array([1.8]))[0], 1.8
     # What comes after a step lies in the subspace.
     y, dt = rom.step(x, u, 1e-3, t), 1e-5

@@ -1,6 +1,19 @@
-"""The paper's claims as criteria that can fail: figures 3, 6, 10 to 14, and statements."""
+"""The paper's claims as criteria that can fail: figures 3, 6, 10 to 14, and statements.
 
-from typing import Any
+Usage: python paper/claims.py [--results DIR]
+
+Prints every claim with its verdict, of the default settings and of the paper's literal ones, from
+equilibrium: the paper says nothing of another start.  The paper shows curves; a reader sees a
+deviation on them when it is a visible share of the signal's range.  `vehiclemor compare paper` runs
+the studies.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -12,22 +25,33 @@ from vehiclemor.reduction.projection.bases import by_window, window_edges
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
-from vehiclemor.report.findings import (
-    IN_WORDS,
-    INDISTINGUISHABLE,
-    SMALLEST_CHANGE,
-    VISIBLE,
-    Finding,
+from vehiclemor.report.comparison import PAPER, at_published_start
+from vehiclemor.report.findings import INDISTINGUISHABLE, VERDICTS, at_point, judged
+from vehiclemor.report.labels import Column
+from vehiclemor.report.printed_numbers import (
+    TIMING,
+    VARIANTS,
     Results,
-    at_point,
-    criterion,
-    largest_deviation,
-    not_visible,
-    worst_of,
+    case_of,
+    judge_rms_error,
+    printed_errors_and_savings,
+    time_saved,
+    timing_scatter,
 )
+from vehiclemor.report.printing import Table
+from vehiclemor.report.published import Model, Printed, load_published
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
+from vehiclemor.study.plans.loading import load_studies
+from vehiclemor.study.store import combined_path
+from vehiclemor.toml_files import FileSchema, Line, read_toml
 
+FILE = Path(__file__).with_name("claims.toml")
+# Share of a signal's range from which on a deviation counts as visible in a figure: 2 mm on a curve
+# that is 40 mm high.
+VISIBLE = 0.05
+# A change of an error by less than this share is no change.
+SMALLEST_CHANGE = 0.01
 # Largest principal angle (rad) up to which two subspaces count as similar.
 SIMILAR_SUBSPACES = 0.1
 # The end of the simulation: the last fifth.
@@ -56,6 +80,124 @@ DEVIATION = "largest deviation of the angle, as a share of its range"
 TWICE = "largest deviation of the suspension's angle at twice the frequency, as of figure 14"
 
 
+class Claim(Printed):
+    """A printed statement in our words; without a model it is about all three.
+
+    A `result` is what the paper says it saw, an `expectation` what it explains without showing it.
+    """
+
+    model: Model | None = None
+    kind: Literal["result", "expectation"]
+    statement: Line
+
+
+class ClaimFile(FileSchema):
+    """Schema of `claims.toml`."""
+
+    claim: list[Claim]
+
+
+class Finding(NamedTuple):
+    """The number that decides about a claim, its bound, and whether it is met.
+
+    That is None if it can't be judged.  `measure` says what the number is, `reason` what else was
+    seen.
+    """
+
+    reproduced: float
+    bound: float
+    within: bool | None
+    measure: str
+    reason: str = ""
+
+    @classmethod
+    def below(cls, value: float, bound: float, *, valid: bool = True, **about: Any) -> Self:
+        """A value that must stay below its bound; a run that has failed is not `valid`.
+
+        `about` are further fields.
+        """
+        return cls(value, bound, valid and value < bound, **about)
+
+    @classmethod
+    def above(cls, value: float, bound: float, *, valid: bool = True, **about: Any) -> Self:
+        """As `below`, of a value that must exceed its bound."""
+        return cls(value, bound, valid and value > bound, **about)
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A claim of the paper as a number that can miss its bound.
+
+    It gets the results of studies and timings by name, and the label of a method; `variants` are
+    what the rows of labels are called.
+    """
+
+    judge: Callable[[Results, str], Finding]
+    variants: Mapping[str, str]
+
+
+# Id of a claim -> its criterion; filled by `criterion`.
+CRITERIA: dict[str, Criterion] = {}
+Judge = Callable[..., Finding]
+
+
+def criterion(
+    claim: str, variants: Mapping[str, str] = VARIANTS, **arguments: Any
+) -> Callable[[Judge], Judge]:
+    """Make a function of results, label and further arguments the criterion of a claim."""
+
+    def register(judge: Judge) -> Judge:
+        CRITERIA[claim] = Criterion(partial(judge, **arguments), variants)
+        return judge
+
+    return register
+
+
+def claims() -> dict[str, Claim]:
+    """Id -> claim, in the order of the file."""
+    return {claim.id: claim for claim in read_toml(FILE, ClaimFile).claim}
+
+
+def stored_results(folder: Path) -> Results:
+    """Studies and timings of the paper in a results folder; nothing is checked or computed."""
+    names = (*load_studies(PAPER), *TIMING.values())
+    stored = {name: xr.load_dataset(combined_path(folder, name)) for name in names}
+    return {name: at_published_start(dataset) for name, dataset in stored.items()}
+
+
+def claim_rows(results: Results) -> Iterator[dict[str, Any]]:
+    """A row for each variant of each claim that can be measured."""
+    for claim in claims().values():
+        if claim.id not in CRITERIA:
+            continue
+        each = CRITERIA[claim.id]
+        for label, variant in each.variants.items():
+            finding = each.judge(results, label)
+            verdict = judged(finding.within)
+            yield {"id": claim.id, "variant": variant, "verdict": verdict} | finding._asdict()
+
+
+def largest_deviation(point: xr.Dataset, output: str) -> float:
+    """Largest error of an output as a share of the full-order signal's range."""
+    chosen = point.sel(output=output)
+    return float(chosen["max_error"] / chosen["signal_range"])
+
+
+def not_visible(point: xr.Dataset, outputs: tuple[str, ...], bound: float = VISIBLE) -> Finding:
+    """Whether the largest deviation of all named outputs stays below a share of their ranges."""
+    worst, where = worst_of({output: largest_deviation(point, output) for output in outputs})
+    status = str(point["status"].item())
+    seen = f"of {where}" if status == "ok" else f"{status}: {point['message'].item()}"
+    text = "largest deviation of an output, as a share of its range"
+    return Finding.below(worst, bound, measure=text, reason=seen, valid=status == "ok")
+
+
+def worst_of(values: Mapping[str, float]) -> tuple[float, str]:
+    """Largest value and where it is; missing if any is missing."""
+    name = list(values)[int(np.argmax(list(values.values())))]
+    return values[name], name
+
+
 @criterion("gv_fig3_closely_matches", study="figures-2-4", outputs=OUTPUTS)
 @criterion(
     "hfv_fig10_one_state_excellent", study="figures-9-10", outputs=HIGH_FIDELITY_OUTPUTS, rank=1
@@ -78,7 +220,7 @@ def agrees(
 # The vehicle with independent suspensions.
 
 
-@criterion("gv_three_states_suffice", applies_to_replay=False)
+@criterion("gv_three_states_suffice")
 def three_states_suffice(results: Results, label: str) -> Finding:
     """Text: three states hold most of the information, by the best approximation in them."""
     chosen = at_point(results["figures-2-4"], label, rank=3)
@@ -88,7 +230,7 @@ def three_states_suffice(results: Results, label: str) -> Finding:
     return Finding.below(worst, VISIBLE, measure=text, reason=f"of {where}")
 
 
-@criterion("gv_control_periods_sharpen_basis", applies_to_replay=False)
+@criterion("gv_control_periods_sharpen_basis")
 def shorter_periods_sharpen_basis(results: Results, label: str) -> Finding:
     """Text: a subspace for each control period is more accurate than one for a longer time."""
     study = at_point(results["vehicle-control-period"], label, rank=3)
@@ -103,8 +245,8 @@ def shorter_periods_sharpen_basis(results: Results, label: str) -> Finding:
     return Finding.below(worst, bound, measure=text, reason=better)
 
 
-@criterion("gv_longer_period_saves_time", applies_to_replay=False, bound=1.0 - SUBSTANTIAL)
-@criterion("all_accuracy_buys_time", applies_to_replay=False, bound=1.0 - SMALLEST_CHANGE)
+@criterion("gv_longer_period_saves_time", bound=1.0 - SUBSTANTIAL)
+@criterion("all_accuracy_buys_time", bound=1.0 - SMALLEST_CHANGE)
 def longer_periods_save_time(results: Results, label: str, bound: float) -> Finding:
     """Text: longer control periods save time, at the price of some deviation."""
     study = at_point(results["vehicle-control-period"], label, rank=3)
@@ -150,7 +292,7 @@ def shorter_period_reduces_deviation(results: Results, label: str) -> Finding:
     return Finding.below(value, bound, measure=text, reason=seen)
 
 
-@criterion("dw_fig12_basis_insensitive_to_amplitude", OF_SUBSPACES, applies_to_replay=False)
+@criterion("dw_fig12_basis_insensitive_to_amplitude", OF_SUBSPACES)
 def basis_insensitive_to_amplitude(*_: object) -> Finding:
     """Figure 12: training at amplitude +20 % gives nearly the same subspaces."""
     nominal = trained(1.0, 1.0).bases
@@ -239,7 +381,7 @@ def leaves_full_model(results: Results, label: str, measure: str) -> Finding:
     return Finding.above(largest, VISIBLE, measure=measure)
 
 
-@criterion("dw_fig14_dropped_modes_excited", OF_SUBSPACES, applies_to_replay=False)
+@criterion("dw_fig14_dropped_modes_excited", OF_SUBSPACES)
 def dropped_modes_excited(*_: object) -> Finding:
     """Figure 14: at frequency +100 % three modes no longer hold most of the energy (eq. 5-8)."""
     fitted = trained(1.0, 1.0)
@@ -253,7 +395,7 @@ def dropped_modes_excited(*_: object) -> Finding:
     share, more = 1.0 - left_out[1], left_out[1] / left_out[0]
     text = "share of the energy of the run at twice the frequency that three modes hold"
     seen = f"they leave out {left_out[1]:.2g} of it, {more:.2g} times as much as of the nominal run"
-    return Finding.below(share, 0.5, measure=text, reason=seen, threshold_source=IN_WORDS)
+    return Finding.below(share, 0.5, measure=text, reason=seen)
 
 
 @criterion("dw_fig14_six_states_follow", UNCUT)
@@ -280,7 +422,7 @@ def six_states_follow(results: Results, label: str) -> Finding:
 # All three models.
 
 
-@criterion("all_three_equation_kinds", applies_to_replay=False)
+@criterion("all_three_equation_kinds")
 def all_kinds_reduced(results: Results, label: str) -> Finding:
     """Conclusion: ordinary differential, algebraic and differential-algebraic equations."""
     ended = [
@@ -291,7 +433,7 @@ def all_kinds_reduced(results: Results, label: str) -> Finding:
     kinds = sorted(set(ended))
     text = "kinds of equations whose nominal run ends with the paper's number of states"
     seen = ", ".join(kinds) or "none"
-    return Finding(float(len(kinds)), 3.0, len(kinds) == 3, text, seen, IN_WORDS)
+    return Finding(float(len(kinds)), 3.0, len(kinds) == 3, text, seen)
 
 
 @criterion("all_follow_precisely")
@@ -305,3 +447,63 @@ def precisely_followed(results: Results, label: str) -> Finding:
     seen = f"{study}: {findings[study].reason}"
     valid = all(finding.within for finding in findings.values())
     return Finding.below(worst, VISIBLE, measure=text, reason=seen, valid=valid)
+
+
+# Times.
+
+
+@criterion("dw_fig14_six_slower_than_three", {"pod_literal": "literal"})
+def six_slower(results: Results, label: str) -> Finding:
+    """Figure 14: six states take more time than three, but less than the full model."""
+    timing = results[TIMING["double_wishbone"]]
+    numbers = load_published().numbers
+    few, many = (case_of(numbers[f"dw_time_reduction_{n}"], label) for n in (3, 6))
+    row = timing.sel(case=many)
+    slower = float(row["seconds"] / timing["seconds"].sel(case=few))
+    seen = (
+        f"six states take {1.0 / float(row['speed_up']):.2f} times the time of Newton with fresh "
+        f"Jacobians ({int(row['iterations'])} iterations against "
+        f"{int(timing['iterations'].sel(case='baseline'))})"
+    )
+    scattered = timing_scatter(timing, few, many, "baseline")
+    met = None if scattered else slower > 1.0 and float(row["speed_up"]) > 1.0
+    text = "time with six states as a multiple of that with three; and less than the full model's"
+    reason = "; ".join(filter(None, (scattered, seen)))
+    return Finding(slower, 1.0, met, text, reason)
+
+
+@criterion("all_close_agreement_less_time")
+def agree_and_save(results: Results, label: str) -> Finding:
+    """Conclusion: reduced models agree closely and take substantially less time."""
+    numbers = printed_errors_and_savings()
+    agree = all(judge_rms_error(n, results, label).within for n in numbers if n.kind == "rms_error")
+    timed = [n for n in numbers if n.kind == "time_reduction" and case_of(n, label)]
+    saved = [time_saved(n, results, label) for n in timed]
+    number, least = min(zip(timed, saved, strict=True), key=lambda pair: pair[1].reproduced)
+    bound = min(finding.bound for finding in saved)
+    text = "least share of time that is saved, if all published errors are met"
+    seen = f"{number.model}; errors {'met' if agree else 'missed'}"
+    scattered = [f.reason for f in saved if f.within is None and agree]
+    met = None if scattered else agree and least.reproduced >= bound
+    return Finding(least.reproduced, bound, met, text, next(iter(scattered), seen))
+
+
+def main() -> None:
+    """Print the claims."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--results", type=Path, default=Path("results"), help="results folder")
+    known, rows = claims(), []
+    for row in claim_rows(stored_results(parser.parse_args().results)):
+        about = {"of": known[row["id"]].statement, "word": VERDICTS[row["verdict"]]}
+        rows.append(row | about)
+    columns = {
+        "variant": Column("settings"),
+        "bound": Column("bound", ".3g"),
+        "reproduced": Column("reproduced", ".3g"),
+        "word": Column("verdict"),
+    }
+    print(Table(rows, columns, "Claims of the paper", group="of", note="reason"))
+
+
+if __name__ == "__main__":
+    main()
