@@ -17,7 +17,7 @@ from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction import model_file
-from vehiclemor.reduction.error_estimate import checked_bounds
+from vehiclemor.reduction.error_estimate import checked_bounds, estimates
 from vehiclemor.reduction.fallback import run_of
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.settings import Value
@@ -30,7 +30,14 @@ from vehiclemor.simulation.checks import check_positive, checked_array, checked_
 from vehiclemor.simulation.linear_model import LinearModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
-from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, output_names
+from vehiclemor.simulation.trajectory import (
+    WITHOUT_COMPLAINT,
+    Names,
+    Start,
+    Trajectory,
+    Trust,
+    output_names,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -137,17 +144,27 @@ class ReducedOrderModel(ShortRepr):
             chosen = registered(chosen)
         first = self.model.starts[0] if start is None else start
         off = choice("trust", trust, ("estimate", "off")) == "off"
-        own = None if bounds is None else checked_bounds(self.model, bounds)
+        unjudged = off or self._own_limits
+        own = None if bounds is None else self.checked_bounds(bounds, unjudged)
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
-            run = run_of(self.reduced, (chosen, first), names, own, off or self._own_limits)
+            run = run_of(self.reduced, (chosen, first), names, own, unjudged)
         # A copy would take a twentieth of a short run.
         run.__dict__.update(method=self.method, maneuver=chosen.name)
-        remarks = run.remark, self._lower_rank, "its error was not estimated" if off else ""
+        # It may be too short, or without bounds.
+        missing = estimates(self.model) and not (unjudged or run.trust)
+        missing = off or (missing and run.status in WITHOUT_COMPLAINT)
+        remarks = run.remark, self._lower_rank, "its error was not estimated" if missing else ""
         run.__dict__["remark"] = "; ".join(filter(None, remarks))
         if not (off or run.trust) and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
         return run if times is None else run.chosen(times=times)
+
+    def checked_bounds(self, bounds: Mapping[str, Any], unjudged: bool = False) -> dict[str, Any]:
+        """Bounds of `simulate` by output; `InputError` if one is wrong, or none can be judged."""
+        if unjudged or self._own_limits:
+            raise InputError(f"bounds: errors of these runs by {self.method} are not estimated")
+        return checked_bounds(self.model, bounds)
 
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The model with other parameters, reduced by a method that learns from no run.

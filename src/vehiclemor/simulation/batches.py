@@ -65,6 +65,7 @@ def simulate_many(
     outputs: Names = None,
     times: Any = None,
     jobs: int | None = None,
+    bounds: Mapping[str, Any] | None = None,
     trust: str = "estimate",
 ) -> xr.Dataset:
     """Many runs in threads, each the same to the bit as if it were done alone.
@@ -94,9 +95,8 @@ def simulate_many(
         default.
     jobs
         Number of threads; by default as many as there are cores.
-    trust
-        Of a reduced vehicle `off` if its errors are not to be estimated, see
-        `ReducedOrderModel.simulate`.
+    bounds, trust
+        Of a reduced model, see `ReducedOrderModel.simulate`.
 
     Returns
     -------
@@ -119,8 +119,14 @@ def simulate_many(
         raise InputError(f"the result would take {size:.1f} GB of memory: choose outputs=, times=")
     values = np.empty(shape)
     how: dict[str, Any] = {"outputs": names}
-    if choice("trust", trust, ("estimate", "off")) == "off" and given is not full:
+    off = choice("trust", trust, ("estimate", "off")) == "off"
+    if off and given is not full:
         how["trust"] = trust
+    if bounds is not None:
+        if not hasattr(given, "checked_bounds"):
+            raise InputError("bounds: errors of these runs are not estimated")
+        given.checked_bounds(bounds, off)
+        how["bounds"] = bounds
 
     def written(run: int) -> tuple:
         """What else there is of a run, whose values are written."""
