@@ -36,8 +36,8 @@ MARKS: dict[str, dict[str, Any]] = {
 def figure_coverage(results: Mapping[str, xr.Dataset]) -> Figure:
     """Runs that keep their bounds, and warnings: over speed and acceleration sideways; braking."""
     names = [MODELS[name] for name in VEHICLES]
-    texts = [*(f"{name}, steering" for name in names), *(f"{name}, with brakes" for name in names)]
-    figure, grid = look.lettered(2, 2, look.TWO, 6.3, texts, sharey="row")
+    texts = [*(f"{name}, steering" for name in names), *(f"{name}, braking" for name in names)]
+    figure, grid = look.lettered(2, 2, 5.0, 4.8, texts, sharey="row")
     for (above, below), name in zip(grid.T, VEHICLES, strict=True):
         draw_runs(above, runs_of(results, name, "speeds"), ("speed", "acceleration"))
         above.set(xlabel="speed at the start (m/s)", xlim=SPEEDS, ylim=SIDEWAYS)
@@ -69,11 +69,11 @@ def draw_circles(axis: Axes) -> None:
 
 
 def figure_estimate(results: Mapping[str, xr.Dataset]) -> Figure:
-    """Estimated over true largest error of every fifth run, of all kinds."""
+    """Estimated over true largest error of every sixth run, of all kinds."""
     texts = [MODELS[name] for name in VEHICLES]
     figure, ((*axes,),) = look.lettered(1, 2, look.TWO, 2.9, texts, sharey=True)
     for axis, name in zip(axes, VEHICLES, strict=True):
-        part = runs_of(results, name).isel(run=slice(None, None, 5))
+        part = runs_of(results, name).isel(run=slice(None, None, 6))
         missed, warned = ~(part["score"].values <= 1.0), part["warned"].values
         alike = warned == missed
         for chosen, text in zip((alike, warned & ~alike, ~warned & ~alike), TOLD, strict=True):

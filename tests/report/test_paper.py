@@ -112,8 +112,8 @@ def test_coverage_shows_which_runs_keep_their_bounds_with_steering_and_with_brak
 
 
 def test_an_estimate_stands_over_its_error_and_what_it_tells_wrongly_is_marked(other_steering):
-    runs = other_steering["other_steering"].isel(run=[1, 0, 0, 0, 0] * 2)
-    runs["model"] = "run", np.repeat(coverage.VEHICLES, 5)
+    runs = other_steering["other_steering"].isel(run=[1, 0, 0, 0, 0, 0] * 2)
+    runs["model"] = "run", np.repeat(coverage.VEHICLES, 6)
     runs["estimate"] = 0.5 * runs["score"]
     with styled(STYLE):
         figure = coverage.figure_estimate({"other_steering": runs})
