@@ -35,9 +35,9 @@ MARKS: dict[str, dict[str, Any]] = {
 
 def figure_coverage(results: Mapping[str, xr.Dataset]) -> Figure:
     """Runs that keep their bounds, and warnings: over speed and acceleration sideways; braking."""
-    names = [MODELS[name] for name in VEHICLES]
+    names = [MODELS[name].removesuffix(" vehicle") for name in VEHICLES]
     texts = [*(f"{name}, steering" for name in names), *(f"{name}, braking" for name in names)]
-    figure, grid = look.lettered(2, 2, 5.0, 4.8, texts, sharey="row")
+    figure, grid = look.lettered(2, 2, 4.2, 4.4, texts, sharey="row")
     for (above, below), name in zip(grid.T, VEHICLES, strict=True):
         draw_runs(above, runs_of(results, name, "speeds"), ("speed", "acceleration"))
         above.set(xlabel="speed at the start (m/s)", xlim=SPEEDS, ylim=SIDEWAYS)
