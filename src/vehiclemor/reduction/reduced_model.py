@@ -17,8 +17,8 @@ from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction import model_file
-from vehiclemor.reduction.error_estimate import checked_bounds, estimates
-from vehiclemor.reduction.fallback import run_of
+from vehiclemor.reduction.error_estimate import checked_bounds
+from vehiclemor.reduction.fallback import NOT_ESTIMATED, run_of
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.training import own_speed, training_summary
@@ -30,14 +30,7 @@ from vehiclemor.simulation.checks import check_positive, checked_array, checked_
 from vehiclemor.simulation.linear_model import LinearModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
-from vehiclemor.simulation.trajectory import (
-    WITHOUT_COMPLAINT,
-    Names,
-    Start,
-    Trajectory,
-    Trust,
-    output_names,
-)
+from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, output_names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -144,25 +137,21 @@ class ReducedOrderModel(ShortRepr):
             chosen = registered(chosen)
         first = self.model.starts[0] if start is None else start
         off = choice("trust", trust, ("estimate", "off")) == "off"
-        unjudged = off or self._own_limits
-        own = None if bounds is None else self.checked_bounds(bounds, unjudged)
+        own = None if bounds is None else self.checked_bounds(bounds, off)
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
-            run = run_of(self.reduced, (chosen, first), names, own, unjudged)
+            run = run_of(self.reduced, (chosen, first), names, own, off or self._own_limits)
         # A copy would take a twentieth of a short run.
         run.__dict__.update(method=self.method, maneuver=chosen.name)
-        # It may be too short, or without bounds.
-        missing = estimates(self.model) and not (unjudged or run.trust)
-        missing = off or (missing and run.status in WITHOUT_COMPLAINT)
-        remarks = run.remark, self._lower_rank, "its error was not estimated" if missing else ""
+        remarks = run.remark, self._lower_rank, NOT_ESTIMATED if off else ""
         run.__dict__["remark"] = "; ".join(filter(None, remarks))
         if not (off or run.trust) and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
         return run if times is None else run.chosen(times=times)
 
-    def checked_bounds(self, bounds: Mapping[str, Any], unjudged: bool = False) -> dict[str, Any]:
+    def checked_bounds(self, bounds: Mapping[str, Any], off: bool = False) -> dict[str, Any]:
         """Bounds of `simulate` by output; `InputError` if one is wrong, or none can be judged."""
-        if unjudged or self._own_limits:
+        if off or self._own_limits:
             raise InputError(f"bounds: errors of these runs by {self.method} are not estimated")
         return checked_bounds(self.model, bounds)
 
@@ -312,8 +301,7 @@ class ReducedOrderModel(ShortRepr):
         """How far a state, or states (samples, dim), go in what the model knows.
 
         A model that does not judge itself knows the inputs that it was trained on, and the full
-        one the ranges of validity of inputs and outputs that it declares.  Where a run came from is
-        not in a state.
+        one the ranges of validity of inputs and outputs that it declares.
         """
         states, u, _ = self._samples(state, inputs)
         if left := self._left_validity(states, u):
