@@ -36,6 +36,8 @@ FEWEST_NODES = 8
 HELD, SETTLED = 1e-6, 0.2
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
+# Of bounds in SI units: squares of errors in bounds are numbers.
+SMALLEST = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +134,7 @@ def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBo
             raise InputError(f"bound of {name} is {quoted(value)}, not a measure and a number")
         choice("output of bounds", name, model.outputs)
         measure = choice(f"measure of {name}", pair[0], ("max", "rms"))
-        check_positive(f"bound of {name}", pair[1])
+        check_positive(f"bound of {name}", pair[1], SMALLEST)
         checked[name] = ErrorBound(measure, float(pair[1]))
     return checked
 
