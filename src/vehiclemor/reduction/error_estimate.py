@@ -28,7 +28,7 @@ from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajector
 # passes, and how far corrections are settled.  The last one is that which finds a small error, or
 # one within the bounds that is nearly that of the look before.
 FINER = 12, 1e-4
-LOOKS = (0.04, (12, 1e-3)), (0.02, FINER), (0.01, FINER), (0.005, FINER)
+LOOKS = (0.04, (12, 3e-4)), (0.02, FINER), (0.01, FINER), (0.005, FINER)
 SMALL, NEARLY = 0.4, 0.1
 FEWEST_NODES = 8
 # What the estimate is multiplied by for its own error before a run is judged.
