@@ -71,8 +71,10 @@ html_css_files = ["site.css"]
 html_static_path = ["_static"]
 
 
-def unbroken(_: Sphinx, _name: str, source: list[str]) -> None:
-    """In tables no line breaks within 4.9e-7."""
+def adapted(_: Sphinx, _name: str, source: list[str]) -> None:
+    """Links to examples lead to their pages; in tables no line breaks within 4.9e-7."""
+    source[0] = source[0].replace("(../examples/README.rst)", "(gallery/index.rst)")
+    source[0] = re.sub(r"\(\.\./examples/(\w+)\.py\)", r"(gallery/\1.rst)", source[0])
     rows = re.compile(r"^\|.*", re.MULTILINE)
     source[0] = rows.sub(lambda row: re.sub(r"(?<=\de)-(?=\d+ )", "\u2011", row[0]), source[0])
 
@@ -105,5 +107,5 @@ def markdown(rows: list[dict[str, object]]) -> str:
 
 def setup(app: Sphinx) -> None:
     """Tell Sphinx of the functions above."""
-    app.connect("source-read", unbroken)
+    app.connect("source-read", adapted)
     app.connect("builder-inited", write_file_reference)

@@ -4,10 +4,11 @@ Usage: python paper/other_steering.py [--results DIR] [--runs N] [--seed SEED]
 
 Draws so many runs of each kind, of steering of the size of the protocol's boxes: single pulses,
 motions of 0.1 to 1 s again and again, and fishhooks; these and eight other families for 5 to 40 s,
-from starts with one state out of place, and at 8 to 35 m/s.  The models are those that ship,
-without full order behind them.  Writes DIR/other_steering.nc, the runs and named values that
-`paper/measured_numbers.py` reads, in a minute.  A run is undetected if it violates a bound and its
-status is `ok`.
+from starts with one state out of place, at 8 to 35 m/s, and with brakes or drive.  The models are
+those that ship, without full order behind them, and for brakes and drive one that learns from the
+training runs of `predictive-MODEL-2`.  Writes it to DIR/models, and DIR/other_steering.nc, the runs
+and named values that `paper/measured_numbers.py` reads, in five minutes.  A run is undetected if it
+violates a bound and its status is `ok`.
 """
 
 import argparse
@@ -20,12 +21,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from in_use import Values, store
-from reduced_models import in_bounds
+from reduced_models import Choice, fitted, in_bounds
 
 import vehiclemor as vm
 from vehiclemor.exceptions import VehiclemorError
+from vehiclemor.files import make_folder
+from vehiclemor.inputs.driving import FRONT_SHARE, MASS, RADIUS
 from vehiclemor.reduction.reduced_model import ReducedOrderModel
 from vehiclemor.registry import component
+from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names
 from vehiclemor.study.scenario import Scenario, start_of
 
@@ -33,6 +37,10 @@ from vehiclemor.study.scenario import Scenario, start_of
 VEHICLES = {"independent_suspension_vehicle": 0.0300768, "high_fidelity_vehicle": -0.0046903}
 # Samples a second, between which steering is a spline.
 RATE = 100
+# Demanded of the drive or brakes (m/s^2); the part of the speed that they take at most.  Torques
+# are never below that of the last number: a spline overshoots by less.
+DEMANDS, SPENT, LEAST = (-7.0, 3.0), 0.5, 1e-4
+WHEELS = "FL", "FR", "RL", "RR"
 Steering = Callable[[np.ndarray], np.ndarray]
 
 
@@ -51,6 +59,7 @@ KINDS = {
     "families": Kind(durations=(5.0, 10.0, 20.0, 25.0, 40.0)),
     "starts": Kind(),
     "speeds": Kind(durations=(10.0,), speeds=(8.0, 35.0)),
+    "brakes": Kind(durations=(10.0,), speeds=(10.0, 30.0)),
 }
 
 
@@ -113,6 +122,19 @@ def steering(rng: np.random.Generator, duration: float) -> dict[str, Steering]:
     }
 
 
+def torques(rng: np.random.Generator, times: np.ndarray, speed: float) -> dict[str, np.ndarray]:
+    """Torques (N m) of all wheels that brake or drive once; the rear axle drives."""
+    demand, begin, rise = rng.uniform(*DEMANDS), rng.uniform(0.5, 4.0), rng.uniform(0.2, 1.0)
+    hold = min(rng.uniform(0.3, 6.0), SPENT * speed / abs(demand))
+    size = demand * (ramp(times, begin, rise) - ramp(times, begin + rise + hold, rise))
+    front = {"brake": FRONT_SHARE, "drive": 0.0}
+    return {
+        f"{kind}_torque_{wheel}": MASS * RADIUS * share / 2.0 * np.maximum(sign * size, LEAST)
+        for kind, sign in (("brake", -1.0), ("drive", 1.0))
+        for wheel, share in zip(WHEELS, [front[kind]] * 2 + [1.0 - front[kind]] * 2, strict=True)
+    }
+
+
 def drawn(model: Any, kind: str, rng: np.random.Generator) -> tuple[vm.Signal, np.ndarray, float]:
     """Signal, start and speed (m/s) of a run; what is faster steers less."""
     of = KINDS[kind]
@@ -122,8 +144,11 @@ def drawn(model: Any, kind: str, rng: np.random.Generator) -> tuple[vm.Signal, n
     size = VEHICLES[model.name] * rng.uniform(0.2, 1.9) * rng.choice([-1.0, 1.0])
     size *= (20.0 / speed) ** 1.5
     times = np.linspace(0.0, duration, int(RATE * duration) + 1)
-    samples = size * families[name](times)
-    driven = vm.Signal.from_samples(times, samples, "cubic", inputs=model.inputs[0], name=name)
+    inputs = {model.inputs[0]: size * families[name](times)}
+    if kind == "brakes":
+        inputs |= torques(rng, times, speed)
+    samples = np.column_stack([*inputs.values()])
+    driven = vm.Signal.from_samples(times, samples, "cubic", inputs=[*inputs], name=name)
     nominal = component("maneuver", model.definition.maneuver)
     begin = str(rng.choice(model.starts))
     state = np.array(model.start(start_of(model, Scenario(nominal, begin, speed))))
@@ -138,13 +163,36 @@ def alone(reduced: ReducedOrderModel) -> ReducedOrderModel:
     return replace(reduced, reduced=getattr(inner, "reduced", inner))
 
 
+def braking_car(name: str, results: Path) -> ReducedOrderModel:
+    """What the second protocol has chosen, which brakes and drives; it is fitted once."""
+    path = results / "models" / f"braking_{name}.nc"
+    if not path.exists():
+        protocol = load_protocol(f"predictive-{name}-2")
+        entry = next(entry for entry in protocol.entries if entry.label == "guarded")
+        make_folder(path.parent)
+        fitted(Choice(protocol, entry.method, entry.candidates[0], entry.training)).save(path)
+    return vm.load(path)
+
+
+def accelerations(run: Trajectory) -> dict[str, float]:
+    """The largest acceleration sideways; forward and sideways where both together are largest.
+
+    In m/s^2.
+    """
+    forward = np.gradient(run["longitudinal_speed"], run.times)
+    forward -= run["lateral_speed"] * run["yaw_rate"]
+    sideways = np.abs(run["longitudinal_speed"] * run["yaw_rate"])
+    most = np.hypot(forward, sideways).argmax()
+    return {"acceleration": sideways.max(), "forward": forward[most], "sideways": sideways[most]}
+
+
 def score_of(protocol: Protocol, reduced: Any, driven: Any, state: Any) -> dict[str, Any] | None:
     """Largest error in bounds, and what the model tells of it; none if full order fails.
 
-    The acceleration is the largest sideways in the full-order run, in m/s^2.
+    The accelerations are those of the full-order run.
     """
     try:
-        exact = protocol.model.simulate(driven, state)
+        exact = reduced.model.simulate(driven, state)
     except VehiclemorError:
         return None
     if exact.status != "ok":
@@ -154,16 +202,16 @@ def score_of(protocol: Protocol, reduced: Any, driven: Any, state: Any) -> dict[
         "score": in_bounds(protocol, run, exact) if run.finished else np.inf,
         "estimate": run.error_estimate.in_bounds if run.error_estimate else np.inf,
         "warned": run.status != "ok",
-        "acceleration": np.abs(exact["longitudinal_speed"] * exact["yaw_rate"]).max(),
-    }
+    } | accelerations(exact)
 
 
-def judged(name: str, count: int, seed: int) -> Iterator[dict[str, Any]]:
+def judged(name: str, wanted: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """Runs of every kind of a vehicle."""
-    protocol, reduced = load_protocol(protocol_names()[name]), alone(vm.rom(name))
-    rng = np.random.default_rng(seed)
-    for kind in KINDS:
-        for _ in range(count):
+    protocol, rng = load_protocol(protocol_names()[name]), np.random.default_rng(wanted.seed)
+    cars = dict.fromkeys(KINDS, alone(vm.rom(name)))
+    cars["brakes"] = alone(braking_car(name, wanted.results))
+    for kind, reduced in cars.items():
+        for _ in range(wanted.runs):
             driven, state, speed = drawn(protocol.model, kind, rng)
             if row := score_of(protocol, reduced, driven, state):
                 yield {"model": name, "kind": kind, "family": driven.name, "speed": speed} | row
@@ -199,7 +247,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=300, help="of each kind")
     parser.add_argument("--seed", type=int, default=7)
     wanted = parser.parse_args()
-    runs = pd.DataFrame(row for name in VEHICLES for row in judged(name, wanted.runs, wanted.seed))
+    runs = pd.DataFrame(row for name in VEHICLES for row in judged(name, wanted))
     values: Values = dict(counted(runs)) | dict(estimated(runs))
     title = "Other steering than that of the test sets"
     store(values, title, wanted.results / "other_steering.nc", runs)

@@ -5,18 +5,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib import colormaps
-from matplotlib.colors import BoundaryNorm
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from drawings import look
 from drawings.fields import MODELS
 
 VEHICLES = "independent_suspension_vehicle", "high_fidelity_vehicle"
-# Edges of the cells: speed in m/s, acceleration in m/s^2; and of the errors in bounds.
-SPEEDS, ACCELERATIONS = np.arange(8.0, 36.0, 3.0), np.arange(0.0, 10.0)
-ERRORS = 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0
-COLORS = "RdYlBu_r"
+# m/s; m/s^2: lateral acceleration, and that of drive and brakes; radii of the circles.
+SPEEDS, SIDEWAYS, FORWARD, CIRCLES = (8.0, 35.0), (0.0, 10.0), (-7.0, 3.0), (2, 4, 6, 8)
 MARK: dict[str, Any] = {"color": "black", "markerfacecolor": "none", "linestyle": "none"}
 MARK |= {"markeredgewidth": 0.6}
 # Errors in bounds, and what an estimate tells, rightly or not.
@@ -26,45 +23,57 @@ TOLD: dict[str, dict[str, Any]] = {
     "warned of, but right": {"marker": "o", "markersize": 3.5},
     "missed without a warning": {"marker": "x", "markersize": 5},
 }
+DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.4, "markeredgewidth": 0}
+RING: dict[str, Any] = {"markersize": 3.4, "markerfacecolor": "none", "markeredgewidth": 0.7}
 MARKS: dict[str, dict[str, Any]] = {
-    "right": {"marker": ".", "markersize": 1.5},
-    "warned of": {"marker": "o", "markersize": 3.5},
-    "missed without a warning": {"marker": "x", "markersize": 5},
+    "within all bounds": DOT | {"color": look.BLUE},
+    "within, but warned of": DOT | {"color": look.BLUE} | RING,
+    "beyond, and warned of": DOT | {"color": look.ORANGE},
+    "beyond, without a warning": MARK | {"marker": "x", "markersize": 5, "markeredgewidth": 1.0},
 }
 
 
 def figure_coverage(results: Mapping[str, xr.Dataset]) -> Figure:
-    """Largest error over speed and lateral acceleration, and the runs that are warned of."""
-    texts = [MODELS[name] for name in VEHICLES]
-    figure, ((*axes,),) = look.lettered(1, 2, look.TWO, 2.9, texts, sharey=True)
-    norm = BoundaryNorm(ERRORS, colormaps[COLORS].N, extend="both")
-    for axis, name in zip(axes, VEHICLES, strict=True):
-        part = runs_of(results, name, "speeds")
-        # What is infinite would be blank.
-        errors = np.minimum(largest_errors(part).T, 2.0 * ERRORS[-1])
-        axis.pcolorfast(SPEEDS, ACCELERATIONS, errors, cmap=COLORS, norm=norm, alpha=0.6)
-        axis.grid(False)
-        right, warned = part["score"].values <= 1.0, part["warned"].values
-        for chosen, text in zip((right & ~warned, warned, ~right & ~warned), MARKS, strict=True):
-            run = part.isel(run=chosen)
-            axis.plot(run["speed"], run["acceleration"], label=text, **MARK | MARKS[text])
-        axis.set_xlabel("speed at the start (m/s)")
-        axis.set_xlim(SPEEDS[0], SPEEDS[-1])
-        axis.set_ylim(ACCELERATIONS[0], ACCELERATIONS[-1])
-    axes[0].set_ylabel("lateral acceleration (m/s$^2$)")
-    figure.colorbar(
-        axes[0].images[0], ax=axes, label="largest error / bound", pad=0.01, format="%g"
-    )
-    look.legend(figure, axes, 3)
+    """Runs that keep their bounds, and warnings: over speed and acceleration sideways; braking."""
+    names = [MODELS[name].removesuffix(" vehicle") for name in VEHICLES]
+    texts = [*(f"{name}, steering" for name in names), *(f"{name}, braking" for name in names)]
+    figure, grid = look.lettered(2, 2, 4.2, 4.4, texts, sharey="row")
+    for (above, below), name in zip(grid.T, VEHICLES, strict=True):
+        draw_runs(above, runs_of(results, name, "speeds"), ("speed", "acceleration"))
+        above.set(xlabel="speed at the start (m/s)", xlim=SPEEDS, ylim=SIDEWAYS)
+        draw_circles(below)
+        draw_runs(below, runs_of(results, name, "brakes"), ("sideways", "forward"))
+        below.set(xlabel="lateral acceleration (m/s$^2$)", xlim=SIDEWAYS, ylim=FORWARD)
+    grid[0, 0].set_ylabel("lateral acceleration (m/s$^2$)")
+    grid[1, 0].set_ylabel("brakes (-), drive (+) (m/s$^2$)")
+    look.legend(figure, grid.flat, 2)
     return figure
 
 
+def draw_runs(axis: Axes, part: xr.Dataset, over: tuple[str, str]) -> None:
+    """A mark for each run over two of its values."""
+    right, warned = part["score"].values <= 1.0, part["warned"].values
+    cases = right & ~warned, right & warned, ~right & warned, ~right & ~warned
+    for chosen, (text, mark) in zip(cases, MARKS.items(), strict=True):
+        run = part.isel(run=chosen)
+        axis.plot(run[over[0]], run[over[1]], label=text, **mark)
+
+
+def draw_circles(axis: Axes) -> None:
+    """Equal accelerations of the car, the friction circles."""
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181)
+    for radius in CIRCLES:
+        axis.plot(radius * np.cos(angles), radius * np.sin(angles), **look.BOUND)
+    axis.set_aspect("equal")
+    axis.grid(False)
+
+
 def figure_estimate(results: Mapping[str, xr.Dataset]) -> Figure:
-    """Estimated over true largest error of every fifth run, of all kinds."""
+    """Estimated over true largest error of every sixth run, of all kinds."""
     texts = [MODELS[name] for name in VEHICLES]
     figure, ((*axes,),) = look.lettered(1, 2, look.TWO, 2.9, texts, sharey=True)
     for axis, name in zip(axes, VEHICLES, strict=True):
-        part = runs_of(results, name).isel(run=slice(None, None, 5))
+        part = runs_of(results, name).isel(run=slice(None, None, 6))
         missed, warned = ~(part["score"].values <= 1.0), part["warned"].values
         alike = warned == missed
         for chosen, text in zip((alike, warned & ~alike, ~warned & ~alike), TOLD, strict=True):
@@ -87,14 +96,3 @@ def runs_of(results: Mapping[str, xr.Dataset], name: str, kind: str = "") -> xr.
     data = results["other_steering"].drop_dims("name")
     chosen = data["model"].values == name
     return data.isel(run=chosen & (np.isin(data["kind"].values, kind) | (not kind)))
-
-
-def largest_errors(part: xr.Dataset) -> np.ndarray:
-    """Largest error in bounds (speeds, accelerations) of the runs in each cell; NaN if none is."""
-    errors = np.full((len(SPEEDS) - 1, len(ACCELERATIONS) - 1), np.nan)
-    rows = np.searchsorted(SPEEDS, part["speed"].values, side="right") - 1
-    columns = np.searchsorted(ACCELERATIONS, part["acceleration"].values, side="right") - 1
-    for row, column, score in zip(rows, columns, part["score"].values, strict=True):
-        if row < errors.shape[0] and column < errors.shape[1]:
-            errors[row, column] = np.fmax(errors[row, column], score)
-    return errors

@@ -85,6 +85,8 @@ class ExportedSystem(ShortRepr):
 
     def with_outputs(self, names: Sequence[str]) -> ExportedSystem:
         """The system with these outputs alone, in this order; `InputError` if it lacks one."""
+        if not names:
+            raise InputError("outputs are none: name one at least")
         numbers = {q.name: i for i, q in enumerate(self.outputs)}
         chosen = [numbers[choice("output", name, numbers)] for name in dict.fromkeys(names)]
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.exceptions import ConvergenceError, InputError
+from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction.constraint_error import constraint_errors
@@ -28,14 +28,13 @@ from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajector
 # passes, and how far corrections are settled.  The last one is that which finds a small error, or
 # one within the bounds that is nearly that of the look before.
 FINER = 12, 1e-4
-LOOKS = (0.04, (12, 1e-3)), (0.02, FINER), (0.01, FINER), (0.005, FINER)
+LOOKS = (0.04, (12, 3e-4)), (0.02, FINER), (0.01, FINER), (0.005, FINER)
 SMALL, NEARLY = 0.4, 0.1
 FEWEST_NODES = 8
-# Violations of constraints and their rates that are none (m, m/s); time in s in which those of a
-# start decay, ten time constants of their stabilisation.
-HELD, SETTLED = 1e-6, 0.2
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
+# Of bounds in SI units: squares of errors in bounds are numbers.
+SMALLEST = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +101,15 @@ class ErrorEstimate(ShortRepr):
     @cached_property
     def in_bounds(self) -> float:
         """Largest error of the run in multiples of its bound."""
-        peaks, rms = self._shares.max(axis=0), np.sqrt(np.mean(self._shares**2, axis=0))
-        largest = [bound.measure == "max" for bound in self.bounds.values()]
-        return float(np.where(largest, peaks, rms).max())
+        # By the column: thrice as fast as by the table.
+        shares = []
+        for column, bound in zip(
+            self.errors_of(tuple(self.bounds)).T, self.bounds.values(), strict=True
+        ):
+            peak = np.abs(column).max()
+            size = peak if bound.measure == "max" else np.sqrt(column @ column / len(column))
+            shares.append(size / bound.bound)
+        return float(np.max(shares))
 
     def trust(self) -> Trust:
         """Trust of the run: its indicator is the estimated error in bounds, with a reserve."""
@@ -132,7 +137,7 @@ def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBo
             raise InputError(f"bound of {name} is {quoted(value)}, not a measure and a number")
         choice("output of bounds", name, model.outputs)
         measure = choice(f"measure of {name}", pair[0], ("max", "rms"))
-        check_positive(f"bound of {name}", pair[1])
+        check_positive(f"bound of {name}", pair[1], SMALLEST)
         checked[name] = ErrorBound(measure, float(pair[1]))
     return checked
 
@@ -189,8 +194,9 @@ def _looked(
     for spacing, passes in LOOKS:
         parts = math.ceil(apart / spacing - 1e-6)
         finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
-        nodes = slice(0, finer.samples_to_stop, max(int(parts * spacing / apart + 1e-6), 1))
-        if len(finer.times[nodes]) < FEWEST_NODES:
+        every = max(int(parts * spacing / apart + 1e-6), 1)
+        nodes = np.arange(0, finer.samples_to_stop, every)
+        if len(nodes) < FEWEST_NODES:
             continue
         estimate = error_estimate(finer, nodes, given, bounds, passes)
         before, error = error, estimate.in_bounds
@@ -202,7 +208,7 @@ def _looked(
 
 def error_estimate(
     run: Trajectory,
-    nodes: slice,
+    nodes: np.ndarray,
     given: tuple[Excitation, Start],
     bounds: Mapping[str, ErrorBound],
     passes: tuple[int, float],
@@ -213,42 +219,17 @@ def error_estimate(
     """
     from vehiclemor.reduction.error_model import error_model
 
-    model, times = run.model, run.times[nodes]
-    states, inputs = run.states[nodes].copy(), run.inputs[nodes].copy()
+    model, (_, start) = run.model, given
+    times, inputs = run.times[nodes], run.inputs[nodes].copy()
+    states = run.states_at(nodes)
     corrected, is_settled = None, False
-    begun = _begun(model, given, times, inputs[0])
-    if begun is not None and np.isfinite(states).all():
-        first, step = len(begun) - 1, float(times[1] - times[0])
-        errors_of = error_model(model, states, float(times[-1]))
-        rest = step, states[first:], inputs[first:], begun[-1], (*passes, not first)
-        corrected, is_settled = errors_of.corrected(*rest)
-        if corrected is not None and first:
-            corrected = np.concatenate([begun[:-1], corrected])
+    if np.isfinite(states).all():
+        errors_of, step = error_model(model, states, float(times[-1])), float(times[1] - times[0])
+        corrected, is_settled = errors_of.corrected(
+            step, states, inputs, model.start(start), passes
+        )
     errors = partial(_errors_of_states, model, inputs, states, corrected)
     return ErrorEstimate(times, model, errors, bounds, is_settled)
-
-
-def _begun(
-    model: DynamicModel, given: tuple[Excitation, Start], times: np.ndarray, inputs: np.ndarray
-) -> np.ndarray | None:
-    """States (some first nodes, n) of the full model, none if it fails: its start alone.
-
-    Where that violates the constraints, the full model runs until they hold: no linearisation
-    knows how it comes there.
-    """
-    maneuver, start = given
-    state = model.start(start)
-    if not model.definition.constraints:
-        return state[None]
-    if max(np.abs(part).max() for part in model.violations(state, inputs)) < HELD:
-        return state[None]
-    nodes = min(int(times.searchsorted(SETTLED)) + 1, len(times) - FEWEST_NODES)
-    if nodes < 2:
-        return state[None]
-    try:
-        return model.simulate(maneuver, state, times[:nodes]).states
-    except ConvergenceError:
-        return None
 
 
 def _errors_of_states(
@@ -261,7 +242,8 @@ def _errors_of_states(
     """Errors (nodes, names) of outputs at states (nodes, n), infinite without corrected ones."""
     if corrected is None:
         return np.full((len(states), len(names)), np.inf)
-    own, full = (model.histories_at(names, path, inputs) for path in (states, corrected))
+    both = np.concatenate((states, corrected)), np.concatenate((inputs, inputs))
+    own, full = np.split(model.histories_at(names, *both), 2)
     return own - full
 
 

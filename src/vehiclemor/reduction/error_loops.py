@@ -1,15 +1,13 @@
 """Corrections of a run by the full equations, window by window: a compiled loop.
 
 See `error_model`.  Modal coordinates stand in rows: real parts of all modes, those of pairs first,
-then imaginary parts of pairs.  Matrices stand in blocks of eight columns, which are added up in
-registers; rows are filled up with zeros to as many.
+then imaginary parts of pairs.  Rows and columns of matrices are filled up with zeros to fours.
 """
 
 import math
 from typing import NamedTuple
 
 from vehiclemor.codegen.loop_types import (
-    Cube,
     Float,
     Int,
     IntMatrix,
@@ -53,42 +51,53 @@ class FullEquations(NamedTuple):
 
 
 class ModesOfErrors(NamedTuple):
-    """Modes: coordinates of shapes and back, in blocks (blocks, rows, 8); weights (8, modes).
+    """Modes: coordinates of shapes and back (rows, columns), filled up; weights (8, modes).
 
-    Slow (modal coordinates,) is one for those that start with an error; what the others add to
-    heading and place while they decay follows from the start's deviation by `settling` (n, 3).  The
-    correction, in blocks too, meets violations of constraints; velocity (3, n) gives psi', U, V.
+    Three further columns of shapes, and of the correction that meets violations of constraints,
+    are changes of psi', U, V.  Slow (modal coordinates,) is one for those that start with an error;
+    what the others add to heading and place while they decay follows from the start's deviation by
+    `settling` (n, 3).
     """
 
-    coordinates: Cube
-    shapes: Cube
+    coordinates: Matrix
+    shapes: Matrix
     weights: Matrix
     slow: Vector
     settling: Matrix
-    correction: Cube
-    velocity: Matrix
+    correction: Matrix
+
+
+class Violated(NamedTuple):
+    """Constraints that the start violates: at some first nodes violations and rates, filled up.
+
+    Shapes that move with them and these shapes' slopes (nodes, n), and what of heading and place
+    the nodes miss (3,).
+    """
+
+    violations: Matrix
+    shapes: Matrix
+    slopes: Matrix
+    motion: Vector
 
 
 class Passes(NamedTuple):
     """Nodes of a window, passes that are made of it at most, and the change that ends them.
 
-    Changes of the shape are measured in the ranges of its coordinates, at least in `least`.  One if
-    the first node is the beginning of the run, whose state a method may record as it was given.
+    Changes of the shape are measured in the ranges of its coordinates, at least in `least`.
     """
 
     window: Int
     most: Int
     settled: Float
     least: Float
-    is_beginning: Int
 
 
 class Scratch(NamedTuple):
     """Room for all nodes: states, their rates, violations, shapes, slopes of the path, motions.
 
     Then in modes, filled up, what drives errors, and the errors; further for a change of these, a
-    shape, what meets violations (both filled up), the ranges of its coordinates (n,), and what a
-    start adds to heading and place (3,).
+    shape and its motion, what meets violations (both filled up), one over the ranges of the
+    coordinates (n,), and what a start adds to heading and place (3,).
     """
 
     states: Matrix
@@ -111,6 +120,7 @@ def corrected_run(
     run: Matrix,
     inputs: Matrix,
     start: Vector,
+    violated: Violated,
     shape: Shape,
     equations: FullEquations,
     modes: ModesOfErrors,
@@ -123,7 +133,7 @@ def corrected_run(
     Start (n,) is that of the full model.  Returned is the number of windows that were not settled,
     or minus one if a correction has gone to infinity.
     """
-    begin_with(run, start, step, shape, modes, passes, scratch)
+    begin_with(run, (start, violated), step, shape, modes, passes, scratch)
     nodes, begin, unsettled = len(scratch.shapes), 0, 0
     while begin < nodes - 1:
         end = min(begin + passes.window, nodes)
@@ -131,47 +141,58 @@ def corrected_run(
             end = nodes
         first = begin + 1 if begin else 0
         guess(begin, first, end, modes, scratch)
-        change = 0.0
+        change, expected = 0.0, LARGEST
         for _ in range(passes.most):
             full_rates(first, end, inputs, shape, equations, scratch)
+            for i in range(first, min(end, len(violated.violations))):
+                for k in range(violated.violations.shape[1]):
+                    scratch.violations[i, k] -= violated.violations[i, k]
             modal_sources(begin, end, shape, modes, scratch)
-            change = 0.0
+            before, change = change, 0.0
             for i in range(first, end):
                 propagate(i, modes, scratch)
                 largest = correct(i, shape, modes, scratch)
                 if not largest < LARGEST:
                     return -1
                 change = max(change, largest)
-            if change < passes.settled:
+            # The next change, if each is smaller than the one before by the same factor.
+            expected = change * change / before if change < before else change
+            if expected < passes.settled:
                 break
-        if change >= passes.settled:
+        if expected >= passes.settled:
             unsettled += 1
         begin = end - 1 if end < nodes else end
     place(step, start, shape, scratch, result)
     return unsettled
 
 
-def begin_with(run, start, step, shape, modes, passes, scratch):
+def begin_with(run, begin, step, shape, modes, passes, scratch):
     """Shapes of a run and their slopes, the error at the start, and ranges."""
+    start, violated = begin
     shapes, scale, moved = scratch.shapes, scratch.scale, scratch.moved
     nodes, n = shapes.shape
     for i in range(nodes):
         shape_of(run[i], shape, scratch.states[i], shapes[i])
-    if passes.is_beginning:
-        for j in range(n):
-            near = 4.0 * shapes[1, j] - 6.0 * shapes[2, j]
-            shapes[0, j] = near + 4.0 * shapes[3, j] - shapes[4, j]
+    moved[:] = 0.0
     for j in range(n):
+        # A method may record the first state as it was given.
+        near = 4.0 * shapes[1, j] - 6.0 * shapes[2, j]
+        shapes[0, j] = near + 4.0 * shapes[3, j] - shapes[4, j]
         moved[j] = scale[j] = shapes[1, j]
     for i in range(2, nodes):
         for j in range(n):
             scale[j] = max(scale[j], shapes[i, j])
             moved[j] = min(moved[j], shapes[i, j])
     for j in range(n):
-        scale[j] = max(scale[j] - moved[j], passes.least)
+        scale[j] = 1.0 / max(scale[j] - moved[j], passes.least)
     slopes(shapes, step, scratch.slopes)
+    for i in range(len(violated.shapes)):
+        for j in range(n):
+            shapes[i, j] += violated.shapes[i, j]
+            scratch.slopes[i, j] += violated.slopes[i, j]
     shape_of(start, shape, scratch.states[0], moved)
-    scratch.settled[:] = 0.0
+    for k in range(len(scratch.settled)):
+        scratch.settled[k] = violated.motion[k]
     for j in range(n):
         moved[j] -= shapes[0, j]
         for k in range(len(scratch.settled)):
@@ -201,23 +222,15 @@ def turn(state, shape, cosine, sine, turned):
         turned[b] = sine * one + cosine * other
 
 
-def product(blocks, values, result):
-    """Linear combinations of values (rows,) by a matrix in blocks (blocks, rows, 8)."""
-    for block in range(len(blocks)):
-        rows, into = blocks[block], result[8 * block : 8 * block + 8]
-        a = b = c = d = e = f = g = h = 0.0
-        for j in range(len(rows)):
-            value, row = values[j], rows[j]
-            a += value * row[0]
-            b += value * row[1]
-            c += value * row[2]
-            d += value * row[3]
-            e += value * row[4]
-            f += value * row[5]
-            g += value * row[6]
-            h += value * row[7]
-        into[0], into[1], into[2], into[3] = a, b, c, d
-        into[4], into[5], into[6], into[7] = e, f, g, h
+def product(matrix, values, result):
+    """Linear combination of the rows of a matrix, four of them at once."""
+    for k in range(len(result)):
+        result[k] = 0.0
+    for j in range(0, len(matrix) - 3, 4):
+        a, b, c, d = values[j], values[j + 1], values[j + 2], values[j + 3]
+        one, two, three, four = matrix[j], matrix[j + 1], matrix[j + 2], matrix[j + 3]
+        for k in range(len(result)):
+            result[k] += (a * one[k] + b * two[k]) + (c * three[k] + d * four[k])
 
 
 def slopes(values, step, result):
@@ -374,21 +387,20 @@ def propagate(i, modes, scratch):
 
 
 def correct(i, shape, modes, scratch):
-    """Change the shape at a node, and write its motion; how much it changes in its scale."""
+    """Change the shape at a node, and write its motion; how much it changes in its ranges."""
     rates, violations, change = scratch.rates[i], scratch.violations[i], scratch.change
     moved, into, largest = scratch.moved, scratch.shapes[i], 0.0
     product(modes.shapes, change, moved)
     if len(violations):
         product(modes.correction, violations, scratch.met)
-    for j in range(len(into)):
+    for j in range(len(moved)):
         moved[j] -= scratch.met[j]
+    n = len(into)
+    for j in range(n):
         into[j] += moved[j]
-        largest = max(largest, abs(moved[j]) / scratch.scale[j])
+        largest = max(largest, abs(moved[j]) * scratch.scale[j])
         if moved[j] != moved[j]:
             return INFINITE
     for k in range(len(shape.planar)):
-        velocity = rates[shape.planar[k]]
-        for j in range(len(into)):
-            velocity += modes.velocity[k, j] * moved[j]
-        scratch.motion[i, k] = velocity
+        scratch.motion[i, k] = rates[shape.planar[k]] + moved[n + k]
     return largest

@@ -16,13 +16,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vehiclemor.codegen.loops import Prepared, Ready, loops, ready
-from vehiclemor.codegen.operations import LANES
-from vehiclemor.reduction.error_loops import FullEquations, ModesOfErrors, Passes, Scratch, Shape
+from vehiclemor.codegen.operations import LANES, padded
+from vehiclemor.reduction.error_loops import (
+    FullEquations,
+    ModesOfErrors,
+    Passes,
+    Scratch,
+    Shape,
+    Violated,
+)
 from vehiclemor.reduction.vehicle.shape import RANK, Linearisation, VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import address_of, at_samples
@@ -30,19 +38,24 @@ from vehiclemor.simulation.workspaces import Pool
 
 # Speeds (m/s) of linearisations are multiples of this one.
 SPEEDS = 2.5
+# Every how manyth node tells the way.
+APART = 8
 # Modes start with an error whose rate times the time between nodes is no larger; the others have
 # decayed before it matters.
 FOLLOWED = 8.0
 # Nodes in a window; least range of a coordinate of the shape, in which changes are measured (m,
 # rad, m/s, rad/s).
 WINDOW, LEAST_RANGE = 9, 1e-3
+# Violations of constraints and their rates that are none (m, m/s); time in s in which those of a
+# start decay, ten time constants of their stabilisation.
+HELD, SETTLED = 1e-6, 0.2
 # Step of differences; magnitude of a mode's rate times the step below which weights are series.
 DIFFERENCE, SERIES = 1e-6, 1e-3
 
 
 def error_model(model: DynamicModel, states: np.ndarray, duration: float) -> ErrorModel:
     """What corrects a run of a vehicle model, with states (nodes, n) over so many s."""
-    way = np.hypot(*np.diff(states[:, model.planar[:2]], axis=0).T).sum()
+    way = np.hypot(*np.diff(states[::APART, model.planar[:2]], axis=0).T).sum()
     return _at_speed(_alike(model), SPEEDS * max(round(float(way) / duration / SPEEDS), 1))
 
 
@@ -76,14 +89,21 @@ def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
     modes = errors.modes
     return ready(
         ModesOfErrors(
-            in_blocks(modes.coordinates),
-            in_blocks(modes.shapes),
+            _filled(modes.coordinates),
+            _filled(errors.with_motion(modes.shapes)),
             errors.weights(step),
             *errors.starts(step),
-            in_blocks(errors.free.correction),
-            np.ascontiguousarray(errors.linearised.velocity_a),
+            _filled(errors.with_motion(errors.free.correction)),
         )
     )
+
+
+@lru_cache(maxsize=64)
+def _decay_of_violations(errors: ErrorModel, step: float) -> np.ndarray:
+    """Violations and their rates (2 c, 2 c) a step in s later."""
+    import scipy.linalg
+
+    return scipy.linalg.expm(step * errors._violating[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,14 +120,14 @@ class ErrorModel:
         states: np.ndarray,
         inputs: np.ndarray,
         start: np.ndarray,
-        passes: tuple[int, float, bool],
+        passes: tuple[int, float],
     ) -> tuple[np.ndarray | None, bool]:
         """States (nodes, n) of the full model along a run, none if they can't be followed.
 
         Given are states of the run and inputs (nodes, inputs) at nodes that are a step in s apart,
-        and the start (n,) of the full model; the most passes, the change that ends them, in ranges
-        of the coordinates, and whether the run begins at the first node.  The truth value tells
-        whether all changes were small enough in the end to be settled.
+        and the start (n,) of the full model; the most passes, and the change that ends them, in
+        ranges of the coordinates.  The truth value tells whether all changes were small enough in
+        the end to be settled.
         """
         kind = step, len(states), *passes
         space = self.pool.taken(kind, lambda: self._space(step, len(states), passes))
@@ -115,25 +135,75 @@ class ErrorModel:
         np.copyto(space.run, states)
         np.copyto(space.inputs, inputs)
         np.copyto(space.start, start)
+        self._write_violated(start, inputs[0], step, space.violated)
         unsettled, result = space.call(), space.result.copy()
         self.pool.give_back(kind, space)
         return (None if unsettled < 0 else result), unsettled == 0
 
-    def _space(self, step: float, nodes: int, passes: tuple[int, float, bool]) -> Space:
+    def _space(self, step: float, nodes: int, passes: tuple[int, float]) -> Space:
         """Arrays of a run, and the loop that uses them."""
         (n, count), model = self.modes.coordinates.shape, self.shape.model
-        filled, shape, states = _filled(count), _filled(n), len(model.definition.states)
-        widths = states, states, len(self.free.correction), n, n, 3, filled, filled
+        filled, shape, states = padded(count), padded(n + 3), len(model.definition.states)
+        violations = padded(len(self.free.correction))
+        widths = states, states, violations, n, n, 3, filled, filled
         rooms: list[Any] = [np.empty((nodes, columns)) for columns in widths]
         scratch = Scratch(*rooms, *(np.zeros(size) for size in (filled, shape, shape, n, 3)))
         run, result = np.empty((2, nodes, states))
         inputs, start = np.empty((nodes, len(model.inputs))), np.empty(states)
-        most, settled, is_beginning = passes
-        limits = Passes(WINDOW, most, settled, LEAST_RANGE, int(is_beginning))
+        first = min(max(int(SETTLED / step) + 1, 5), nodes)
+        rooms = [np.zeros(size) for size in ((first, violations), (first, n), (first, n), 3)]
+        violated = Violated(*rooms)
+        limits = Passes(WINDOW, *passes, LEAST_RANGE)
         of_errors = _modes_of_errors(self, step)
         loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
-        of_run = step, run, inputs, start, *self._bundles, of_errors, limits, scratch, result
-        return Space(run, inputs, start, result, loop.prepared(*of_run))
+        of_run = step, run, inputs, start, violated, *self._bundles, of_errors, limits, scratch
+        return Space(run, inputs, start, violated, result, loop.prepared(*of_run, result))
+
+    def _write_violated(
+        self, start: np.ndarray, inputs: np.ndarray, step: float, violated: Violated
+    ) -> None:
+        """What a start (n,) violates, at nodes that are a step in s apart, see `Violated`.
+
+        Violations decay as the stabilised constraints tell, whatever the motion.
+        """
+        model, count = self.shape.model, len(self.free.correction)
+        if not count:
+            return
+        at_first = model.evaluated("violations", start, inputs).ravel()
+        if np.abs(at_first).max() < HELD:
+            for array in violated:
+                array[:] = 0.0
+            return
+        (rates, shapes), decay = self._violating, _decay_of_violations(self, step)
+        violations = violated.violations[:, :count]
+        violations[0] = at_first
+        for before, after in pairwise(violations):
+            after[:] = decay @ before
+        np.matmul(violations, shapes.T, out=violated.shapes)
+        np.matmul(violations, (shapes @ rates).T, out=violated.slopes)
+        # What quadrature by the nodes misses.
+        ends = np.array([-25.0, 48.0, -36.0, 16.0, -3.0]) / 144.0
+        ends[0] -= 0.5
+        by_nodes = step * (violations.sum(axis=0) + ends @ violations[: len(ends)])
+        missed = -np.linalg.solve(rates, at_first) - by_nodes
+        violated.motion[:] = self.linearised.velocity_a @ shapes @ missed
+
+    @cached_property
+    def _violating(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rates (2 c, 2 c) of violations and their rates; shapes (n, 2 c) that move with them."""
+        import scipy.linalg
+
+        free, a = self.free, self.linearised.a
+        rates = free.jacobian @ a @ free.correction.T
+        moved = a[free.indices]
+        along = scipy.linalg.solve_sylvester(
+            moved @ free.shapes, -rates, -moved @ free.correction.T
+        )
+        return rates, free.correction.T + free.shapes @ along
+
+    def with_motion(self, changes: np.ndarray) -> np.ndarray:
+        """Changes (rows, n) of the shape with those of psi', U, V (rows, n + 3)."""
+        return np.hstack([changes, changes @ self.linearised.velocity_a.T])
 
     @cached_property
     def linearised(self) -> Linearisation:
@@ -182,7 +252,7 @@ class ErrorModel:
         """Coordinates of the shape that are free, those by which the others are known best."""
         shape, n = self.shape, len(self.shape.indices)
         if not shape.model.definition.constraints:
-            return Free(np.arange(n), np.eye(n), np.zeros((0, n)))
+            return Free(np.arange(n), np.eye(n), np.zeros((0, n)), np.zeros((0, n)))
         steps = DIFFERENCE * np.vstack([np.eye(n), -np.eye(n)])
         violations = self._violations(steps, np.zeros((2 * n, len(shape.model.inputs))))
         jacobian = (violations[:n] - violations[n:]).T / (2.0 * DIFFERENCE)
@@ -193,7 +263,8 @@ class ErrorModel:
         *_, order = scipy.linalg.qr(kept.T, pivoting=True)
         free = np.sort(order[: kept.shape[1]])
         inverse = np.linalg.inv(np.vstack([np.eye(n)[free], jacobian]))
-        return Free(free, inverse[:, : len(free)], np.ascontiguousarray(inverse[:, len(free) :].T))
+        correction = np.ascontiguousarray(inverse[:, len(free) :].T)
+        return Free(free, inverse[:, : len(free)], jacobian, correction)
 
     @cached_property
     def modes(self) -> Modes:
@@ -225,26 +296,19 @@ class ErrorModel:
         return np.array([half for part in parts for half in (part.real, part.imag)])
 
 
-def in_blocks(matrix: np.ndarray) -> np.ndarray:
-    """A matrix (rows, columns) in blocks (blocks, rows, 8) of columns, filled up with zeros."""
-    rows, columns = matrix.shape
-    filled = np.zeros((rows, _filled(columns)))
-    filled[:, :columns] = matrix
-    return np.ascontiguousarray(
-        filled.reshape(rows, _filled(columns) // LANES, LANES).swapaxes(0, 1)
-    )
-
-
-def _filled(columns: int) -> int:
-    return -(-columns // LANES) * LANES
+def _filled(matrix: np.ndarray) -> np.ndarray:
+    """A matrix with rows and columns of zeros up to multiples of four."""
+    more = [(0, padded(count) - count) for count in matrix.shape]
+    return np.ascontiguousarray(np.pad(matrix, more))
 
 
 class Space(NamedTuple):
-    """Arrays of a run at its nodes, its start, the result, and the loop that uses them."""
+    """Arrays of a run at its nodes, its start, what that violates, the result, and the loop."""
 
     run: np.ndarray
     inputs: np.ndarray
     start: np.ndarray
+    violated: Violated
     result: np.ndarray
     call: Prepared
 
@@ -252,11 +316,12 @@ class Space(NamedTuple):
 class Free(NamedTuple):
     """Indices (free,) of free coordinates; shapes (n, free) that keep the constraints.
 
-    The correction (2 c, n) is what meets violations.
+    The Jacobian (2 c, n) is of violations and their rates; the correction (2 c, n) meets these.
     """
 
     indices: np.ndarray
     shapes: np.ndarray
+    jacobian: np.ndarray
     correction: np.ndarray
 
 

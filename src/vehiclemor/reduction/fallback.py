@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
-from vehiclemor.reduction.error_estimate import judged_run
+from vehiclemor.reduction.error_estimate import estimates, judged_run
 from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
@@ -21,6 +21,7 @@ from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
+NOT_ESTIMATED = "its error was not estimated"
 # What users step and ask is the reduced model.
 STEPPED = ("states", "begin", "step", "rates", "sensitivities", "decode", "trust")
 
@@ -110,4 +111,8 @@ def run_of(
     if off:
         return simulated(getattr(reduced, "reduced", reduced), *given, outputs)
     run = judged_run(reduced.simulate, *given, bounds)
+    if run.trust is None and run.finished and estimates(run.model):
+        # It is too short, or nothing is bounded.
+        remark = "; ".join(filter(None, (run.remark, NOT_ESTIMATED)))
+        run = Trajectory.of(**run.__dict__ | {"remark": remark})
     return run if outputs is None else run.chosen(outputs)

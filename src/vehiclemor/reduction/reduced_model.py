@@ -18,7 +18,7 @@ from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction import model_file
 from vehiclemor.reduction.error_estimate import checked_bounds
-from vehiclemor.reduction.fallback import run_of
+from vehiclemor.reduction.fallback import NOT_ESTIMATED, run_of
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.training import own_speed, training_summary
@@ -137,17 +137,23 @@ class ReducedOrderModel(ShortRepr):
             chosen = registered(chosen)
         first = self.model.starts[0] if start is None else start
         off = choice("trust", trust, ("estimate", "off")) == "off"
-        own = None if bounds is None else checked_bounds(self.model, bounds)
+        own = None if bounds is None else self.checked_bounds(bounds, off)
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
             run = run_of(self.reduced, (chosen, first), names, own, off or self._own_limits)
         # A copy would take a twentieth of a short run.
         run.__dict__.update(method=self.method, maneuver=chosen.name)
-        remarks = run.remark, self._lower_rank, "its error was not estimated" if off else ""
+        remarks = run.remark, self._lower_rank, NOT_ESTIMATED if off else ""
         run.__dict__["remark"] = "; ".join(filter(None, remarks))
         if not (off or run.trust) and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
         return run if times is None else run.chosen(times=times)
+
+    def checked_bounds(self, bounds: Mapping[str, Any], off: bool = False) -> dict[str, Any]:
+        """Bounds of `simulate` by output; `InputError` if one is wrong, or none can be judged."""
+        if off or self._own_limits:
+            raise InputError(f"bounds: errors of these runs by {self.method} are not estimated")
+        return checked_bounds(self.model, bounds)
 
     def for_parameters(self, parameters: Mapping[str, object]) -> ReducedOrderModel:
         """The model with other parameters, reduced by a method that learns from no run.
@@ -295,8 +301,7 @@ class ReducedOrderModel(ShortRepr):
         """How far a state, or states (samples, dim), go in what the model knows.
 
         A model that does not judge itself knows the inputs that it was trained on, and the full
-        one the ranges of validity of inputs and outputs that it declares.  Where a run came from is
-        not in a state.
+        one the ranges of validity of inputs and outputs that it declares.
         """
         states, u, _ = self._samples(state, inputs)
         if left := self._left_validity(states, u):

@@ -309,8 +309,9 @@ def _speed_target(target: SpeedTarget, winner: Row, methods: list[Row]) -> Row:
         names, beside = [name], ""
         factor = ratio(next((row for row in methods if row["label"] == name), None), winner)
     rivals = " and ".join(filter(None, names))
-    reason = f"against {rivals}" if rivals else "no full-order row is as accurate"
-    reason += beside
+    is_full = any(row["role"] == FULL_ORDER for row in methods)
+    missing = "no full-order row is as accurate" if is_full else "`rows` takes no full order"
+    reason = f"against {rivals}{beside}" if rivals else missing
     if target.aim:
         reason += f"; the aim is {target.aim:g}"
     row = _target(f"speed-up, {target.against}", target.ratio, factor, reason, -1.0)

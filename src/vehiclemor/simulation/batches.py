@@ -65,6 +65,7 @@ def simulate_many(
     outputs: Names = None,
     times: Any = None,
     jobs: int | None = None,
+    bounds: Mapping[str, Any] | None = None,
     trust: str = "estimate",
 ) -> xr.Dataset:
     """Many runs in threads, each the same to the bit as if it were done alone.
@@ -94,9 +95,8 @@ def simulate_many(
         default.
     jobs
         Number of threads; by default as many as there are cores.
-    trust
-        Of a reduced vehicle `off` if its errors are not to be estimated, see
-        `ReducedOrderModel.simulate`.
+    bounds, trust
+        Of a reduced model, see `ReducedOrderModel.simulate`.
 
     Returns
     -------
@@ -118,9 +118,7 @@ def simulate_many(
         size = 8e-9 * math.prod(shape)
         raise InputError(f"the result would take {size:.1f} GB of memory: choose outputs=, times=")
     values = np.empty(shape)
-    how: dict[str, Any] = {"outputs": names}
-    if choice("trust", trust, ("estimate", "off")) == "off" and given is not full:
-        how["trust"] = trust
+    how = {"outputs": names} | _judgement(given, bounds, trust)
 
     def written(run: int) -> tuple:
         """What else there is of a run, whose values are written."""
@@ -148,6 +146,19 @@ def _driven(model: Any, signals: Sequence[Excitation]) -> tuple[Any, Model]:
     if given is full and is_list:
         given = full = full.driving([name for signal in signals for name in signal.inputs])
     return given, full
+
+
+def _judgement(given: Any, bounds: Any, trust: str) -> dict[str, Any]:
+    """Arguments of each run by which it is judged; `InputError` if one is wrong."""
+    off = choice("trust", trust, ("estimate", "off")) == "off"
+    how: dict[str, Any] = {"trust": trust} if off and not isinstance(given, Model) else {}
+    if bounds is None:
+        return how
+    checked = getattr(given, "checked_bounds", None)
+    if checked is None:
+        raise InputError("bounds: errors of these runs are not estimated")
+    checked(bounds, off)
+    return how | {"bounds": bounds}
 
 
 def _about(given: Any, full: Model, signals: Sequence[Excitation]) -> dict[str, Any]:

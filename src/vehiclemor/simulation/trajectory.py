@@ -267,6 +267,11 @@ class Trajectory(ShortRepr):
             return self.__dict__["recording"].state_history
         return np.hstack((self.coordinates, self.speeds, self.further_states))
 
+    def states_at(self, rows: np.ndarray) -> np.ndarray:
+        """States (rows, n) at some of the samples; of a run that nobody has read, no others."""
+        recording = self.__dict__.get("recording")
+        return self.states[rows] if recording is None else recording.at(rows).state_history
+
 
 def output_names(outputs: Any, what: str = "outputs") -> tuple[str, ...]:
     """Names of chosen outputs, or of something else; `InputError` if they are none."""

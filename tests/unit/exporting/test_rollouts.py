@@ -62,5 +62,6 @@ def test_rollouts_refuse_what_does_not_fit():
     refused(lambda: rollouts(state, np.full((4, 5), np.nan), 0.01), "not finite")
     refused(lambda: rollouts(state, inputs, 0.0), "period")
     refused(lambda: vm.export("double_wishbone", "rollouts"), "no states")
+    refused(lambda: vm.export(model, "rollouts", outputs=[]), "outputs")
     refused(lambda: vm.export(model, "rollouts", precision="single"), "precision")
     refused(lambda: pickle.dumps(rollouts), "copied")

@@ -77,12 +77,31 @@ def test_a_run_is_judged_by_the_bounds_that_are_given():
     assert "the estimated error of yaw_rate is 1." in strict.message
     assert 0.0 < strict.trust.until < run.times[-1]
     assert rom.simulate(bounds={"yaw_rate": ("rms", 0.9 * largest)}).status == "ok"
-    for wrong in ({"yow": 1.0}, {"yaw": 0.0}, {"yaw": ("mean", 1.0)}, 3.0, {}):
+    for wrong in ({"yow": 1.0}, {"yaw": 0.0}, {"yaw": ("mean", 1.0)}, {"yaw": 1e-300}, 3.0, {}):
         with pytest.raises(InputError):
             rom.simulate(bounds=wrong)
     truck = vm.reduce("flexible_truck", "craig_bampton")
     with pytest.raises(InputError, match="not estimated"):
         truck.simulate(bounds={"driver_acceleration": 1.0})
+    full = vm.reduce(CAR, "full_order")
+    for model, how in ((rom, {"trust": "off"}), (full, {}), (vm.reduce(CAR, "replay"), {})):
+        with pytest.raises(InputError, match="not estimated"):
+            model.simulate(bounds={"yaw": 1.0}, **how)
+
+
+def test_many_runs_are_judged_as_single_ones_by_the_bounds_that_are_given():
+    rom, times = shipped(CAR), np.linspace(0.0, 2.0, 101)
+    signals = vm.many_signals(times, [0.01 * times, 0.02 * times])
+    bounds = {"yaw": ("rms", 1e-5), "yaw_rate": 1e-4}
+    many = vm.simulate_many(rom, signals, bounds=bounds)
+    indicators = [rom.simulate(signal, bounds=bounds).trust.indicator for signal in signals]
+    assert many["indicator"].values.tolist() == indicators
+    assert indicators != vm.simulate_many(rom, signals)["indicator"].values.tolist()
+    for model, how in ((rom, {"trust": "off"}), (rom.model, {}), (vm.reduce(CAR, "replay"), {})):
+        with pytest.raises(InputError, match="not estimated"):
+            vm.simulate_many(model, signals, bounds=bounds, **how)
+    with pytest.raises(InputError, match="yow"):
+        vm.simulate_many(rom, signals, bounds={"yow": 1.0})
 
 
 def test_it_can_be_left_out():
@@ -130,6 +149,13 @@ def test_a_short_run_is_judged(length):
     assert true > 2.0
     assert run.status == "untrusted"
     assert run.error_estimate.in_bounds == pytest.approx(true, rel=0.1)
+
+
+def test_a_run_that_is_too_short_says_so():
+    signal = vm.Signal.from_samples([0.0, 0.02], [0.0, 0.01], output_step=0.005)
+    run = shipped(CAR).simulate(signal)
+    assert (run.error_estimate, run.remark) == (None, "its error was not estimated")
+    assert vm.reduce(CAR, "full_order").simulate(signal).remark == ""
 
 
 def test_bounds_are_those_of_the_studies():
