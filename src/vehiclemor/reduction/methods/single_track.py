@@ -120,8 +120,8 @@ def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: 
 
 
 def steering(data: TrainingData, inputs: np.ndarray) -> np.ndarray:
-    """The first input (steps, 2) at both ends of steps of standardised ones."""
-    return data.input_scale[0] * inputs[:, :: len(data.input_scale)]
+    """The first input (steps, ..., 2) at both ends of steps of standardised ones."""
+    return data.input_scale[0] * inputs[..., :: len(data.input_scale)]
 
 
 def fit(model: Any, training: Training, settings: SingleTrackSettings) -> LearnedModel:
@@ -137,7 +137,12 @@ def fit(model: Any, training: Training, settings: SingleTrackSettings) -> Learne
     first = np.array([kappa, *TIRES, *BODY])
     constants = fitted_constants(data, first, shape.speed, settings.iterations + 1)
     rate, step = partial(rates, constants, shape.speed), data.samples.spacing
-    return data.model(lambda z, u: driven(rate, z, steering(data, u), step)[:, :-1])
+
+    def path(start: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        steer = np.moveaxis(steering(data, inputs), -1, 1)
+        return np.moveaxis(driven(rate, start.T, steer, step)[:, :-1], -1, 1)
+
+    return data.model(path)
 
 
 METHOD = Method(
