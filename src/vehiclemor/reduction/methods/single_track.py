@@ -91,22 +91,26 @@ def driven(rate: Any, start: np.ndarray, steer: np.ndarray, step: float) -> np.n
 
 def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: int) -> np.ndarray:
     """Constants by least squares of states and heading over whole runs, each by its size."""
-    step, longest = data.samples.spacing, max(map(len, data.inputs))
-    steer, true = [], []
+    step, runs, of_length = data.samples.spacing, [], {}
     for z, u in zip(data.paths, data.inputs, strict=True):
-        more = longest - len(u)
         heading = np.cumsum(np.append(0.0, 0.5 * step * (z[1:, 1] + z[:-1, 1])))
-        run = np.column_stack([z, heading])
-        steer.append(np.pad(steering(data, u), ((0, more), (0, 0)), "edge"))
-        true.append(np.pad(run, ((0, more), (0, 0)), constant_values=np.nan))
-    inputs, wanted = np.stack(steer, axis=-1)[..., None], np.stack(true, axis=-1)[..., None]
-    size, known = np.sqrt(np.nanmean(wanted**2, axis=(0, 2), keepdims=True)), np.isfinite(wanted)
+        runs.append(np.column_stack([z, heading]))
+        of_length.setdefault(len(u), []).append((steering(data, u), runs[-1]))
+    # Runs of one length are driven together.
+    groups = [
+        tuple(np.stack(part, axis=-1)[..., None] for part in zip(*group, strict=True))
+        for group in of_length.values()
+    ]
+    size = np.sqrt(np.mean(np.concatenate(runs) ** 2, axis=0))[:, None, None]
 
     def residuals(sets: np.ndarray) -> np.ndarray:
         """Residuals (samples, sets) of sets of constants (constants, sets)."""
-        start = np.repeat(wanted[0, :-1], sets.shape[1], axis=-1)
-        path = driven(partial(rates, sets[:, None], speed), start, inputs, step)
-        return ((path - wanted) / size)[known[..., 0]]
+        parts, count = [], sets.shape[1]
+        for inputs, wanted in groups:
+            start = np.repeat(wanted[0, :-1], count, axis=-1)
+            path = driven(partial(rates, sets[:, None], speed), start, inputs, step)
+            parts.append(((path - wanted) / size).reshape(-1, count))
+        return np.concatenate(parts)
 
     def slopes(constants: np.ndarray) -> np.ndarray:
         changes = STEP * np.maximum(np.abs(constants), LEAST)
