@@ -1,8 +1,8 @@
 """Models of general learners: training data, a learned step of few coordinates, what follows it."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
 from typing import Any, Literal
@@ -38,10 +38,11 @@ LARGEST = 1e3
 # and part of a parameter by which it may leave the one value of training.
 MARGIN, SLACK = 1.1, 0.05
 
-# One step: coordinates (r,) and standardised inputs at its ends (2 inputs,) -> coordinates (r,).
+# One step of some runs: coordinates (runs, r) and standardised inputs at its ends (runs, 2 inputs)
+# -> coordinates (runs, r).
 Step = Callable[[np.ndarray, np.ndarray], np.ndarray]
-# Coordinates (r,) at the start and inputs of all steps (steps, 2 inputs) -> coordinates (steps + 1,
-# r); from where a run diverges they are no numbers.
+# Coordinates (runs, r) at the start and inputs of all steps (steps, runs, 2 inputs) -> coordinates
+# (steps + 1, runs, r); from where a run diverges they are no numbers.
 Path = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -74,17 +75,21 @@ class LearnedSettings(SampledSettings):
 
 
 def stepped(step: Step) -> Path:
-    """A path by one step after the other, until it diverges."""
+    """A path by one step after the other, of each run until it diverges."""
 
     def path(start: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        rows = np.full((len(inputs) + 1, len(start)), np.nan)
-        rows[0] = start
+        path = np.full((len(inputs) + 1, *start.shape), np.nan)
+        path[0] = z = start
+        sound = np.ones(len(start), dtype=bool)
         for k, u in enumerate(inputs):
-            z = step(rows[k], u)
-            if not np.abs(z).max() < LARGEST:
+            z = step(z, u)
+            sound &= np.abs(z).max(axis=1) < LARGEST
+            if not sound.any():
                 break
-            rows[k + 1] = z
-        return rows
+            path[k + 1, sound] = z[sound]
+            # Libraries refuse what is no number.
+            z = np.where(sound[:, None], z, 0.0)
+        return path
 
     return path
 
@@ -93,8 +98,8 @@ def predicted(*regressors: tuple[Any, Any]) -> Path:
     """A path whose changes in a step are what regressors of scikit-learn predict, times scales."""
 
     def step(z: np.ndarray, u: np.ndarray) -> np.ndarray:
-        v = np.concatenate([z, u])[None]
-        return z + sum(scale * regressor.predict(v)[0] for regressor, scale in regressors)
+        v = np.hstack([z, u])
+        return z + sum(scale * regressor.predict(v) for regressor, scale in regressors)
 
     return stepped(step)
 
@@ -239,6 +244,8 @@ class LearnedModel(ShortRepr):
     middle: np.ndarray
     reach: np.ndarray
     offline: OfflineCost
+    # Inputs and start of a run as bytes -> its path, see `in_step`.
+    known: dict[bytes, np.ndarray] = field(default_factory=dict)
 
     @property
     def model(self) -> Any:
@@ -253,6 +260,28 @@ class LearnedModel(ShortRepr):
     def for_model(self, model: Any) -> "LearnedModel":
         """The same for a model whose online parameters are others."""
         return replace(self, states=States.of_model(model))
+
+    def in_step(self, runs: Sequence[tuple[Any, Excitation, Start]]) -> "LearnedModel":
+        """The same, with the paths of some runs (model, maneuver, start) known.
+
+        All of them go on step by step together: a prediction of many rows takes a library hardly
+        longer than one of a single row.
+        """
+        if self.model.kind == "ae" or not runs:
+            return self
+        begun = []
+        for model, maneuver, start in runs:
+            checked = checked_maneuver(maneuver, model.definition)
+            begun.append(self.for_model(model)._begun(checked, model.start(start))[1:])
+        longest = max(len(inputs) for _, inputs in begun)
+        inputs = np.zeros((longest, len(runs), begun[0][1].shape[1]))
+        for run, (_, of_run) in enumerate(begun):
+            inputs[: len(of_run), run] = of_run
+        paths = self._paths(np.stack([z for z, _ in begun]), inputs)
+        known = {
+            _key(z, of_run): paths[: len(of_run) + 1, run] for run, (z, of_run) in enumerate(begun)
+        }
+        return replace(self, known=known)
 
     def best_approximation(self, states: np.ndarray) -> None:
         """States are no linear function of the coordinates: there is no subspace."""
@@ -292,16 +321,28 @@ class LearnedModel(ShortRepr):
 
     def _path(self, maneuver: Excitation, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Times of all steps of a run, and the coordinates of those that are reached."""
+        times, z, inputs = self._begun(maneuver, state)
+        path = self.known.get(_key(z, inputs))
+        if path is None:
+            path = self._paths(z[None], inputs[:, None])[:, 0]
+        with np.errstate(invalid="ignore"):
+            sound = (np.abs(path) < LARGEST).all(axis=1)
+        return times, path[: len(path) if sound.all() else max(int(np.argmin(sound)), 1)]
+
+    def _begun(self, maneuver: Excitation, state: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Times of all steps, coordinates (r,) at the start, inputs (steps, 2 inputs)."""
         model, count = self.model, int(np.ceil(maneuver.duration / self.time_step - 1e-9))
         times = self.time_step * np.arange(max(count, 1) + 1)
         inputs = online_inputs(model, maneuver.at(np.minimum(times, maneuver.duration)))
         z = np.zeros(self.order)
         if model.kind != "structural":
             z = self.coordinates.of(self.states.of(state[None]), inputs[:1])[0]
+        return times, z, both_ends(inputs / self.input_scale)
+
+    def _paths(self, start: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """See `Path`."""
         with np.errstate(all="ignore"):
-            path = np.asarray(self.path(z, both_ends(inputs / self.input_scale)))
-            sound = (np.abs(path) < LARGEST).all(axis=1)
-        return times, path[: len(path) if sound.all() else max(int(np.argmin(sound)), 1)]
+            return np.asarray(self.path(start, inputs))
 
     def _states(self, times: np.ndarray, values: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Full states (samples, 2 n): heading and position of a vehicle follow by quadratures."""
@@ -317,6 +358,11 @@ class LearnedModel(ShortRepr):
             states = shape.states(values[:, :-3] + shape.reference, planar)
         states[0] = start
         return states
+
+
+def _key(start: np.ndarray, inputs: np.ndarray) -> bytes:
+    """All that a path follows from."""
+    return start.tobytes() + inputs.tobytes()
 
 
 def _splined(times: np.ndarray, values: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

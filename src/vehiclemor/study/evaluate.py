@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 FALLBACK = ("fallback", "fallback_tolerance")
 # More than the fits of a study of protocols, some of which take a minute.
 MOST_FITS = 128
+# Runs that a learned model solves together: their paths stay in memory.
+MOST_IN_STEP = 100
 
 
 class Fit(NamedTuple):
@@ -97,8 +99,11 @@ def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> 
     tested = model_of_run(model, test[0])
     if refused := refusal(model, experiment):
         return result_dataset(tested, experiment, [refused] * len(test), refused)
-    fit = _shared(_wanted(model, experiment))
-    outcomes = [_outcome(experiment, model, fit, scenario, solve) for scenario in test]
+    fit, outcomes = _shared(_wanted(model, experiment)), []
+    for at in range(0, len(test), MOST_IN_STEP):
+        some = test[at : at + MOST_IN_STEP]
+        solved = _in_step(fit, experiment, model, some)
+        outcomes += [_outcome(experiment, model, solved, scenario, solve) for scenario in some]
     method: Method = component("method", experiment.method)
     # Whether it has learnt from the very run that it is tested on.
     seen = (
@@ -213,6 +218,26 @@ def _fit(fit: Fit) -> FittedModel | Failure:
 
     with one_thread():
         return attempt(fit_model)
+
+
+def _in_step(
+    fit: Fitted, experiment: Experiment, model: Model, test: tuple[Scenario, ...]
+) -> Fitted:
+    """A fit that has solved some tests together, where it can and no time is measured."""
+    solve = getattr(fit.reduced, "in_step", None)
+    if solve is None or experiment.keep != "errors":
+        return fit
+
+    def solved() -> FittedModel:
+        runs = [
+            (model_of_run(model, scenario), scenario.maneuver, start_of(model, scenario))
+            for scenario in test
+        ]
+        return solve(runs)
+
+    reduced = attempt(solved)
+    # What fails does so again in its own run, which says so.
+    return fit if isinstance(reduced, Failure) else Fitted(reduced, fit.warm)
 
 
 def _text(content: Mapping[str, object]) -> str:

@@ -94,7 +94,7 @@ def operators(data: TrainingData, settings: OperatorInferenceSettings) -> Learne
         opinf.ROM(step).fit_regselect_discrete([*RIDGES], paths, inputs, **chosen)
     except RuntimeError as error:
         raise InputError("opinf finds no ridge that keeps all training runs stable") from error
-    return data.model(stepped(step.rhs))
+    return data.model(stepped(lambda z, u: step.rhs(z.T, u.T).T))
 
 
 def sparse_terms(data: TrainingData, settings: SparseIdentificationSettings) -> LearnedModel:
@@ -123,9 +123,9 @@ def linear_step(data: TrainingData, settings: DynamicModeSettings) -> LearnedMod
     size[size == 0.0] = 1.0
     ridge: Any = Ridge(settings.ridge * len(values), fit_intercept=data.constant)
     ridge.fit(arguments / size, following - values)
-    path = stepped(lambda z, u: z + ridge.predict((np.concatenate([z, u]) / size)[None])[0])
+    path = stepped(lambda z, u: z + ridge.predict(np.hstack([z, u]) / size))
     # The first observables are the coordinates.
-    return data.model(lambda z, u: path(observables.transform(z[None])[0], u)[:, :r])
+    return data.model(lambda z, u: path(observables.transform(z), u)[..., :r])
 
 
 def with_kernels(data: TrainingData, settings: GaussianProcessSettings) -> LearnedModel:

@@ -91,22 +91,26 @@ def driven(rate: Any, start: np.ndarray, steer: np.ndarray, step: float) -> np.n
 
 def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: int) -> np.ndarray:
     """Constants by least squares of states and heading over whole runs, each by its size."""
-    step, longest = data.samples.spacing, max(map(len, data.inputs))
-    steer, true = [], []
+    step, runs, of_length = data.samples.spacing, [], {}
     for z, u in zip(data.paths, data.inputs, strict=True):
-        more = longest - len(u)
         heading = np.cumsum(np.append(0.0, 0.5 * step * (z[1:, 1] + z[:-1, 1])))
-        run = np.column_stack([z, heading])
-        steer.append(np.pad(steering(data, u), ((0, more), (0, 0)), "edge"))
-        true.append(np.pad(run, ((0, more), (0, 0)), constant_values=np.nan))
-    inputs, wanted = np.stack(steer, axis=-1)[..., None], np.stack(true, axis=-1)[..., None]
-    size, known = np.sqrt(np.nanmean(wanted**2, axis=(0, 2), keepdims=True)), np.isfinite(wanted)
+        runs.append(np.column_stack([z, heading]))
+        of_length.setdefault(len(u), []).append((steering(data, u), runs[-1]))
+    # Runs of one length are driven together.
+    groups = [
+        tuple(np.stack(part, axis=-1)[..., None] for part in zip(*group, strict=True))
+        for group in of_length.values()
+    ]
+    size = np.sqrt(np.mean(np.concatenate(runs) ** 2, axis=0))[:, None, None]
 
     def residuals(sets: np.ndarray) -> np.ndarray:
         """Residuals (samples, sets) of sets of constants (constants, sets)."""
-        start = np.repeat(wanted[0, :-1], sets.shape[1], axis=-1)
-        path = driven(partial(rates, sets[:, None], speed), start, inputs, step)
-        return ((path - wanted) / size)[known[..., 0]]
+        parts, count = [], sets.shape[1]
+        for inputs, wanted in groups:
+            start = np.repeat(wanted[0, :-1], count, axis=-1)
+            path = driven(partial(rates, sets[:, None], speed), start, inputs, step)
+            parts.append(((path - wanted) / size).reshape(-1, count))
+        return np.concatenate(parts)
 
     def slopes(constants: np.ndarray) -> np.ndarray:
         changes = STEP * np.maximum(np.abs(constants), LEAST)
@@ -120,8 +124,8 @@ def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: 
 
 
 def steering(data: TrainingData, inputs: np.ndarray) -> np.ndarray:
-    """The first input (steps, 2) at both ends of steps of standardised ones."""
-    return data.input_scale[0] * inputs[:, :: len(data.input_scale)]
+    """The first input (steps, ..., 2) at both ends of steps of standardised ones."""
+    return data.input_scale[0] * inputs[..., :: len(data.input_scale)]
 
 
 def fit(model: Any, training: Training, settings: SingleTrackSettings) -> LearnedModel:
@@ -137,7 +141,12 @@ def fit(model: Any, training: Training, settings: SingleTrackSettings) -> Learne
     first = np.array([kappa, *TIRES, *BODY])
     constants = fitted_constants(data, first, shape.speed, settings.iterations + 1)
     rate, step = partial(rates, constants, shape.speed), data.samples.spacing
-    return data.model(lambda z, u: driven(rate, z, steering(data, u), step)[:, :-1])
+
+    def path(start: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        steer = np.moveaxis(steering(data, inputs), -1, 1)
+        return np.moveaxis(driven(rate, start.T, steer, step)[:, :-1], -1, 1)
+
+    return data.model(path)
 
 
 METHOD = Method(

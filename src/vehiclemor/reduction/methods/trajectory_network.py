@@ -88,7 +88,11 @@ def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings)
     network.optimization(adam_epochs=0, lbfgs_epochs=settings.epochs, iprint=-1)
     network.fit(wanted, driven)
     parameters, compiled = network.params, jax.jit(step)
-    return data.model(stepped(lambda z, u: np.asarray(compiled(z, u, parameters))))
+
+    def of_runs(z: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return np.asarray(compiled(z, u, parameters)).reshape(z.shape)
+
+    return data.model(stepped(of_runs))
 
 
 METHOD = Method(

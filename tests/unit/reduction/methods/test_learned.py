@@ -35,6 +35,16 @@ LINEAR = {
     "dynamic_mode_decomposition": {"ridge": 1e-14},
 }
 
+STEPPED = {
+    "operator_inference": {"rank": 3, "form": "bilinear"},
+    "sparse_identification": {"rank": 3, "degree": 2},
+    "dynamic_mode_decomposition": {"rank": 3, "degree": 2},
+    "gaussian_process": {"rank": 3, "samples": 50},
+    "neural_network": {"rank": 3, "width": 4, "epochs": 5},
+    "trajectory_network": {"rank": 3, "width": 4, "epochs": 2},
+    "single_track": {"iterations": 1},
+}
+
 
 def learned(name, model, runs, **settings):
     """What a method fits to runs, and what it has seen."""
@@ -89,7 +99,7 @@ def test_operators_are_those_that_repeat_the_training_best(car, runs):
             error = sum(np.linalg.norm(path - z) / np.linalg.norm(z) for path, z in pairs)
         if error < least:
             best, least = paths[0], error
-    found = reduced.path(data.paths[0][0], data.inputs[0])
+    found = reduced.path(data.paths[0][:1], data.inputs[0][:, None])[:, 0]
     np.testing.assert_allclose(found, best, atol=1e-9)
 
 
@@ -100,7 +110,7 @@ def test_monomials_are_stepped_and_begin_as_those_of_the_start(car, runs):
     products = [now[:, i] * now[:, j] for i in range(3) for j in range(i, 3)]
     lifted = np.column_stack([now, *products, inputs])
     expected = lifted @ np.linalg.lstsq(lifted, following, rcond=None)[0]
-    found = [reduced.path(z, u[None])[1] for z, u in zip(now[::90], inputs[::90], strict=True)]
+    found = reduced.path(now[::90], inputs[None, ::90])[1]
     np.testing.assert_allclose(found, expected[::90], atol=1e-5)
 
 
@@ -172,6 +182,32 @@ def test_a_diverged_run_is_recorded_up_to_where_it_left(car, runs):
     assert run.status == "diverged"
     assert "have diverged at t = " in run.message
     assert np.isnan(run.outputs[-1]).all()
+    # Another that goes on beside it does so.
+    path = stepped(lambda z, _: 2.0 * z)(np.array([[1.0], [1e-9]]), np.zeros((20, 2, 1)))
+    np.testing.assert_allclose(path[:, 1, 0], 1e-9 * 2.0 ** np.arange(21))
+    assert np.isfinite(path[:, 0]).sum() == 10
+
+
+@pytest.mark.parametrize("name", STEPPED)
+def test_runs_in_step_are_those_of_one_after_the_other(car, runs, name):
+    if name == "trajectory_network":
+        pytest.importorskip("jax_sysid")
+    method = component("method", name)
+    reduced = method.fit(car, runs, method.settings[car.kind](**STEPPED[name]))
+    maneuvers = lane_change, vm.maneuver("sine_sweep"), lane_change.perturbed(0.7, 4.0)
+    tests = [(car, maneuver, start) for maneuver in maneuvers for start in car.starts[:2]]
+    together = reduced.in_step(tests)
+
+    def refused(*_):
+        raise AssertionError("it is marched again")
+
+    for _, maneuver, start in tests:
+        # More output times leave the steps as they are.
+        alone = reduced.simulate(maneuver.subdivided(2), start)
+        run = replace(together, path=refused).simulate(maneuver.subdivided(2), start)
+        assert run.message == alone.message
+        np.testing.assert_allclose(run.outputs, alone.outputs, rtol=1e-6, atol=1e-9)
+    assert not reduced.known
 
 
 def test_reduced_lateral_dynamics_answer_slow_steering_as_all_modes_do(car):
@@ -226,6 +262,7 @@ def test_a_network_trained_on_whole_runs_repeats_them_better_than_one_of_steps(c
     for epochs in (0, 60):
         given = {"coordinates": "slow", "width": 4, "epochs": epochs}
         reduced, data = learned("trajectory_network", car, runs, **given)
-        found = [reduced.path(z[0], u) for z, u in zip(data.paths, data.inputs, strict=True)]
+        pairs = zip(data.paths, data.inputs, strict=True)
+        found = [reduced.path(z[:1], u[:, None])[:, 0] for z, u in pairs]
         off[epochs] = np.linalg.norm(np.concatenate(found) - np.concatenate(data.paths))
     assert off[60] < 0.5 * off[0]
