@@ -224,7 +224,10 @@ class ErrorModel:
         slow = np.append(follow, follow[: len(modes.coordinates.T) - len(follow)])
         kept = (modes.coordinates * slow) @ modes.shapes
         decayed = -np.linalg.pinv(linear.a, rcond=RANK).T @ linear.velocity_a.T
-        return slow, np.ascontiguousarray((np.eye(len(kept)) - kept) @ decayed)
+        # What violates constraints is not part of it.
+        settling, free = np.zeros_like(decayed), self.free
+        settling[free.indices] = free.shapes.T @ (np.eye(len(kept)) - kept) @ decayed
+        return slow, settling
 
     @cached_property
     def _bundles(self) -> tuple[Ready, Ready]:

