@@ -27,9 +27,9 @@ from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajector
 # Of looks: time in s between nodes, at last a twentieth of the period of wheel hop; the most
 # passes, and how far corrections are settled.  The last one is that which finds a small error, or
 # one within the bounds that is nearly that of the look before.
-FINER = 12, 1e-4
+FINER = 15, 1e-5
 LOOKS = (0.04, (12, 3e-4)), (0.02, FINER), (0.01, FINER), (0.005, FINER)
-SMALL, NEARLY = 0.4, 0.1
+SMALL, NEARLY = 0.4, 0.03
 FEWEST_NODES = 8
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
