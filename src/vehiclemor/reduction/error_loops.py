@@ -34,18 +34,14 @@ INFINITE = 1e300
 class Shape(NamedTuple):
     """Where the shape stands in the states (n,); heading, x, y (3,); pairs that turn (pairs, 2).
 
-    Its values at straight running are the reference (n,).
+    Its values at straight running are the reference (n,).  Further addresses of the full model's
+    kernels of rates and violations for lanes, and their constants.
     """
 
     indices: IntVector
     planar: IntVector
     pairs: IntMatrix
     reference: Vector
-
-
-class FullEquations(NamedTuple):
-    """Addresses of the kernels of rates and violations for lanes, and their constants."""
-
     kernels: IntVector
     constants: Vector
 
@@ -122,7 +118,6 @@ def corrected_run(
     start: Vector,
     violated: Violated,
     shape: Shape,
-    equations: FullEquations,
     modes: ModesOfErrors,
     passes: Passes,
     scratch: Scratch,
@@ -143,7 +138,7 @@ def corrected_run(
         guess(begin, first, end, modes, scratch)
         change, expected = 0.0, LARGEST
         for _ in range(passes.most):
-            full_rates(first, end, inputs, shape, equations, scratch)
+            full_rates(first, end, inputs, shape, scratch)
             for i in range(first, min(end, len(violated.violations))):
                 for k in range(violated.violations.shape[1]):
                     scratch.violations[i, k] -= violated.violations[i, k]
@@ -312,7 +307,7 @@ def guess(begin, first, end, modes, scratch):
             into[j] += moved[j]
 
 
-def full_rates(first, end, inputs, shape, equations, scratch):
+def full_rates(first, end, inputs, shape, scratch):
     """Rates of the states at the nodes of a window, and violations of the constraints."""
     n = len(shape.indices)
     for i in range(first, end):
@@ -323,10 +318,10 @@ def full_rates(first, end, inputs, shape, equations, scratch):
     for start in range(first, end, LANES):
         # The last lanes overlap those before; of the first window all nodes are its own.
         at = max(min(start, last), 0)
-        arrays = scratch.states, inputs, equations.constants
-        call_lanes(equations.kernels, 0, *arrays, scratch.rates, at)
+        arrays = scratch.states, inputs, shape.constants
+        call_lanes(shape.kernels, 0, *arrays, scratch.rates, at)
         if scratch.violations.shape[1]:
-            call_lanes(equations.kernels, 1, *arrays, scratch.violations, at)
+            call_lanes(shape.kernels, 1, *arrays, scratch.violations, at)
     heading = shape.planar[0]
     for i in range(first, end):
         rates, state = scratch.rates[i], scratch.states[i]

@@ -24,7 +24,6 @@ import numpy as np
 from vehiclemor.codegen.loops import Prepared, Ready, loops, ready
 from vehiclemor.codegen.operations import LANES, padded
 from vehiclemor.reduction.error_loops import (
-    FullEquations,
     ModesOfErrors,
     Passes,
     Scratch,
@@ -156,7 +155,7 @@ class ErrorModel:
         limits = Passes(WINDOW, *passes, LEAST_RANGE)
         of_errors = _modes_of_errors(self, step)
         loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
-        of_run = step, run, inputs, start, violated, *self._bundles, of_errors, limits, scratch
+        of_run = step, run, inputs, start, violated, self._of_shape, of_errors, limits, scratch
         return Space(run, inputs, start, violated, result, loop.prepared(*of_run, result))
 
     def _write_violated(
@@ -181,7 +180,7 @@ class ErrorModel:
             after[:] = decay @ before
         np.matmul(violations, shapes.T, out=violated.shapes)
         np.matmul(violations, (shapes @ rates).T, out=violated.slopes)
-        # What quadrature by the nodes misses.
+        # What the quadrature of the loop, see `integral` there, misses by its nodes.
         ends = np.array([-25.0, 48.0, -36.0, 16.0, -3.0]) / 144.0
         ends[0] -= 0.5
         by_nodes = step * (violations.sum(axis=0) + ends @ violations[: len(ends)])
@@ -230,7 +229,7 @@ class ErrorModel:
         return slow, settling
 
     @cached_property
-    def _bundles(self) -> tuple[Ready, Ready]:
+    def _of_shape(self) -> Ready:
         """The shape and the full equations, as the loop takes them."""
         shape, model = self.shape, self.shape.model
         x, y, heading = model.planar
@@ -240,8 +239,7 @@ class ErrorModel:
             address_of(model.kernels, n, LANES) if n in model.kernels else 0 for n in names
         ]
         places = shape.indices, np.array([heading, x, y]), pairs, shape.reference
-        equations = FullEquations(np.array(addresses), model.constants)
-        return ready(Shape(*places)), ready(equations)
+        return ready(Shape(*places, np.array(addresses), model.constants))
 
     def _violations(self, deviations: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Violations of the constraints and their rates (samples, 2 c)."""
