@@ -390,12 +390,11 @@ def correct(i, shape, modes, scratch):
         product(modes.correction, violations, scratch.met)
     for j in range(len(moved)):
         moved[j] -= scratch.met[j]
-    n = len(into)
-    for j in range(n):
+    for j in range(len(into)):
         into[j] += moved[j]
         largest = max(largest, abs(moved[j]) * scratch.scale[j])
         if moved[j] != moved[j]:
             return INFINITE
     for k in range(len(shape.planar)):
-        scratch.motion[i, k] = rates[shape.planar[k]] + moved[n + k]
+        scratch.motion[i, k] = rates[shape.planar[k]] + moved[len(into) + k]
     return largest
