@@ -101,3 +101,14 @@ def test_what_was_measured_is_measured_again_only_if_it_has_changed(tmp_path):
     np.testing.assert_array_equal(again["seconds"], first["seconds"])
     timed_starts({"equilibrium": cases("pod_r4", "baseline")}, path)
     assert path.stat().st_mtime_ns > written
+
+
+def test_a_fit_is_timed_with_all_inputs_of_its_training():
+    model = build("independent_suspension_vehicle")
+    steered, braked = (
+        Scenario.of(name, (1.0, 1.0), "equilibrium") for name in ("lane_change", "braking_in_turn")
+    )
+    settings = complete_settings(model, "replay", {}, "recommended")
+    replay = make_experiment(model, "replay", settings, (steered, braked), (steered,), "errors")
+    data = timed_tests({"replay": replay}, np.ones((1, 1), dtype=bool))
+    assert (data["seconds"] > 0.0).all()
