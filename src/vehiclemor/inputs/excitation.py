@@ -132,6 +132,14 @@ class Excitation(ShortRepr):
 
     @property
     @cached
+    def jumps(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times (jumps,) in s inside the run at which inputs may jump; by how much they do."""
+        edges, first, _, coefficients = self.pieces
+        after = first[1:-1]
+        return edges[1:-1], coefficients[after, 0] - coefficients[after - 1].sum(axis=1)
+
+    @property
+    @cached
     def extent(self) -> Extent:
         """Extremes of the inputs, between output times too."""
         low, high, _ = self._extent(ANYTHING)

@@ -13,6 +13,7 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction.constraint_error import constraint_errors
@@ -219,8 +220,10 @@ def error_estimate(
     """
     from vehiclemor.reduction.error_model import error_model
 
-    model, (_, start) = run.model, given
-    times, inputs = run.times[nodes], run.inputs[nodes].copy()
+    model, (maneuver, start) = run.model, given
+    times = run.times[nodes]
+    complete = checked_maneuver(maneuver, model.definition)
+    inputs = _averaged_jumps(complete, times, run.inputs[nodes])
     states = run.states_at(nodes)
     corrected, is_settled = None, False
     if np.isfinite(states).all():
@@ -230,6 +233,23 @@ def error_estimate(
         )
     errors = partial(_errors_of_states, model, inputs, states, corrected)
     return ErrorEstimate(times, model, errors, bounds, is_settled)
+
+
+def _averaged_jumps(maneuver: Excitation, times: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """Inputs (nodes, inputs) at times; the node next to a jump has the mean over its interval.
+
+    So sums over nodes are integrals, wherever inputs jump.
+    """
+    at, sizes = maneuver.jumps
+    position = at / (times[1] - times[0])
+    node = np.rint(position).astype(int)
+    inside = (node > 0) & (node < len(times) - 1)
+    node, before = node[inside], (node - position)[inside]
+    averaged = inputs.copy()
+    # Of a jump the node has all, or nothing; times that differ by rounding are one.
+    shares = 0.5 + before - (before > -1e-8)
+    np.add.at(averaged, node, shares[:, None] * sizes[inside])
+    return averaged
 
 
 def _errors_of_states(

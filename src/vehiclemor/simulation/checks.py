@@ -67,8 +67,10 @@ def check_positive(name: str, value: object, smallest: float = 0.0) -> None:
     """Raise `InputError` if a value is no finite positive number, or is below the smallest."""
     number = isinstance(value, int | float | np.integer | np.floating)
     number = number and not isinstance(value, bool | np.timedelta64)
+    # The largest number is none of single precision.
+    size: Any = float(value) if isinstance(value, np.floating) else value
     # An integer may be too large for a float.
-    if not (number and 0.0 < value <= LARGEST and value >= smallest):  # type: ignore[operator]
+    if not (number and 0.0 < size <= LARGEST and size >= smallest):
         bound = f"at least {smallest:g}" if smallest else "positive"
         raise InputError(f"{name} is {quoted(value)}; it must be a finite number, {bound}")
 
