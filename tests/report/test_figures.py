@@ -8,8 +8,7 @@ from matplotlib.image import imread
 
 from tests.report.figure_texts import checked, varied
 from vehiclemor.exceptions import InputError
-from vehiclemor.report.figures.costs import figure_pareto
-from vehiclemor.report.figures.errors import figure_errors
+from vehiclemor.report.figures.errors import figure_errors, figure_pareto
 from vehiclemor.report.figures.result_plot import draw, pictures_of, shown_outputs
 from vehiclemor.report.figures.theme import panels, save_figure, styled
 from vehiclemor.study.run import run_studies

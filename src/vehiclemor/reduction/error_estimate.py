@@ -16,7 +16,6 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
-from vehiclemor.reduction.constraint_error import constraint_errors
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
@@ -36,6 +35,9 @@ FEWEST_NODES = 8
 RESERVE = 1.25
 # Of bounds in SI units: squares of errors in bounds are numbers.
 SMALLEST = 1e-100
+# Of mechanisms: largest last step (rad or m) of Newton's method, after which its error is far
+# smaller.
+LAST_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,6 +183,28 @@ def judged(
     judged = run.judged(estimate.trust())
     seconds = loops + time.thread_time() - began
     return Trajectory.of(**judged.__dict__ | {"error_estimate": estimate, "seconds": seconds})
+
+
+def constraint_errors(
+    run: Trajectory, maneuver: Excitation
+) -> tuple[Callable[[tuple[str, ...]], np.ndarray], bool]:
+    """Errors (samples, names) of a run by names of outputs, and whether all samples are in reach.
+
+    The constraint equations say at each sample where the mechanism is.  Newton's method in vector
+    lanes goes there from extrapolated positions in little more than one step a sample: a correction
+    of the decoded coordinates takes as many, and can't tell on which branch they are.  Errors are
+    infinite from the first sample on that the mechanism can't reach on the branch of its design
+    position.
+    """
+    model = run.model
+    full = model.solved_as_far(model.sampled(maneuver), "newton_lanes", LAST_STEP)
+    return partial(_errors_of_mechanism, run, full), full.status == "ok"
+
+
+def _errors_of_mechanism(run: Trajectory, full: Trajectory, names: tuple[str, ...]) -> np.ndarray:
+    columns = [full.names.index(name) for name in names]
+    errors = run.outputs[:, columns] - full.outputs[:, columns]
+    return np.where(np.isfinite(errors), errors, np.inf)
 
 
 def _looked(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import number, real_array
+from vehiclemor.arguments import real_array
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
@@ -26,7 +25,7 @@ from vehiclemor.reduction.trust import InputRange
 from vehiclemor.reduction.validation import for_model, validated
 from vehiclemor.registry import choice, component
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import check_positive, checked_array, checked_path
+from vehiclemor.simulation.checks import check_positive, checked_array, checked_path, checked_time
 from vehiclemor.simulation.linear_model import LinearModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.stepping import SHORTEST
@@ -232,13 +231,13 @@ class ReducedOrderModel(ShortRepr):
             If the equations can't be solved.
         """
         check_positive("dt", dt, SHORTEST)
-        time = _finite(time)
+        time = checked_time(time)
         ends = None if next_inputs is None else self._inputs(next_inputs, "next_inputs")
         return self._stepped.step(self._state(state), self._inputs(inputs), dt, time, ends)
 
     def rhs(self, state: Any, inputs: Any, time: float = 0.0) -> np.ndarray:
         """Time derivative (dim,) of a state; `InputError` if it isn't finite."""
-        rates = self._stepped.rates(self._state(state), self._inputs(inputs), _finite(time))
+        rates = self._stepped.rates(self._state(state), self._inputs(inputs), checked_time(time))
         if not np.isfinite(rates).all():
             raise InputError(f"the derivative of {self._name} is not finite at this state")
         return rates
@@ -269,7 +268,7 @@ class ReducedOrderModel(ShortRepr):
             If an argument is wrong, or the model has no such derivatives.
         """
         x, u = self._state(state), self._inputs(inputs)
-        return self._stepped.sensitivities(x, u, _finite(time), with_respect_to, of)
+        return self._stepped.sensitivities(x, u, checked_time(time), with_respect_to, of)
 
     def linearise(self, state: Any = None, inputs: Any = None) -> LinearModel:
         """Linear model at a state, that of the first start by default, and inputs, 0 by default."""
@@ -370,11 +369,6 @@ class ReducedOrderModel(ShortRepr):
     @cached_property
     def _name(self) -> str:
         return f"{self.model.name} by {self.method}"
-
-
-def _finite(time: Any) -> float:
-    """A time in s; `InputError` if it is none."""
-    return time if type(time) is float and math.isfinite(time) else number("time", time)
 
 
 def load(path: Any) -> ReducedOrderModel:

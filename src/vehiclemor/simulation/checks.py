@@ -1,5 +1,6 @@
 """Checks at the border of a model that is ready to run, and of what its runs give."""
 
+import math
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -33,6 +34,11 @@ def checked_array(value: Any, size: int, name: str, model: str) -> np.ndarray:
         index = int(np.flatnonzero(~np.isfinite(array))[0])
         raise InputError(f"{name}[{index}] is not finite")
     return array
+
+
+def checked_time(time: Any) -> float:
+    """A time in s; `InputError` if it is none."""
+    return time if type(time) is float and math.isfinite(time) else number("time", time)
 
 
 def checked_path(

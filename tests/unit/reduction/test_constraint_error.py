@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from vehiclemor.reduction.constraint_error import constraint_errors
+from vehiclemor.reduction.error_estimate import constraint_errors
 
 WISHBONE = "double_wishbone"
 TIMES = np.linspace(0.0, 10.0, 1001)

@@ -43,6 +43,7 @@ class Windows(NamedTuple):
     bases: Cube
     tests: Cube
     ranks: IntVector  # Rows that are used (windows,).
+    least_squares: Int  # Whether least squares are solved, without the test basis.
 
 
 def weigh(test, r, product, reduced):
@@ -86,7 +87,6 @@ def enter_window(mean, basis, r, q, qh):
 def projected_path(
     q_start: Vector,
     windows: Windows,
-    least_squares: Int,
     inputs: Matrix,
     constants: Vector,
     kernels: IntVector,
@@ -121,7 +121,7 @@ def projected_path(
                 call_kernel(kernels, ENTRIES, q, u, constants, entries)
                 basis_product(kernels, entries, basis, r, product)
                 iterations += 1
-                if least_squares:
+                if windows.least_squares:
                     weigh(product, r, product, reduced)
                 else:
                     weigh(windows.tests[window], r, product, reduced)

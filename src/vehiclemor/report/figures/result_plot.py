@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from vehiclemor.exceptions import InputError
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
-from vehiclemor.report.figures.costs import figure_pareto
-from vehiclemor.report.figures.errors import figure_errors
+from vehiclemor.report.figures.errors import figure_errors, figure_pareto
 from vehiclemor.report.figures.runs import PATH, figure_histories, figure_paths
 from vehiclemor.report.figures.theme import save_figure, styled, tell_empty
 from vehiclemor.report.labels import main_outputs, tabled_outputs
