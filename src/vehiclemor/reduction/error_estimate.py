@@ -26,10 +26,10 @@ from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajector
 
 # Of looks: time in s between nodes, at last a twentieth of the period of wheel hop; the most
 # passes, and how far corrections are settled.  The last one is that which finds a small error, or
-# one within the bounds that is nearly that of the look before.
+# one that has changed little since the look before, beside the room that it leaves to the bounds.
 FINER = 15, 1e-5
 LOOKS = (0.04, (12, 3e-4)), (0.02, FINER), (0.01, FINER), (0.005, FINER)
-SMALL, NEARLY = 0.4, 0.03
+SMALL, ROOM = 0.4, 0.2
 FEWEST_NODES = 8
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
@@ -225,7 +225,7 @@ def _looked(
             continue
         estimate = error_estimate(finer, nodes, given, bounds, passes)
         before, error = error, estimate.in_bounds
-        is_within = RESERVE * error < 1.0 and math.isclose(before, error, rel_tol=NEARLY)
+        is_within = abs(error - before) < ROOM * (1.0 / RESERVE - error)
         if error < SMALL or is_within:
             break
     return estimate
