@@ -31,14 +31,15 @@ def one_thread() -> Iterator[None]:
     How many threads add up a sum decides how it is rounded: results are then the same to the bit,
     whatever the number of cores, jobs or limits set outside.
     """
-    # SciPy brings another library.
-    with _libraries("scipy.linalg" in sys.modules).limit(limits=1, user_api="blas"):
+    # SciPy brings another library, by whichever of these is imported first.
+    of_scipy = any(name in sys.modules for name in ("scipy.linalg", "scipy.special"))
+    with _libraries(of_scipy).limit(limits=1, user_api="blas"):
         yield
 
 
 @cache
-def _libraries(scipy: bool) -> ThreadpoolController:
-    del scipy
+def _libraries(of_scipy: bool) -> ThreadpoolController:
+    del of_scipy
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
