@@ -157,6 +157,8 @@ cached_reference = lru_cache(maxsize=1024)(reference_run)
 
 
 def _wanted(model: Model, experiment: Experiment) -> Fit:
+    # A fit needs all inputs of its training, whoever asks for it.
+    model = driven_by_all(model, (*experiment.training, *experiment.test))
     settings, method = _text(experiment.settings), experiment.method
     online, function = model.definition.online, component("method", method).fit
     changed = tuple(pair for pair in experiment.test[0].parameters if pair[0] not in online)

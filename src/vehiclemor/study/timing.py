@@ -38,7 +38,7 @@ from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.evaluate import cached_fit, evaluate, for_run, fresh_fit, model_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.result import variables
-from vehiclemor.study.scenario import driven_by_all, model_of_run, start_of
+from vehiclemor.study.scenario import model_of_run, start_of
 from vehiclemor.study.store import stored
 
 # Rounds of a cost table, and of the test set of a protocol, which has many runs; and those of them
@@ -153,15 +153,15 @@ def _rounds(
     `rounds` are all of them, and those of long runs, which have no seconds (NaN) in the others, as
     runs that fail have in all.  All runs of a round follow one another: load hits all alike.
     """
+    model = model_of(experiments[0])
     scenarios = experiments[0].test
-    model = driven_by_all(model_of(experiments[0]), scenarios)
     tests = [(as_signal(model, s.maneuver), start_of(model, s)) for s in scenarios]
     shape = (len(experiments), len(tests))
     wanted = np.ones(shape, dtype=bool) if finished is None else finished.copy()
     # The names differ, so that progress never goes back.
     work = f"rounds of times on {model.name}, {what}"
     tell(work, 0, rounds[0] + 1)
-    fits = [_warm_fit(e, bool(w.any())) for e, w in zip(experiments, wanted, strict=True)]
+    fits = [_warm_fit(model, e, bool(w.any())) for e, w in zip(experiments, wanted, strict=True)]
     for (reduced, _), runs in zip(fits, wanted, strict=True):
         if isinstance(reduced, Failure):
             if finished is not None and runs.any():
@@ -247,9 +247,10 @@ def called(
     return Seconds(*np.median(measured[1:], axis=0).tolist())
 
 
-def _warm_fit(experiment: Experiment, needed: bool) -> tuple[FittedModel | Failure, float]:
+def _warm_fit(
+    model: Model, experiment: Experiment, needed: bool
+) -> tuple[FittedModel | Failure, float]:
     """A fitted model, and the median seconds of fits with their machine code loaded."""
-    model = driven_by_all(model_of(experiment), (*experiment.training, *experiment.test))
     fitted = cached_fit(model, experiment)
     if isinstance(fitted, Failure):
         return fitted, np.nan
