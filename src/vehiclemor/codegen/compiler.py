@@ -19,13 +19,17 @@ from numba import types
 from numba.core import cgutils
 from numba.core.codegen import AOTCodeLibrary, JITCPUCodegen
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.cpu import CPUTargetOptions
 from numba.core.errors import TypingError
+from numba.core.options import TargetOptions
 from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
-from vehiclemor.codegen.llvm_arithmetic import DOUBLE
+from vehiclemor.codegen.llvm_arithmetic import DOUBLE, FLAGS, constant
+from vehiclemor.codegen.llvm_vectors import spread
 from vehiclemor.codegen.loop_types import declared_arguments
+from vehiclemor.codegen.operations import LANES
 
 # Straight-line kernels are one long block: with its default limits the compiler packs half of the
 # operations that left and right have in common.
@@ -69,7 +73,13 @@ class _Codegen(JITCPUCodegen):
         """Nothing: code without Python objects has no environment."""
 
 
+class _Options(CPUTargetOptions):
+    noalias = TargetOptions.Mapping("noalias")
+
+
 class _Target(CPUTarget):
+    options = _Options
+
     @property
     def typing_context(self) -> Any:
         return cpu_target.typing_context
@@ -125,12 +135,12 @@ def linked(modules: Sequence[ModuleType]) -> dict[str, Any]:
     functions: dict[str, Any] = {}
     namespaces = [dict(vars(module)) for module in modules]
     for module, namespace in zip(modules, namespaces, strict=True):
-        inlined = getattr(module, "INLINED", ())
+        inlined, disjoint = (getattr(module, name, ()) for name in ("INLINED", "DISJOINT"))
         for name, value in vars(module).items():
             if inspect.isfunction(value) and value.__module__ == module.__name__:
                 copied = FunctionType(value.__code__, namespace, name)
                 copied.__annotations__ = value.__annotations__
-                options = OPTIONS | {"forceinline": name in inlined}
+                options = OPTIONS | {"forceinline": name in inlined, "noalias": name in disjoint}
                 functions[name] = _Dispatcher(copied, targetoptions=options)
     for namespace in namespaces:
         namespace.update(functions | INTRINSICS)
@@ -265,6 +275,50 @@ def _call_lanes(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _call_address(context, builder, sig, args, pointers + row_lengths)
 
 
+@intrinsic
+def rows_product(
+    typing_context: Any, values: Any, first: Any, matrix: Any, result: Any, to: Any
+) -> Any:
+    """See `loop_types.rows_product`."""
+    del typing_context
+    _require_plain(values, matrix, result)
+    return types.void(values, first, matrix, result, to), _rows_product
+
+
+def _rows_product(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def part(index: int, row: Any = None) -> tuple[Any, Any, Any]:
+        array = context.make_array(sig.args[index])(context, builder, args[index])
+        rows, width = cgutils.unpack_tuple(builder, array.shape)
+        if row is None:
+            return array.data, rows, width
+        row = context.cast(builder, args[row], sig.args[row], types.intp)
+        return builder.gep(array.data, [builder.mul(row, width)]), rows, width
+
+    (values, _, stride), (matrix, terms, columns) = part(0, 1), part(2)
+    result, _, result_stride = part(3, 4)
+    kind = ir.VectorType(DOUBLE, LANES)
+    sums = [cgutils.alloca_once(builder, kind) for _ in range(LANES)]
+
+    def at(pointer: Any, offset: Any) -> Any:
+        return builder.bitcast(builder.gep(pointer, [offset]), kind.as_pointer())
+
+    with cgutils.for_range_slice(builder, WORD(0), columns, WORD(LANES), WORD) as (column, _):
+        for total in sums:
+            builder.store(constant(kind, 0.0), total)
+        with cgutils.for_range(builder, terms) as term:
+            weights = at(matrix, builder.add(builder.mul(term.index, columns), column))
+            weights = builder.load(weights, align=8)
+            for row, total in enumerate(sums):
+                place = builder.add(builder.mul(stride, WORD(row)), term.index)
+                factor = spread(builder, builder.load(builder.gep(values, [place])), LANES)
+                product = builder.fmul(weights, factor, flags=FLAGS)
+                builder.store(builder.fadd(builder.load(total), product, flags=FLAGS), total)
+        for row, total in enumerate(sums):
+            into = at(result, builder.add(builder.mul(result_stride, WORD(row)), column))
+            builder.store(builder.load(total), into, align=8)
+    return context.get_dummy_value()
+
+
 def _call_address(context: Any, builder: Any, sig: Any, args: Any, arguments: Sequence[Any]) -> Any:
     """Call the function at an index of a list of addresses, the first two arguments."""
     kernels = context.make_array(sig.args[0])(context, builder, args[0])
@@ -288,4 +342,5 @@ INTRINSICS = {
     "matrix": matrix,
     "call_kernel": call_kernel,
     "call_lanes": call_lanes,
+    "rows_product": rows_product,
 }

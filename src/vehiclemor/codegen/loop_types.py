@@ -48,6 +48,15 @@ def call_lanes(
     raise NotImplementedError(COMPILED_ONLY)
 
 
+def rows_product(values: Matrix, first: int, matrix: Matrix, result: Matrix, to: int) -> None:
+    """Write `LANES` rows of values times a matrix, from row `first` on, to rows of a result.
+
+    Only the first columns of values and of the result are used, as many as the matrix has rows and
+    columns; it has a multiple of `LANES` columns.
+    """
+    raise NotImplementedError(COMPILED_ONLY)
+
+
 def declared_arguments(entry: Any) -> dict[str, Any]:
     """Declared types of the arguments of a loop's entry by name."""
     return {name: kind for name, kind in entry.__annotations__.items() if name != "return"}

@@ -1,7 +1,8 @@
 """Corrections of a run by the full equations, window by window: a compiled loop.
 
 See `error_model`.  Modal coordinates stand in rows: real parts of all modes, those of pairs first,
-then imaginary parts of pairs.  Rows and columns of matrices are filled up with zeros to fours.
+then imaginary parts of pairs.  A window has as many nodes as vector lanes.  Arrays have rows for
+whole windows, and columns up to a multiple of the lanes, filled up with zeros.
 """
 
 import math
@@ -15,6 +16,7 @@ from vehiclemor.codegen.loop_types import (
     Matrix,
     Vector,
     call_lanes,
+    rows_product,
 )
 from vehiclemor.codegen.operations import LANES
 
@@ -23,19 +25,22 @@ from vehiclemor.codegen.operations import LANES
 DECAY, BEGIN, END, RATES = 0, 2, 4, 6
 
 INLINED = (
-    *("begin_with", "shape_of", "turn", "product", "slopes", "slope", "integral", "place"),
-    *("guess", "full_rates", "modal_sources", "propagate", "correct"),
+    *("begin_with", "shape_of", "turn", "slopes", "slope", "integral", "place"),
+    *("guess", "full_rates", "modal_sources", "propagate", "correct", "change_shapes"),
+    *("stepped", "turned"),
 )
+# Of these no argument overlaps one that is written.
+DISJOINT = "stepped", "turned"
 # A change that is larger has gone to infinity, as one that is no number has.
 LARGEST = 1e9
-INFINITE = 1e300
 
 
 class Shape(NamedTuple):
-    """Where the shape stands in the states (n,); heading, x, y (3,); pairs that turn (pairs, 2).
+    """Where the shape stands in the states; heading, x, y (3,); pairs that turn (pairs, 2).
 
-    Its values at straight running are the reference (n,).  Further addresses of the full model's
-    kernels of rates and violations for lanes, and their constants.
+    Shapes have the columns of states (n,); those that are not of the shape are zero.  Its values at
+    straight running are the reference (n,).  Further addresses of the full model's kernels of rates
+    and violations for lanes, and their constants.
     """
 
     indices: IntVector
@@ -47,24 +52,23 @@ class Shape(NamedTuple):
 
 
 class ModesOfErrors(NamedTuple):
-    """Modes: coordinates of shapes and back (rows, columns), filled up; weights (8, modes).
+    """Modes: coordinates of shapes (n, columns); changes of shapes; weights (8, modes).
 
-    Three further columns of shapes, and of the correction that meets violations of constraints,
-    are changes of psi', U, V.  Slow (modal coordinates,) is one for those that start with an error;
-    what the others add to heading and place while they decay follows from the start's deviation by
-    `settling` (n, 3).
+    Changes have rows for violations of constraints, which they meet, and for modal coordinates; of
+    their columns the three after those of the shape are changes of psi', U, V.  Slow (modal
+    coordinates,) is one for those that start with an error; what the others add to heading and
+    place while they decay follows from the start's deviation by `settling` (n, 3).
     """
 
     coordinates: Matrix
-    shapes: Matrix
+    changes: Matrix
     weights: Matrix
     slow: Vector
     settling: Matrix
-    correction: Matrix
 
 
 class Violated(NamedTuple):
-    """Constraints that the start violates: at some first nodes violations and rates, filled up.
+    """Constraints that the start violates: at some first nodes violations and rates.
 
     Shapes that move with them and these shapes' slopes (nodes, n), and what of heading and place
     the nodes miss (3,).
@@ -77,36 +81,37 @@ class Violated(NamedTuple):
 
 
 class Passes(NamedTuple):
-    """Nodes of a window, passes that are made of it at most, and the change that ends them.
+    """Passes that are made of a window at most, and the change that ends them.
 
     Changes of the shape are measured in the ranges of its coordinates, at least in `least`.
     """
 
-    window: Int
     most: Int
     settled: Float
     least: Float
 
 
 class Scratch(NamedTuple):
-    """Room for all nodes: states, their rates, violations, shapes, slopes of the path, motions.
+    """Room for all nodes: states, inputs, rates, shapes, slopes of the path, motions.
 
-    Then in modes, filled up, what drives errors, and the errors; further for a change of these, a
-    shape and its motion, what meets violations (both filled up), one over the ranges of the
-    coordinates (n,), and what a start adds to heading and place (3,).
+    Then in modes what drives errors, and the errors; what changes shapes: violations of the
+    constraints, and changes of the errors.  For the nodes of a window what is left over of the
+    slopes, and changes of the shapes.  Of the coordinates of the shape the largest change and one
+    over the ranges (n,); what a start adds to heading and place (3,).
     """
 
     states: Matrix
+    inputs: Matrix
     rates: Matrix
-    violations: Matrix
     shapes: Matrix
     slopes: Matrix
     motion: Matrix
     sources: Matrix
     errors: Matrix
-    change: Vector
-    moved: Vector
-    met: Vector
+    changes: Matrix
+    left: Matrix
+    moved: Matrix
+    largest: Vector
     scale: Vector
     settled: Vector
 
@@ -128,47 +133,43 @@ def corrected_run(
     Start (n,) is that of the full model.  Returned is the number of windows that were not settled,
     or minus one if a correction has gone to infinity.
     """
-    begin_with(run, (start, violated), step, shape, modes, passes, scratch)
-    nodes, begin, unsettled = len(scratch.shapes), 0, 0
-    while begin < nodes - 1:
-        end = min(begin + passes.window, nodes)
-        if nodes - end < LANES:
-            end = nodes
-        first = begin + 1 if begin else 0
-        guess(begin, first, end, modes, scratch)
+    begin_with(run, inputs, (start, violated), step, shape, modes, passes, scratch)
+    nodes, unsettled = len(result), 0
+    for first in range(0, nodes, LANES):
+        end = min(first + LANES, nodes)
+        guess(first, end, modes, scratch)
         change, expected = 0.0, LARGEST
         for _ in range(passes.most):
-            full_rates(first, end, inputs, shape, scratch)
-            for i in range(first, min(end, len(violated.violations))):
-                for k in range(violated.violations.shape[1]):
-                    scratch.violations[i, k] -= violated.violations[i, k]
-            modal_sources(begin, end, shape, modes, scratch)
-            before, change = change, 0.0
+            full_rates(first, end, shape, violated, scratch)
+            modal_sources(first, modes, scratch)
+            before = change
             for i in range(first, end):
                 propagate(i, modes, scratch)
-                largest = correct(i, shape, modes, scratch)
-                if not largest < LARGEST:
-                    return -1
-                change = max(change, largest)
+            change = correct(first, end, shape, modes, scratch)
+            if not change < LARGEST:
+                return -1
             # The next change, if each is smaller than the one before by the same factor.
             expected = change * change / before if change < before else change
             if expected < passes.settled:
                 break
         if expected >= passes.settled:
             unsettled += 1
-        begin = end - 1 if end < nodes else end
     place(step, start, shape, scratch, result)
     return unsettled
 
 
-def begin_with(run, begin, step, shape, modes, passes, scratch):
+def begin_with(run, inputs, begin, step, shape, modes, passes, scratch):
     """Shapes of a run and their slopes, the error at the start, and ranges."""
     start, violated = begin
-    shapes, scale, moved = scratch.shapes, scratch.scale, scratch.moved
-    nodes, n = shapes.shape
-    for i in range(nodes):
-        shape_of(run[i], shape, scratch.states[i], shapes[i])
-    moved[:] = 0.0
+    shapes, scale, moved = scratch.shapes, scratch.scale, scratch.moved[0]
+    nodes, n = run.shape
+    scratch.slopes[nodes:] = 0.0
+    for i in range(len(shapes)):
+        # Of the last window further nodes are like the last one.
+        k = min(i, nodes - 1)
+        for j in range(inputs.shape[1]):
+            scratch.inputs[i, j] = inputs[k, j]
+        shape_of(run[k], shape, scratch.rates[i], shapes[i])
     for j in range(n):
         # A method may record the first state as it was given.
         near = 4.0 * shapes[1, j] - 6.0 * shapes[2, j]
@@ -180,30 +181,32 @@ def begin_with(run, begin, step, shape, modes, passes, scratch):
             moved[j] = min(moved[j], shapes[i, j])
     for j in range(n):
         scale[j] = 1.0 / max(scale[j] - moved[j], passes.least)
-    slopes(shapes, step, scratch.slopes)
+    slopes(shapes[:nodes], step, scratch.slopes)
     for i in range(len(violated.shapes)):
         for j in range(n):
             shapes[i, j] += violated.shapes[i, j]
             scratch.slopes[i, j] += violated.slopes[i, j]
-    shape_of(start, shape, scratch.states[0], moved)
+    shape_of(start, shape, scratch.rates[0], moved)
     for k in range(len(scratch.settled)):
         scratch.settled[k] = violated.motion[k]
+    errors = scratch.errors[0]
+    errors[:] = 0.0
     for j in range(n):
-        moved[j] -= shapes[0, j]
+        deviation, row = moved[j] - shapes[0, j], modes.coordinates[j]
         for k in range(len(scratch.settled)):
-            scratch.settled[k] += moved[j] * modes.settling[j, k]
-    product(modes.coordinates, moved, scratch.errors[0])
-    for k in range(len(modes.slow)):
-        scratch.errors[0, k] *= modes.slow[k]
-    scratch.states[:] = 0.0
+            scratch.settled[k] += deviation * modes.settling[j, k]
+        for k in range(len(modes.slow)):
+            errors[k] += deviation * row[k] * modes.slow[k]
 
 
 def shape_of(state, shape, turned, deviation):
     """Deviation of the shape of a state from straight running; `turned` is room for a state."""
     heading = state[shape.planar[0]]
     turn(state, shape, math.cos(heading), -math.sin(heading), turned)
-    for j in range(len(shape.indices)):
-        deviation[j] = turned[shape.indices[j]] - shape.reference[j]
+    for j in range(len(state)):
+        deviation[j] = 0.0
+    for j in shape.indices:
+        deviation[j] = turned[j] - shape.reference[j]
 
 
 def turn(state, shape, cosine, sine, turned):
@@ -215,17 +218,6 @@ def turn(state, shape, cosine, sine, turned):
         one, other = state[a], state[b]
         turned[a] = cosine * one - sine * other
         turned[b] = sine * one + cosine * other
-
-
-def product(matrix, values, result):
-    """Linear combination of the rows of a matrix, four of them at once."""
-    for k in range(len(result)):
-        result[k] = 0.0
-    for j in range(0, len(matrix) - 3, 4):
-        a, b, c, d = values[j], values[j + 1], values[j + 2], values[j + 3]
-        one, two, three, four = matrix[j], matrix[j + 1], matrix[j + 2], matrix[j + 3]
-        for k in range(len(result)):
-            result[k] += (a * one[k] + b * two[k]) + (c * three[k] + d * four[k])
 
 
 def slopes(values, step, result):
@@ -271,9 +263,13 @@ def integral(values, j, step, first, result, into):
 
 def place(step, start, shape, scratch, result):
     """Write the states of corrected shapes, with heading and position by quadratures."""
-    motion, states = scratch.motion, scratch.states
+    motion, states = scratch.motion[: len(result)], scratch.states
     heading, x, y = shape.planar[0], shape.planar[1], shape.planar[2]
     turned, ahead, aside = scratch.settled[0], scratch.settled[1], scratch.settled[2]
+    for i in range(len(states)):
+        state, deviation = states[i], scratch.shapes[i]
+        for j in range(len(state)):
+            state[j] = shape.reference[j] + deviation[j]
     cosine, sine = math.cos(start[heading]), math.sin(start[heading])
     integral(motion, 0, step, start[heading] + turned, states, heading)
     first_x = start[x] + cosine * ahead - sine * aside
@@ -285,64 +281,66 @@ def place(step, start, shape, scratch, result):
         motion[i, 2] = sine * forward + cosine * sideward
     integral(motion, 1, step, first_x, states, x)
     integral(motion, 2, step, first_y, states, y)
-    for i in range(len(states)):
+    for i in range(len(result)):
         state = states[i]
-        for j in range(len(shape.indices)):
-            state[shape.indices[j]] = shape.reference[j] + scratch.shapes[i, j]
         turn(state, shape, math.cos(state[heading]), math.sin(state[heading]), result[i])
 
 
-def guess(begin, first, end, modes, scratch):
-    """At first what drives the errors is guessed to stay as it is at the beginning of a window."""
-    moved = scratch.moved
+def guess(first, end, modes, scratch):
+    """At first what drives the errors is guessed to stay as it is at the end of the last window."""
+    shift = modes.changes.shape[0] - len(modes.slow)
     for i in range(first, end):
-        errors, into = scratch.errors[i], scratch.shapes[i]
-        sources, known = scratch.sources[i], scratch.sources[begin]
-        for k in range(len(errors)):
-            sources[k] = known[k] if begin else 0.0
-            errors[k] = errors[k] if i == 0 else 0.0
+        errors, sources = scratch.errors[i], scratch.sources[i]
+        if i:
+            errors[:] = 0.0
+        for k in range(len(modes.slow)):
+            sources[k] = scratch.sources[i - 1, k] if first else 0.0
         propagate(i, modes, scratch)
-        product(modes.shapes, errors, moved)
-        for j in range(into.shape[0]):
-            into[j] += moved[j]
+        scratch.changes[i, :shift] = 0.0
+        for k in range(len(modes.slow)):
+            scratch.changes[i, shift + k] = errors[k]
+    change_shapes(first, end, modes, scratch)
 
 
-def full_rates(first, end, inputs, shape, scratch):
+def full_rates(first, end, shape, violated, scratch):
     """Rates of the states at the nodes of a window, and violations of the constraints."""
-    n = len(shape.indices)
-    for i in range(first, end):
-        state, deviation = scratch.states[i], scratch.shapes[i]
-        for j in range(n):
-            state[shape.indices[j]] = shape.reference[j] + deviation[j]
-    last = end - LANES
-    for start in range(first, end, LANES):
-        # The last lanes overlap those before; of the first window all nodes are its own.
-        at = max(min(start, last), 0)
-        arrays = scratch.states, inputs, shape.constants
-        call_lanes(shape.kernels, 0, *arrays, scratch.rates, at)
-        if scratch.violations.shape[1]:
-            call_lanes(shape.kernels, 1, *arrays, scratch.violations, at)
+    states, rates = scratch.states, scratch.rates
+    for i in range(first, first + LANES):
+        state, deviation = states[i], scratch.shapes[i]
+        for j in range(len(state)):
+            state[j] = shape.reference[j] + deviation[j]
+    call_lanes(shape.kernels, 0, states, scratch.inputs, shape.constants, rates, first)
+    count = violated.violations.shape[1]
+    if count:
+        call_lanes(
+            shape.kernels, 1, states, scratch.inputs, shape.constants, scratch.changes, first
+        )
+    for i in range(first, min(end, len(violated.violations))):
+        for k in range(count):
+            scratch.changes[i, k] -= violated.violations[i, k]
     heading = shape.planar[0]
-    for i in range(first, end):
-        rates, state = scratch.rates[i], scratch.states[i]
+    for i in range(first, first + LANES):
+        rate, state = rates[i], states[i]
         for p in range(len(shape.pairs)):
             # Components in a frame that turns.
             a, b = shape.pairs[p, 0], shape.pairs[p, 1]
-            rates[a] += rates[heading] * state[b]
-            rates[b] -= rates[heading] * state[a]
+            rate[a] += rate[heading] * state[b]
+            rate[b] -= rate[heading] * state[a]
 
 
-def modal_sources(begin, end, shape, modes, scratch):
+def modal_sources(first, modes, scratch):
     """What drives the errors at the nodes of a window, in modes."""
-    moved, weights = scratch.moved, modes.weights
+    weights = modes.weights
     count = weights.shape[1]
     pairs = len(modes.slow) - count
-    for i in range(begin, end):
-        rates, slope_of_path = scratch.rates[i], scratch.slopes[i]
+    for i in range(LANES):
+        rates, slope_of_path = scratch.rates[first + i], scratch.slopes[first + i]
+        left = scratch.left[i]
+        for j in range(len(left)):
+            left[j] = rates[j] - slope_of_path[j]
+    rows_product(scratch.left, 0, modes.coordinates, scratch.sources, first)
+    for i in range(first, first + LANES):
         into, errors = scratch.sources[i], scratch.errors[i]
-        for j in range(len(shape.indices)):
-            moved[j] = rates[shape.indices[j]] - slope_of_path[j]
-        product(modes.coordinates, moved, into)
         for k in range(count):
             into[k] -= weights[RATES, k] * errors[k]
         for k in range(pairs):
@@ -353,48 +351,74 @@ def modal_sources(begin, end, shape, modes, scratch):
 
 def propagate(i, modes, scratch):
     """The error at a node from that at the one before it; and its change since the last pass."""
-    weights, change = modes.weights, scratch.change
-    count = weights.shape[1]
+    count, shift = modes.weights.shape[1], modes.changes.shape[0] - len(modes.slow)
+    change, errors = scratch.changes[i, shift:], scratch.errors[i]
     if i == 0:
         change[:] = 0.0
         return
-    before, errors = scratch.errors[i - 1], scratch.errors[i]
-    begin, end = scratch.sources[i - 1], scratch.sources[i]
-    for k in range(len(modes.slow)):
-        change[k] = -errors[k]
-    for k in range(count):
+    for k in range(len(change)):
+        change[k] = errors[k]
+    pairs = len(change) - count
+    before, begin, end = scratch.errors[i - 1], scratch.sources[i - 1], scratch.sources[i]
+    real, imaginary = errors[:count], errors[count : count + pairs]
+    stepped(real, before, begin, end, modes.weights)
+    turned(
+        real,
+        imaginary,
+        (before, before[count:]),
+        (begin, begin[count:]),
+        (end, end[count:]),
+        modes.weights,
+    )
+    for k in range(len(change)):
+        change[k] = errors[k] - change[k]
+
+
+def stepped(errors, before, begin, end, weights):
+    """Real parts of errors from those at the node before, as if modes were real."""
+    for k in range(len(errors)):
         part = weights[DECAY, k] * before[k] + weights[BEGIN, k] * begin[k]
         errors[k] = part + weights[END, k] * end[k]
-    for k in range(len(modes.slow) - count):
-        m = count + k
-        errors[k] -= (
-            weights[DECAY + 1, k] * before[m]
-            + weights[BEGIN + 1, k] * begin[m]
-            + weights[END + 1, k] * end[m]
-        )
-        errors[m] = (
-            (weights[DECAY, k] * before[m] + weights[DECAY + 1, k] * before[k])
-            + (weights[BEGIN, k] * begin[m] + weights[BEGIN + 1, k] * begin[k])
-            + (weights[END, k] * end[m] + weights[END + 1, k] * end[k])
-        )
-    for k in range(len(modes.slow)):
-        change[k] += errors[k]
 
 
-def correct(i, shape, modes, scratch):
-    """Change the shape at a node, and write its motion; how much it changes in its ranges."""
-    rates, violations, change = scratch.rates[i], scratch.violations[i], scratch.change
-    moved, into, largest = scratch.moved, scratch.shapes[i], 0.0
-    product(modes.shapes, change, moved)
-    if len(violations):
-        product(modes.correction, violations, scratch.met)
-    for j in range(len(moved)):
-        moved[j] -= scratch.met[j]
-    for j in range(len(into)):
-        into[j] += moved[j]
-        largest = max(largest, abs(moved[j]) * scratch.scale[j])
-        if moved[j] != moved[j]:
-            return INFINITE
-    for k in range(len(shape.planar)):
-        scratch.motion[i, k] = rates[shape.planar[k]] + moved[len(into) + k]
-    return largest
+def turned(real, imaginary, before, begin, end, weights):
+    """What pairs of modes add to real parts of errors, and imaginary parts."""
+    for k in range(len(imaginary)):
+        real[k] -= (
+            weights[DECAY + 1, k] * before[1][k]
+            + weights[BEGIN + 1, k] * begin[1][k]
+            + weights[END + 1, k] * end[1][k]
+        )
+    for k in range(len(imaginary)):
+        imaginary[k] = (
+            (weights[DECAY, k] * before[1][k] + weights[DECAY + 1, k] * before[0][k])
+            + (weights[BEGIN, k] * begin[1][k] + weights[BEGIN + 1, k] * begin[0][k])
+            + (weights[END, k] * end[1][k] + weights[END + 1, k] * end[0][k])
+        )
+
+
+def correct(first, end, shape, modes, scratch):
+    """Change the shapes of a window, and write motions; the largest change in its range."""
+    change_shapes(first, end, modes, scratch)
+    largest, change = scratch.largest, 0.0
+    for j in range(len(largest)):
+        part = largest[j] * scratch.scale[j]
+        # Also one that is no number.
+        change = change if part <= change else part
+    for i in range(first, end):
+        rates, moved = scratch.rates[i], scratch.moved[i - first]
+        for k in range(len(shape.planar)):
+            scratch.motion[i, k] = rates[shape.planar[k]] + moved[len(largest) + k]
+    return change
+
+
+def change_shapes(first, end, modes, scratch):
+    """Add what changes are of shapes; the largest one of each coordinate of the shape."""
+    rows_product(scratch.changes, first, modes.changes, scratch.moved, 0)
+    largest = scratch.largest
+    largest[:] = 0.0
+    for i in range(first, end):
+        moved, into = scratch.moved[i - first], scratch.shapes[i]
+        for j in range(len(largest)):
+            into[j] += moved[j]
+            largest[j] = max(largest[j], abs(moved[j]))

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vehiclemor.codegen.loops import Prepared, Ready, loops, ready
-from vehiclemor.codegen.operations import LANES, padded
+from vehiclemor.codegen.operations import LANES
 from vehiclemor.reduction.error_loops import (
     ModesOfErrors,
     Passes,
@@ -42,9 +42,8 @@ APART = 8
 # Modes start with an error whose rate times the time between nodes is no larger; the others have
 # decayed before it matters.
 FOLLOWED = 8.0
-# Nodes in a window; least range of a coordinate of the shape, in which changes are measured (m,
-# rad, m/s, rad/s).
-WINDOW, LEAST_RANGE = 9, 1e-3
+# Least range of a coordinate of the shape, in which changes are measured (m, rad, m/s, rad/s).
+LEAST_RANGE = 1e-3
 # Violations of constraints and their rates that are none (m, m/s); time in s in which those of a
 # start decay, ten time constants of their stabilisation.
 HELD, SETTLED = 1e-6, 0.2
@@ -85,14 +84,16 @@ def _shape(alike: Alike) -> tuple[VehicleShape, Pool[Space]]:
 @lru_cache(maxsize=256)
 def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
     """What the loop needs of the modes at nodes that are a step in s apart."""
-    modes = errors.modes
+    modes, slow_and_settling = errors.modes, errors.starts(step)
+    changes = np.vstack([-errors.free.correction, modes.shapes])
+    motions = changes @ errors.linearised.velocity_a.T
     return ready(
         ModesOfErrors(
-            _filled(modes.coordinates),
-            _filled(errors.with_motion(modes.shapes)),
+            _filled(errors.in_states(modes.coordinates.T).T),
+            _filled(np.hstack([errors.in_states(changes), motions])),
             errors.weights(step),
-            *errors.starts(step),
-            _filled(errors.with_motion(errors.free.correction)),
+            slow_and_settling[0],
+            np.ascontiguousarray(errors.in_states(slow_and_settling[1].T).T),
         )
     )
 
@@ -141,18 +142,18 @@ class ErrorModel:
 
     def _space(self, step: float, nodes: int, passes: tuple[int, float]) -> Space:
         """Arrays of a run, and the loop that uses them."""
-        (n, count), model = self.modes.coordinates.shape, self.shape.model
-        filled, shape, states = padded(count), padded(n + 3), len(model.definition.states)
-        violations = padded(len(self.free.correction))
-        widths = states, states, violations, n, n, 3, filled, filled
-        rooms: list[Any] = [np.empty((nodes, columns)) for columns in widths]
-        scratch = Scratch(*rooms, *(np.zeros(size) for size in (filled, shape, shape, n, 3)))
-        run, result = np.empty((2, nodes, states))
-        inputs, start = np.empty((nodes, len(model.inputs))), np.empty(states)
+        model, modes = self.shape.model, len(self.modes.shapes)
+        n, violations = len(model.definition.states), len(self.free.correction)
+        rows, of_modes, of_shape = map(_up_to_lanes, (nodes, modes, n + 3))
+        widths = n, len(model.inputs), n, n, n, 3, of_modes, of_modes, violations + modes
+        of_nodes: list[Any] = [np.empty((rows, columns)) for columns in widths]
+        of_window: list[Any] = [np.empty((LANES, columns)) for columns in (n, of_shape)]
+        scratch = Scratch(*of_nodes, *of_window, np.empty(n), np.empty(n), np.empty(3))
+        run, result = np.empty((2, nodes, n))
+        inputs, start = np.empty((nodes, len(model.inputs))), np.empty(n)
         first = min(max(int(SETTLED / step) + 1, 5), nodes)
-        rooms = [np.zeros(size) for size in ((first, violations), (first, n), (first, n), 3)]
-        violated = Violated(*rooms)
-        limits = Passes(WINDOW, *passes, LEAST_RANGE)
+        violated = Violated(*map(np.zeros, ((first, violations), (first, n), (first, n), 3)))
+        limits = Passes(*passes, LEAST_RANGE)
         of_errors = _modes_of_errors(self, step)
         loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
         of_run = step, run, inputs, start, violated, self._of_shape, of_errors, limits, scratch
@@ -174,12 +175,12 @@ class ErrorModel:
                 array[:] = 0.0
             return
         (rates, shapes), decay = self._violating, _decay_of_violations(self, step)
-        violations = violated.violations[:, :count]
+        violations = violated.violations
         violations[0] = at_first
         for before, after in pairwise(violations):
             after[:] = decay @ before
-        np.matmul(violations, shapes.T, out=violated.shapes)
-        np.matmul(violations, (shapes @ rates).T, out=violated.slopes)
+        violated.shapes[:] = self.in_states(violations @ shapes.T)
+        violated.slopes[:] = self.in_states(violations @ (shapes @ rates).T)
         # What the quadrature of the loop, see `integral` there, misses by its nodes.
         ends = np.array([-25.0, 48.0, -36.0, 16.0, -3.0]) / 144.0
         ends[0] -= 0.5
@@ -200,9 +201,11 @@ class ErrorModel:
         )
         return rates, free.correction.T + free.shapes @ along
 
-    def with_motion(self, changes: np.ndarray) -> np.ndarray:
-        """Changes (rows, n) of the shape with those of psi', U, V (rows, n + 3)."""
-        return np.hstack([changes, changes @ self.linearised.velocity_a.T])
+    def in_states(self, shapes: np.ndarray) -> np.ndarray:
+        """Rows of shapes (rows, n) with a column for each state."""
+        columns = np.zeros((len(shapes), len(self.shape.model.definition.states)))
+        columns[:, self.shape.indices] = shapes
+        return columns
 
     @cached_property
     def linearised(self) -> Linearisation:
@@ -238,7 +241,8 @@ class ErrorModel:
         addresses = [
             address_of(model.kernels, n, LANES) if n in model.kernels else 0 for n in names
         ]
-        places = shape.indices, np.array([heading, x, y]), pairs, shape.reference
+        reference = self.in_states(shape.reference[None])[0]
+        places = shape.indices, np.array([heading, x, y]), pairs, reference
         return ready(Shape(*places, np.array(addresses), model.constants))
 
     def _violations(self, deviations: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -298,9 +302,15 @@ class ErrorModel:
 
 
 def _filled(matrix: np.ndarray) -> np.ndarray:
-    """A matrix with rows and columns of zeros up to multiples of four."""
-    more = [(0, padded(count) - count) for count in matrix.shape]
-    return np.ascontiguousarray(np.pad(matrix, more))
+    """A matrix with further columns of zeros, up to a multiple of the lanes."""
+    rows, columns = matrix.shape
+    filled = np.zeros((rows, _up_to_lanes(columns)))
+    filled[:, :columns] = matrix
+    return filled
+
+
+def _up_to_lanes(count: int) -> int:
+    return -(-count // LANES) * LANES
 
 
 class Space(NamedTuple):
