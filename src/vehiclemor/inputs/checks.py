@@ -1,5 +1,7 @@
 """Checks of maneuvers at the border of a model that is ready to run."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from vehiclemor.arguments import quoted
@@ -50,13 +52,19 @@ def _checked(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
     return complete
 
 
-@cached
-def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
+@lru_cache(maxsize=64)
+def _limits(definition: ModelDefinition) -> np.ndarray | None:
+    """Low and high limits (2, inputs) of the inputs, if there are any."""
     anything = -np.inf, np.inf
     ranges = [definition.validity.get(q.name, anything) for q in definition.inputs]
-    if all(bounds == anything for bounds in ranges):
+    return None if all(bounds == anything for bounds in ranges) else np.array(ranges).T
+
+
+@cached
+def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
+    if (limits := _limits(definition)) is None:
         return
-    low, high = np.array(ranges).T
+    low, high = limits
     if definition.kind == "structural":
         # A road has too many waves to be taken between output times.
         times, values = maneuver.recorded_inputs
@@ -64,6 +72,8 @@ def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
         outside, since = np.flatnonzero(beyond.any(axis=0)), times[beyond.argmax(axis=0)]
     else:
         extent = maneuver.extent
+        if (extent.low >= low).all() and (extent.high <= high).all():
+            return
         rounding = ROUNDING * extent.largest
         outside = np.flatnonzero((extent.low < low - rounding) | (extent.high > high + rounding))
         limits = np.vstack([low - rounding, high + rounding])

@@ -38,6 +38,7 @@ from vehiclemor.registry import choice
 OUTPUT_STEP = 0.02
 # Time (s) between the samples that are taken of a function.
 FUNCTION_STEP = 0.01
+NO_JUMPS = np.empty(0), np.empty((0, 0))
 
 # Inputs that an angle's unit or a steering ratio is not meant for.
 OF_ANOTHER_UNIT = frozenset(quantity.name for quantity in OPTIONAL_INPUTS)
@@ -152,6 +153,11 @@ class Signal(Excitation):
     def break_points(self) -> tuple[float, ...]:
         """Times in s inside the run at which a time loop begins anew."""
         return tuple(self.pieces.edges[1:-1].tolist())
+
+    @property
+    def jumps(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times (jumps,) in s inside the run at which inputs jump; by how much they do."""
+        return super().jumps if self.hold == "zero" else NO_JUMPS
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Inputs (n, number of inputs) at times (n,) in s; `InputError` beyond the samples."""

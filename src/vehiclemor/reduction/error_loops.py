@@ -19,6 +19,8 @@ from vehiclemor.codegen.loop_types import (
     rows_product,
 )
 from vehiclemor.codegen.operations import LANES
+from vehiclemor.simulation.loop_arguments import Outputs
+from vehiclemor.simulation.path_loops import evaluate
 
 # Rows of the weights of a step, real and imaginary parts by mode: of the error before it, of what
 # drives the error at its beginning and at its end; then the rates of the modes.
@@ -27,12 +29,41 @@ DECAY, BEGIN, END, RATES = 0, 2, 4, 6
 INLINED = (
     *("begin_with", "shape_of", "turn", "slopes", "slope", "integral", "place"),
     *("guess", "full_rates", "modal_sources", "propagate", "correct", "change_shapes"),
-    *("stepped", "turned"),
+    *("step_real_parts", "step_pairs", "judge"),
 )
 # Of these no argument overlaps one that is written.
-DISJOINT = "stepped", "turned"
+DISJOINT = "step_real_parts", "step_pairs"
 # A change that is larger has gone to infinity, as one that is no number has.
 LARGEST = 1e9
+
+
+class Path(NamedTuple):
+    """A run of a reduced model at nodes that are a step in s apart.
+
+    Its states and those that are corrected (nodes, n), inputs (nodes, inputs), and the start (n,)
+    of the full model.
+    """
+
+    step: Float
+    run: Matrix
+    corrected: Matrix
+    inputs: Matrix
+    start: Vector
+
+
+class Bounded(NamedTuple):
+    """Outputs with bounds, a kernel's results for these of run and corrected run (nodes, results).
+
+    Bounds (outputs,), ones of those that are for the largest error instead of its RMS, and errors
+    in bounds.
+    """
+
+    outputs: Outputs
+    own: Matrix
+    full: Matrix
+    bounds: Vector
+    is_peak: Vector
+    errors: Vector
 
 
 class Shape(NamedTuple):
@@ -117,24 +148,21 @@ class Scratch(NamedTuple):
 
 
 def corrected_run(
-    step: Float,
-    run: Matrix,
-    inputs: Matrix,
-    start: Vector,
+    path: Path,
     violated: Violated,
     shape: Shape,
     modes: ModesOfErrors,
     passes: Passes,
     scratch: Scratch,
-    result: Matrix,
+    bounded: Bounded,
 ) -> Int:
-    """Correct states of a run (nodes, n) at nodes that are a step in s apart.
+    """Correct states of a run, and write the errors of its bounded outputs.
 
-    Start (n,) is that of the full model.  Returned is the number of windows that were not settled,
-    or minus one if a correction has gone to infinity.
+    Returned is the number of windows that were not settled, or minus one if a correction has gone
+    to infinity.
     """
-    begin_with(run, inputs, (start, violated), step, shape, modes, passes, scratch)
-    nodes, unsettled = len(result), 0
+    begin_with(path, violated, shape, modes, passes, scratch)
+    nodes, unsettled = len(path.run), 0
     for first in range(0, nodes, LANES):
         end = min(first + LANES, nodes)
         guess(first, end, modes, scratch)
@@ -154,13 +182,33 @@ def corrected_run(
                 break
         if expected >= passes.settled:
             unsettled += 1
-    place(step, start, shape, scratch, result)
+    place(path, shape, scratch)
+    judge(path, bounded)
     return unsettled
 
 
-def begin_with(run, inputs, begin, step, shape, modes, passes, scratch):
+def judge(path, bounded):
+    """Write the largest or the root mean square error of each bounded output, in its bound."""
+    evaluate(path.run, path.inputs, bounded.outputs, bounded.own)
+    evaluate(path.corrected, path.inputs, bounded.outputs, bounded.full)
+    nodes = len(path.run)
+    for k in range(len(bounded.bounds)):
+        column, largest, squares = bounded.outputs.columns[k], 0.0, 0.0
+        for i in range(nodes):
+            if column >= 0:
+                error = path.run[i, column] - path.corrected[i, column]
+            else:
+                error = bounded.own[i, -1 - column] - bounded.full[i, -1 - column]
+            largest = max(largest, abs(error))
+            squares += error * error
+        size = largest if bounded.is_peak[k] else math.sqrt(squares / nodes)
+        # Also of an output that is no number somewhere.
+        bounded.errors[k] = size / bounded.bounds[k] if squares < math.inf else math.inf
+
+
+def begin_with(path, violated, shape, modes, passes, scratch):
     """Shapes of a run and their slopes, the error at the start, and ranges."""
-    start, violated = begin
+    run, inputs = path.run, path.inputs
     shapes, scale, moved = scratch.shapes, scratch.scale, scratch.moved[0]
     nodes, n = run.shape
     scratch.slopes[nodes:] = 0.0
@@ -181,12 +229,12 @@ def begin_with(run, inputs, begin, step, shape, modes, passes, scratch):
             moved[j] = min(moved[j], shapes[i, j])
     for j in range(n):
         scale[j] = 1.0 / max(scale[j] - moved[j], passes.least)
-    slopes(shapes[:nodes], step, scratch.slopes)
+    slopes(shapes[:nodes], path.step, scratch.slopes)
     for i in range(len(violated.shapes)):
         for j in range(n):
             shapes[i, j] += violated.shapes[i, j]
             scratch.slopes[i, j] += violated.slopes[i, j]
-    shape_of(start, shape, scratch.rates[0], moved)
+    shape_of(path.start, shape, scratch.rates[0], moved)
     for k in range(len(scratch.settled)):
         scratch.settled[k] = violated.motion[k]
     errors = scratch.errors[0]
@@ -261,8 +309,9 @@ def integral(values, j, step, first, result, into):
         result[i, into] = total - step * step / 12.0 * change
 
 
-def place(step, start, shape, scratch, result):
+def place(path, shape, scratch):
     """Write the states of corrected shapes, with heading and position by quadratures."""
+    step, start, result = path.step, path.start, path.corrected
     motion, states = scratch.motion[: len(result)], scratch.states
     heading, x, y = shape.planar[0], shape.planar[1], shape.planar[2]
     turned, ahead, aside = scratch.settled[0], scratch.settled[1], scratch.settled[2]
@@ -361,8 +410,8 @@ def propagate(i, modes, scratch):
     pairs = len(change) - count
     before, begin, end = scratch.errors[i - 1], scratch.sources[i - 1], scratch.sources[i]
     real, imaginary = errors[:count], errors[count : count + pairs]
-    stepped(real, before, begin, end, modes.weights)
-    turned(
+    step_real_parts(real, before, begin, end, modes.weights)
+    step_pairs(
         real,
         imaginary,
         (before, before[count:]),
@@ -374,14 +423,14 @@ def propagate(i, modes, scratch):
         change[k] = errors[k] - change[k]
 
 
-def stepped(errors, before, begin, end, weights):
+def step_real_parts(errors, before, begin, end, weights):
     """Real parts of errors from those at the node before, as if modes were real."""
     for k in range(len(errors)):
         part = weights[DECAY, k] * before[k] + weights[BEGIN, k] * begin[k]
         errors[k] = part + weights[END, k] * end[k]
 
 
-def turned(real, imaginary, before, begin, end, weights):
+def step_pairs(real, imaginary, before, begin, end, weights):
     """What pairs of modes add to real parts of errors, and imaginary parts."""
     for k in range(len(imaginary)):
         real[k] -= (

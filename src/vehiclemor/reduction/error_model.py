@@ -14,6 +14,8 @@ method with a frozen Jacobian.  Heading and position of the corrected shape are 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -23,9 +25,12 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Prepared, Ready, loops, ready
 from vehiclemor.codegen.operations import LANES
+from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction.error_loops import (
+    Bounded,
     ModesOfErrors,
     Passes,
+    Path,
     Scratch,
     Shape,
     Violated,
@@ -53,8 +58,9 @@ DIFFERENCE, SERIES = 1e-6, 1e-3
 
 def error_model(model: DynamicModel, states: np.ndarray, duration: float) -> ErrorModel:
     """What corrects a run of a vehicle model, with states (nodes, n) over so many s."""
-    way = np.hypot(*np.diff(states[::APART, model.planar[:2]], axis=0).T).sum()
-    return _at_speed(_alike(model), SPEEDS * max(round(float(way) / duration / SPEEDS), 1))
+    places = states[::APART, model.planar[:2]].tolist()
+    way = sum(map(math.dist, places, places[1:]))
+    return _at_speed(_alike(model), SPEEDS * max(round(way / duration / SPEEDS), 1))
 
 
 @dataclass(frozen=True)
@@ -121,26 +127,34 @@ class ErrorModel:
         inputs: np.ndarray,
         start: np.ndarray,
         passes: tuple[int, float],
-    ) -> tuple[np.ndarray | None, bool]:
-        """States (nodes, n) of the full model along a run, none if they can't be followed.
+        bounds: Mapping[str, ErrorBound],
+    ) -> Corrected:
+        """A run with states (nodes, n), corrected to be that of the full model.
 
-        Given are states of the run and inputs (nodes, inputs) at nodes that are a step in s apart,
-        and the start (n,) of the full model; the most passes, and the change that ends them, in
-        ranges of the coordinates.  The truth value tells whether all changes were small enough in
-        the end to be settled.
+        Given are also inputs (nodes, inputs) at nodes that are a step in s apart, and the start
+        (n,) of the full model; the most passes, and the change that ends them, in ranges of the
+        coordinates; bounds of outputs.
         """
-        kind = step, len(states), *passes
-        space = self.pool.taken(kind, lambda: self._space(step, len(states), passes))
+        kind = step, len(states), *passes, *bounds.items()
+        space = self.pool.taken(kind, lambda: self._space(step, len(states), passes, bounds))
+        path = space.path
         space.call.give("modes", _modes_of_errors(self, step))
-        np.copyto(space.run, states)
-        np.copyto(space.inputs, inputs)
-        np.copyto(space.start, start)
+        np.copyto(path.run, states)
+        np.copyto(path.inputs, inputs)
+        np.copyto(path.start, start)
         self._write_violated(start, inputs[0], step, space.violated)
-        unsettled, result = space.call(), space.result.copy()
+        unsettled = space.call()
+        known = path.corrected.copy(), float(space.errors.max())
         self.pool.give_back(kind, space)
-        return (None if unsettled < 0 else result), unsettled == 0
+        return Corrected(*known, unsettled == 0) if unsettled >= 0 else LOST
 
-    def _space(self, step: float, nodes: int, passes: tuple[int, float]) -> Space:
+    def _space(
+        self,
+        step: float,
+        nodes: int,
+        passes: tuple[int, float],
+        bounds: Mapping[str, ErrorBound],
+    ) -> Space:
         """Arrays of a run, and the loop that uses them."""
         model, modes = self.shape.model, len(self.modes.shapes)
         n, violations = len(model.definition.states), len(self.free.correction)
@@ -149,15 +163,26 @@ class ErrorModel:
         of_nodes: list[Any] = [np.empty((rows, columns)) for columns in widths]
         of_window: list[Any] = [np.empty((LANES, columns)) for columns in (n, of_shape)]
         scratch = Scratch(*of_nodes, *of_window, np.empty(n), np.empty(n), np.empty(3))
-        run, result = np.empty((2, nodes, n))
-        inputs, start = np.empty((nodes, len(model.inputs))), np.empty(n)
+        run, corrected = np.empty((2, nodes, n))
+        path = Path(step, run, corrected, np.empty((nodes, len(model.inputs))), np.empty(n))
         first = min(max(int(SETTLED / step) + 1, 5), nodes)
         violated = Violated(*map(np.zeros, ((first, violations), (first, n), (first, n), 3)))
-        limits = Passes(*passes, LEAST_RANGE)
-        of_errors = _modes_of_errors(self, step)
-        loop = loops(("reduction.error_loops",), ("corrected_run",))["corrected_run"]
-        of_run = step, run, inputs, start, violated, self._of_shape, of_errors, limits, scratch
-        return Space(run, inputs, start, violated, result, loop.prepared(*of_run, result))
+        outputs, results = model.packed(tuple(bounds), nodes)
+        own, full = np.empty((2, nodes, results))
+        sizes = np.array([bound.bound for bound in bounds.values()])
+        is_peak = np.array([float(bound.measure == "max") for bound in bounds.values()])
+        bounded = Bounded(outputs.bundle, own, full, sizes, is_peak, np.empty(len(bounds)))
+        modules = "simulation.loop_arguments", "simulation.path_loops", "reduction.error_loops"
+        call = loops(modules, ("corrected_run",))["corrected_run"].prepared(
+            path,
+            violated,
+            self._of_shape,
+            _modes_of_errors(self, step),
+            Passes(*passes, LEAST_RANGE),
+            scratch,
+            bounded,
+        )
+        return Space(path, violated, bounded.errors, call)
 
     def _write_violated(
         self, start: np.ndarray, inputs: np.ndarray, step: float, violated: Violated
@@ -169,7 +194,9 @@ class ErrorModel:
         model, count = self.shape.model, len(self.free.correction)
         if not count:
             return
-        at_first = model.evaluated("violations", start, inputs).ravel()
+        at_first = np.empty(model.equations.shapes["violations"])
+        model.kernels.call("violations", start, inputs, model.constants, at_first)
+        at_first = at_first.ravel()
         if np.abs(at_first).max() < HELD:
             for array in violated:
                 array[:] = 0.0
@@ -313,14 +340,26 @@ def _up_to_lanes(count: int) -> int:
     return -(-count // LANES) * LANES
 
 
-class Space(NamedTuple):
-    """Arrays of a run at its nodes, its start, what that violates, the result, and the loop."""
+class Corrected(NamedTuple):
+    """A corrected run (nodes, n), none if it can't be known, and whether all changes were small.
 
-    run: np.ndarray
-    inputs: np.ndarray
-    start: np.ndarray
+    In bounds is the largest error of the run's bounded outputs.
+    """
+
+    states: np.ndarray | None
+    in_bounds: float
+    is_settled: bool
+
+
+LOST = Corrected(None, math.inf, False)
+
+
+class Space(NamedTuple):
+    """Arrays of a run, what its start violates, errors of bounded outputs, and the loop."""
+
+    path: Path
     violated: Violated
-    result: np.ndarray
+    errors: np.ndarray
     call: Prepared
 
 

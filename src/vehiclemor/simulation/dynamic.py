@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import loop_array, number
+from vehiclemor.codegen.loops import Ready
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.excitation import Excitation
@@ -304,6 +305,10 @@ class DynamicModel(Model):
     ) -> np.ndarray:
         """Outputs, coordinates or speeds (samples, names) along a path of states and inputs."""
         return Recording(self._recorder, states, inputs, ALL_SAMPLES).columns(names)
+
+    def packed(self, names: tuple[str, ...], samples: int) -> tuple[Ready, int]:
+        """Outputs, coordinates or speeds for loops over so many samples, see `Recorder.packed`."""
+        return self._recorder.packed(names, samples)
 
     @cached_property
     def _recorder(self) -> Recorder:

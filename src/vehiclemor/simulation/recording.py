@@ -87,7 +87,7 @@ class Recorder:
             states, copied = model.definition.states, model.kernels.sources["outputs"].copies
             kernel, columns = [], []
             for name in names:
-                choice("output", name, (*model.outputs, *states))
+                choice("quantity", name, (*model.outputs, *states))
                 number = model.outputs.index(name) if name in model.outputs else -1
                 column = states.index(name) if number < 0 else copied[number]
                 if column < 0:

@@ -184,6 +184,8 @@ class Trajectory(ShortRepr):
         if names == self.names:
             return self.outputs
         recording = self.__dict__.get("recording")
+        if recording is not None and "outputs" not in self.__dict__:
+            return recording.columns(names)
         groups = {"outputs": self.names}
         if recording is not None or self.coordinates.shape[1]:
             groups |= {group: getattr(self.model, group, ()) for group in STATE_KINDS}
@@ -194,8 +196,6 @@ class Trajectory(ShortRepr):
         }
         for name in names:
             choice("quantity", name, columns)
-        if recording is not None and "outputs" not in self.__dict__:
-            return recording.columns(names)
         histories = []
         for name in names:
             group, column = columns[name]
