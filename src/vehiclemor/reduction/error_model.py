@@ -26,7 +26,7 @@ import numpy as np
 from vehiclemor.codegen.loops import Prepared, Ready, loops, ready
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.multibody.quantities import ErrorBound
-from vehiclemor.reduction.error_loops import (
+from vehiclemor.reduction.error_arguments import (
     Bounded,
     ModesOfErrors,
     Passes,
@@ -40,6 +40,10 @@ from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import address_of, at_samples
 from vehiclemor.simulation.workspaces import Pool
 
+LOOPS = (
+    *("simulation.loop_arguments", "simulation.path_loops"),
+    *("reduction.error_arguments", "reduction.error_loops"),
+)
 # Speeds (m/s) of linearisations are multiples of this one.
 SPEEDS = 2.5
 # Every how manyth node tells the way.
@@ -90,7 +94,7 @@ def _shape(alike: Alike) -> tuple[VehicleShape, Pool[Space]]:
 @lru_cache(maxsize=256)
 def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
     """What the loop needs of the modes at nodes that are a step in s apart."""
-    modes, slow_and_settling = errors.modes, errors.starts(step)
+    modes, (slow, settling) = errors.modes, errors.starts(step)
     changes = np.vstack([-errors.free.correction, modes.shapes])
     motions = changes @ errors.linearised.velocity_a.T
     return ready(
@@ -98,8 +102,8 @@ def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
             _filled(errors.in_states(modes.coordinates.T).T),
             _filled(np.hstack([errors.in_states(changes), motions])),
             errors.weights(step),
-            slow_and_settling[0],
-            np.ascontiguousarray(errors.in_states(slow_and_settling[1].T).T),
+            slow,
+            np.ascontiguousarray(errors.in_states(settling.T).T),
         )
     )
 
@@ -160,9 +164,9 @@ class ErrorModel:
         n, violations = len(model.definition.states), len(self.free.correction)
         rows, of_modes, of_shape = map(_up_to_lanes, (nodes, modes, n + 3))
         widths = n, len(model.inputs), n, n, n, 3, of_modes, of_modes, violations + modes
-        of_nodes: list[Any] = [np.empty((rows, columns)) for columns in widths]
-        of_window: list[Any] = [np.empty((LANES, columns)) for columns in (n, of_shape)]
-        scratch = Scratch(*of_nodes, *of_window, np.empty(n), np.empty(n), np.empty(3))
+        arrays: list[Any] = [np.empty((rows, columns)) for columns in widths]
+        arrays += map(np.empty, ((LANES, n), (LANES, of_shape), n, n, 3))
+        scratch = Scratch(*arrays)
         run, corrected = np.empty((2, nodes, n))
         path = Path(step, run, corrected, np.empty((nodes, len(model.inputs))), np.empty(n))
         first = min(max(int(SETTLED / step) + 1, 5), nodes)
@@ -172,8 +176,7 @@ class ErrorModel:
         sizes = np.array([bound.bound for bound in bounds.values()])
         is_peak = np.array([float(bound.measure == "max") for bound in bounds.values()])
         bounded = Bounded(outputs.bundle, own, full, sizes, is_peak, np.empty(len(bounds)))
-        modules = "simulation.loop_arguments", "simulation.path_loops", "reduction.error_loops"
-        call = loops(modules, ("corrected_run",))["corrected_run"].prepared(
+        call = loops(LOOPS, ("corrected_run",))["corrected_run"].prepared(
             path,
             violated,
             self._of_shape,

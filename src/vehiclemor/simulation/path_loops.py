@@ -3,6 +3,7 @@
 import math
 
 from vehiclemor.codegen.loop_types import (
+    Cube,
     Int,
     IntVector,
     Matrix,
@@ -212,3 +213,17 @@ def cubics_within(states, results, row, outputs):
         if low - margin < ranges[k, 0] or high + margin > ranges[k, 1]:
             return False
     return True
+
+
+def recurrence(matrices: Cube, forcing: Cube, result: Cube) -> Int:
+    """From its first entry on, x' = A x + g: matrices, forcing and result (samples, n, m)."""
+    for sample in range(len(matrices)):
+        before, now = result[sample], result[sample + 1]
+        for i in range(before.shape[0]):
+            for f in range(before.shape[1]):
+                now[i, f] = forcing[sample, i, f]
+            for j in range(before.shape[0]):
+                weight = matrices[sample, i, j]
+                for f in range(before.shape[1]):
+                    now[i, f] += weight * before[j, f]
+    return 0

@@ -18,6 +18,7 @@ from vehiclemor.codegen.loops import loops
 from vehiclemor.reduction.training import Training, TrainingRun
 from vehiclemor.reduction.vehicle.features import PLANAR, feature_columns
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
+from vehiclemor.simulation.evaluation import PATH_LOOPS
 from vehiclemor.simulation.trajectory import Trajectory
 
 # Columns of which less than this share is left are sums of those chosen before.
@@ -255,6 +256,6 @@ def _sensitivities(
     forcing = np.take(now, targets, axis=2) * driven[1:]
     forcing += np.take(before, targets, axis=2) * driven[:-1]
     result = np.zeros((samples, dim, len(targets)))
-    loop = loops(("reduction.vehicle.variation_loops",), ("recurrence",))["recurrence"]
+    loop = loops(PATH_LOOPS, ("recurrence",))["recurrence"]
     loop(advance, forcing, result)
     return weights[:, :, None] * result[(samples - 1) % COMPARED :: COMPARED]
