@@ -1,6 +1,7 @@
 """One run or one model: simulated, drawn, exported, given to other programs."""
 
 import inspect
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,31 +37,13 @@ from vehiclemor.report.printing import wrapped
 SHIPPED = "shipped"
 
 
-def simulate(
-    model: str,
-    *,
-    method: str = "full_order",
-    settings: Settings = None,
-    maneuver: str | None = None,
-    csv: Annotated[list[str] | None, Several] = None,
-    frequency: float = 1.0,
-    amplitude: float = 1.0,
-    start: str | None = None,
-    preset: str = "recommended",
-    training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = ("matched",),
-    parameter: Parameters = None,
-    out: Path | None = None,
-    plot: Annotated[list[Path] | None, Several] = None,
-    all_outputs: bool = False,
-) -> int:
-    """Simulate a model with a method; errors are against the full-order solution.
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Driven:
+    """Options of what drives a run, and where it starts.
 
     Parameters
     ----------
-    model
-        Registered name.
-    method
-        Registered name.
     maneuver
         Registered name, or a CSV file of a log; the model's default maneuver if left out.
     csv
@@ -73,11 +56,22 @@ def simulate(
         Factor on the input's amplitude.
     start
         Initial condition; the model's first by default.
-    preset
-        Preset of the method's settings.
-    training
-        matched (the very run that is simulated; the default), nominal (the model's maneuver),
-        protocol (the training of the model's protocol), or names of maneuvers; one or several.
+    """
+
+    maneuver: str | None = None
+    csv: Annotated[list[str] | None, Several] = None
+    frequency: float = 1.0
+    amplitude: float = 1.0
+    start: str | None = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Shown:
+    """Options of what is saved, drawn and printed of a run.
+
+    Parameters
+    ----------
     out
         netCDF file for the result.
     plot
@@ -85,23 +79,62 @@ def simulate(
     all_outputs
         Print errors of every output, not only of those that tables show.
     """
+
+    out: Path | None = None
+    plot: Annotated[list[Path] | None, Several] = None
+    all_outputs: bool = False
+
+
+def simulate(
+    model: str,
+    *,
+    method: str = "full_order",
+    settings: Settings = None,
+    driven: Driven = Driven(),
+    preset: str = "recommended",
+    training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = ("matched",),
+    parameter: Parameters = None,
+    shown: Shown = Shown(),
+) -> int:
+    """Simulate a model with a method; errors are against the full-order solution.
+
+    Parameters
+    ----------
+    model
+        Registered name.
+    method
+        Registered name.
+    preset
+        Preset of the method's settings.
+    training
+        matched (the very run that is simulated; the default), nominal (the model's maneuver),
+        protocol (the training of the model's protocol), or names of maneuvers; one or several.
+    """
     check_names("--training", training)
     chosen = key_values("--set", settings)
     for key in inspect.signature(vm.simulate).parameters.keys() & chosen.keys():
         raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
-    picture = _picture(plot, f"{model}-{method}.png")
-    if out is not None:
-        result_file("--out", out)
+    picture = _picture(shown.plot, f"{model}-{method}.png")
+    if shown.out is not None:
+        result_file("--out", shown.out)
     ready = vm.model(model, key_values("--parameter", parameter))
-    how: dict[str, Any] = {"maneuver": _maneuver(maneuver, csv), "start": start, "preset": preset}
-    how |= {"frequency": frequency, "amplitude": amplitude, "training": training}
-    dataset = vm.simulate(ready, method, **how, **chosen)
+    dataset = vm.simulate(
+        ready,
+        method,
+        maneuver=_maneuver(driven.maneuver, driven.csv),
+        start=driven.start,
+        frequency=driven.frequency,
+        amplitude=driven.amplitude,
+        preset=preset,
+        training=training,
+        **chosen,
+    )
     from vehiclemor.report.labels import tabled_outputs
     from vehiclemor.report.printing import simulation_text
 
-    shown = ready.outputs if all_outputs else tabled_outputs(ready.definition)
-    print(simulation_text(dataset, shown, ready.counts))
-    _write(dataset, out, picture)
+    outputs = ready.outputs if shown.all_outputs else tabled_outputs(ready.definition)
+    print(simulation_text(dataset, outputs, ready.counts))
+    _write(dataset, shown.out, picture)
     return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
@@ -224,6 +257,32 @@ def plot(
     print(f"written: {picture}")
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Exported:
+    """Options of what an export holds: its integrator, numbers, inputs and outputs.
+
+    Parameters
+    ----------
+    step
+        Step size in s of the integrator in C and FMU.
+    integrator
+        In C and FMU: rk4, explicit; ros2, linearly implicit with one Jacobian, for longer steps.
+    precision
+        Of the numbers in C and FMU.
+    inputs
+        Optional inputs of the full model that the export has, such as brake_torque_FL.
+    outputs
+        Outputs that the export computes; all by default.
+    """
+
+    step: float = STEP
+    integrator: Integrator = "rk4"
+    precision: Precision = "double"
+    inputs: Annotated[tuple[str, ...], Several, Parameter(name="--input", show_default=False)] = ()
+    outputs: Annotated[list[str] | None, Several, Parameter(name="--output")] = None
+
+
 def export(
     model: str,
     *,
@@ -233,11 +292,7 @@ def export(
     parameter: Parameters = None,
     out: Path | None = None,
     overwrite: bool = False,
-    step: float = STEP,
-    integrator: Integrator = "rk4",
-    precision: Precision = "double",
-    inputs: Annotated[list[str] | None, Several, Parameter(name="--input")] = None,
-    outputs: Annotated[list[str] | None, Several, Parameter(name="--output")] = None,
+    exported: Exported = Exported(),
 ) -> None:
     """Export a model, or a reduced one, for another tool.
 
@@ -256,16 +311,6 @@ def export(
         Folder or file; under the model's name here by default.
     overwrite
         Replace an export that is there.
-    step
-        Step size in s of the integrator in C and FMU.
-    integrator
-        In C and FMU: rk4, explicit; ros2, linearly implicit with one Jacobian, for longer steps.
-    precision
-        Of the numbers in C and FMU.
-    inputs
-        Optional inputs of the full model that the export has, such as brake_torque_FL.
-    outputs
-        Outputs that the export computes; all by default.
     """
     given, values = key_values("--set", settings), key_values("--parameter", parameter)
     file = Path(model).suffix == ".nc"
@@ -283,17 +328,7 @@ def export(
         out = destination(name_of(model, method), to, out, overwrite)
         if method is not None:
             chosen = vm.reduce(chosen, method, **given)
-    written = vm.export(
-        chosen,
-        to,
-        out,
-        overwrite=overwrite,
-        step=step,
-        integrator=integrator,
-        precision=precision,
-        inputs=inputs or (),
-        outputs=outputs,
-    )
+    written = vm.export(chosen, to, out, overwrite=overwrite, **vars(exported))
     print(f"written: {written}")
 
 
