@@ -124,7 +124,7 @@ def test_vehicle(benchmark, name, label):
     run = model.simulate(maneuver, None, None, solver, tolerance)
     whole = whole_space(2 * len(model.coordinates))
     space = model.system.workspace(maneuver, whole, Solver(solver, tolerance, maneuver.times))
-    space.start[:] = model.start()
+    space.memory.start[:] = model.start()
 
     def whole_run():
         # The loop stops at a number of calls, which its counts add up.

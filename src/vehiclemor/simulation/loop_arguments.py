@@ -186,6 +186,22 @@ class Output(NamedTuple):
         )
 
 
+class Memory(NamedTuple):
+    """What a run works in.
+
+    Attributes
+    ----------
+    start
+        State where it begins (n,).
+    buffer, integers
+        Scratch space, see `catalogue.scratch_size`.
+    """
+
+    start: Vector
+    buffer: Vector
+    integers: IntVector
+
+
 class Outputs(NamedTuple):
     """Some outputs of a model.
 

@@ -88,7 +88,7 @@ class SteppedSystem:
         """
         held = self._pool.taken(None, self._packed)
         space, coefficients = held.space, held.coefficients
-        start, output = space.start, space.output
+        start, output = space.memory.start, space.output
         start[:] = state
         slope = None if next_inputs is None else (next_inputs - inputs) / dt
         for begin, length, window in self._parts(time, dt):
@@ -104,7 +104,7 @@ class SteppedSystem:
             output.counts.fill(0)
             status = space.call()
             if status:
-                reached = time + begin + space.buffer[0]
+                reached = time + begin + space.memory.buffer[0]
                 raise ConvergenceError(f"{REASONS[status]} at t = {reached:.6g} s")
             start[:] = output.states[0]
         after = start.copy()

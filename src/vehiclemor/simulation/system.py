@@ -25,6 +25,7 @@ from vehiclemor.simulation.loop_arguments import (
     STEP_TOO_SMALL,
     TOO_MANY_CALLS,
     Equations,
+    Memory,
     Method,
     Output,
 )
@@ -182,12 +183,12 @@ class System(ShortRepr):
             if space.signal is not maneuver.packed_pieces:
                 space.take(self._drive(maneuver, windows, space.output.samples))
         self._set_constants(space.call)
-        output = space.output
-        assert len(state) == len(space.start), f"{len(state)} states, not {len(space.start)}"
-        space.start[:] = state
+        start, output = space.memory.start, space.output
+        assert len(state) == len(start), f"{len(state)} states, not {len(start)}"
+        start[:] = state
         output.counts.fill(0)
         status, seconds = timed(space.call)
-        failure = f"{REASONS[status]} at t = {space.buffer[0]:.6g} s" if status else ""
+        failure = f"{REASONS[status]} at t = {space.memory.buffer[0]:.6g} s" if status else ""
         return Run(output.samples, output.states, output.counts, seconds, failure, space, left)
 
     @cached_property
@@ -234,11 +235,13 @@ class System(ShortRepr):
         dim, n = int(windows.ranks.max()), len(self.error_scale)
         formulation = windows.formulation
         longest = float(solver.longest_step or np.inf)
-        start = np.empty(n)
         step = self._step_kernel(name) if full else None
-        buffer = np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, step))
+        memory = Memory(
+            start=np.empty(n),
+            buffer=np.empty(catalogue.scratch_size(chosen, n, dim, self.inputs, step)),
+            integers=np.empty(dim + catalogue.FLAGS, dtype=np.int64),
+        )
         call = catalogue.time_loop(name, formulation).prepared(
-            start,
             self.called(formulation, name if full else ""),
             drive.signal,
             drive.spans,
@@ -246,11 +249,10 @@ class System(ShortRepr):
             self.method(name, self.active if full else np.arange(dim)),
             catalogue.control_of(name, float(solver.tolerance), longest),
             output,
-            buffer,
-            np.empty(dim + catalogue.FLAGS, dtype=np.int64),
+            memory,
         )
         self._set_constants(call)
-        return Workspace(call, start, output, buffer, windows, drive.signal)
+        return Workspace(call, memory, output, windows, drive.signal)
 
     def _set_constants(self, call: Prepared) -> None:
         """Have a loop read the constants of this system."""

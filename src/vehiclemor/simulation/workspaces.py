@@ -15,7 +15,7 @@ import numpy as np
 from vehiclemor.codegen.loops import Prepared, Ready
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.simulation.control_periods import ControlPeriods
-from vehiclemor.simulation.loop_arguments import Output
+from vehiclemor.simulation.loop_arguments import Memory, Output
 
 Item = TypeVar("Item")
 # Kinds of runs whose workspaces are cached.
@@ -68,16 +68,14 @@ class RunInputs(NamedTuple):
 class Workspace:
     """Arrays of one run at a time and, packed once, the loop that uses them.
 
-    The call is the time loop with its arguments, the start where a run begins (n,); output and
-    buffer are as of `integrators/loop.integrate`.  The windows stay alive with the workspace, which
-    is cached by their identity.  The signal is that of the last run.  Other loops that read these
-    arrays are cached by name.
+    The call is the time loop with its arguments, of which memory and output stay the same.  The
+    windows stay alive with the workspace, which is cached by their identity.  The signal is that of
+    the last run.  Other loops that read these arrays are cached by name.
     """
 
     call: Prepared
-    start: np.ndarray
+    memory: Memory
     output: Output
-    buffer: np.ndarray
     windows: ControlPeriods
     signal: Ready
     cached_loops: dict[str, Any] = field(default_factory=dict)

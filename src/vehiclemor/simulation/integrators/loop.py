@@ -5,7 +5,7 @@ It calls functions of an integrator and of a formulation, see `contract`, and is
 
 import math
 
-from vehiclemor.codegen.loop_types import Int, IntVector, Vector, matrix, vector
+from vehiclemor.codegen.loop_types import Int, matrix, vector
 from vehiclemor.inputs.polynomial_loops import Pieces, input_at
 from vehiclemor.simulation.integrators.contract import (
     accept,
@@ -33,6 +33,7 @@ from vehiclemor.simulation.loop_arguments import (
     TOO_MANY_CALLS,
     Control,
     Equations,
+    Memory,
     Method,
     Output,
     Problem,
@@ -42,7 +43,6 @@ from vehiclemor.simulation.loop_arguments import (
 
 
 def integrate(
-    start: Vector,
     equations: Equations,
     signal: Pieces,
     spans: Spans,
@@ -50,14 +50,13 @@ def integrate(
     method: Method,
     control: Control,
     output: Output,
-    buffer: Vector,
-    integers: IntVector,
+    memory: Memory,
 ) -> Int:
-    """Integrate from the start (n,) over all spans; a new window projects the state onto its space.
+    """Integrate from the start over all spans; a new window projects the state onto its space.
 
-    Buffer and integers are scratch space, see `catalogue.scratch_size`.  Gives why the run has
-    ended; if early, when is the first number of the buffer.
+    Gives why the run has ended; if early, when is the first number of the buffer.
     """
+    start, buffer, integers = memory.start, memory.buffer, memory.integers
     n, inputs = len(start), signal.coefficients.shape[2]
     x = vector(buffer, 0, n)
     for i in range(n):

@@ -79,12 +79,12 @@ def guarded(call: Prepared, name: str, dimensions: int, dtype: type) -> np.ndarr
 
 def check(system: System, inputs: int, windows: ControlPeriods, solver: str) -> None:
     space = system.workspace(steered(inputs), windows, Solver(solver, 1e-5))
-    space.start[:] = np.linspace(1.0, 2.0, len(system.reference))
+    space.memory.start[:] = np.linspace(1.0, 2.0, len(system.reference))
     arrays = [
         guarded(space.call, name, dimensions, dtype)
         for name, dimensions, dtype in (
-            ("buffer", 1, float),
-            ("integers", 1, int),
+            ("memory.buffer", 1, float),
+            ("memory.integers", 1, int),
             ("output.states", 2, float),
         )
     ]
