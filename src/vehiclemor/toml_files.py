@@ -70,5 +70,5 @@ def fitting(path: Path, content: dict[str, Any], schema: type[Schema]) -> Schema
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "top level"
         more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-        message = first["msg"].removeprefix("Value error, ")
+        message = first["msg"].removeprefix("Value error, ").replace(" after validation", "")
         raise FileError(f"{path}: {where}: {message}{more}") from None

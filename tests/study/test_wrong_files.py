@@ -56,8 +56,8 @@ STUDIES = {
 PROTOCOLS = {
     "points = [[0.9, 1.0]]": [
         ("points = [[1.0, 1.2]]", "is in training too"),
-        ("points = []", "points is empty"),
-        ("points = [[0.9]]", "a point is [frequency, amplitude]"),
+        ("points = []", "points: List should have at least 1 item"),
+        ("points = [[0.9]]", "points.0: List should have at least 2 items"),
         ("points = [[1.0, 1.0]], speed = [1.0]", "points or lists"),
     ],
     'test = [{ maneuver = "sine_travel"': [('test = [{ maneuver = "lane_change"', "delta")],
@@ -104,7 +104,11 @@ DRAWS = [
     (DRAWN, "parameters.wheel = [0.0, 1.0]", "drawn, box 1: ...wheel"),
     (DRAWN, "parameters.wheel = [0.0, 0.0004]", "3 decimals"),
     (DRAWN, "parameters.initial_speed = [1.0, 2.0]", "by speed = ["),
-    ("[[0.9, 1.0]]", "[[0.9, 1.0]]\nparameters.wheel = []", "wheel is not a list of finite"),
+    (
+        "[[0.9, 1.0]]",
+        "[[0.9, 1.0]]\nparameters.wheel = []",
+        "wheel: List should have at least 1 item",
+    ),
     ('maneuver = "chirp_travel"', 'maneuver = "chrp_travel"', "test, group 2: ...chirp_travel"),
     ("{ rank = 4 }", "{ rank = 3 }", "fixed basis"),
     ("{ tolerance = 1e-6 }", '{ tolerance = 1e-12, solver = "newton_lanes" }', "newton 1e-12"),

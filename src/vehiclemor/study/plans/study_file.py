@@ -19,6 +19,7 @@ from vehiclemor.study.plans.study_runs import (
     Draw,
     Group,
     Limit,
+    Pair,
     list_of,
     table_of,
     values,
@@ -178,7 +179,7 @@ class GridFile(StudyOfModel):
         "the model), the name of a maneuver, protocol (the training of the model's protocol), set, "
         "or a list of these",
     )
-    training_set: list[list[float]] = list_of(
+    training_set: list[Pair] = list_of(
         "of training = set: pairs [frequency factor, amplitude factor]"
     )
     keep: Literal["trajectories", "metrics"] = Field(
@@ -200,20 +201,11 @@ class GridFile(StudyOfModel):
         sizes = [len(values(axis)) for axis in self.grid.values()]
         return math.prod(sizes) * (len(self.start) or 1) * len(self.methods)
 
-    @field_validator("training_set")
-    @classmethod
-    def _pairs(cls, value: list[list[float]]) -> list[list[float]]:
-        if any(len(pair) != 2 for pair in value):
-            raise ValueError("each entry is a pair [frequency factor, amplitude factor]")
-        return value
-
     @field_validator("grid")
     @classmethod
     def _not_empty(cls, value: dict[str, Axis]) -> dict[str, Axis]:
         for name, axis in value.items():
             points = values(axis)
-            if not points:
-                raise ValueError(f"{name} has no values")
             if len(set(points)) != len(points):
                 raise ValueError(f"{name} has the same value twice")
         return value

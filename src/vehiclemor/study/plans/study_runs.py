@@ -4,7 +4,7 @@ import math
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from vehiclemor.reduction.training import SPEED
 from vehiclemor.toml_files import FileSchema
@@ -38,7 +38,10 @@ def without_speed(parameters: dict[str, Any]) -> dict[str, Any]:
     return parameters
 
 
-Range = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Range = Annotated[Pair, AfterValidator(_ordered)]
+# Frequency and amplitude, perhaps the speed.
+Point = Annotated[list[float], Field(min_length=2, max_length=3)]
 # Of members of a family.
 Number = Annotated[int, Field(ge=0, le=10**15)]
 Numbers = Annotated[list[Number], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
@@ -46,16 +49,18 @@ Numbers = Annotated[list[Number], Field(min_length=2, max_length=2), AfterValida
 Printable = Annotated[Range, AfterValidator(_printable)]
 Drawn = Annotated[dict[str, Printable], AfterValidator(without_speed)]
 Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Positive = Annotated[list[Limit], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
+Samples = Annotated[list[Annotated[float, Field(allow_inf_nan=False)]], Field(min_length=1)]
 
 
-def list_of(description: str) -> Any:
-    """Field with a list, empty by default."""
-    return Field(default_factory=list, description=description)
+def list_of(description: str, least: int = 0) -> Any:
+    """Field with a list, empty by default; one that is given has so many entries at least."""
+    return Field(default_factory=list, description=description, min_length=least)
 
 
-def table_of(description: str) -> Any:
-    """Field with a table, empty by default."""
-    return Field(default_factory=dict, description=description)
+def table_of(description: str, least: int = 0) -> Any:
+    """Field with a table, empty by default; one that is given has so many entries at least."""
+    return Field(default_factory=dict, description=description, min_length=least)
 
 
 class Span(FileSchema):
@@ -68,7 +73,8 @@ class Span(FileSchema):
 
 # By its form, so that what is wrong with one is not read as the other.
 Axis = Annotated[
-    Annotated[list[int | float | str], Tag("values")] | Annotated[Span, Tag("span")],
+    Annotated[list[int | float | str], Field(min_length=1), Tag("values")]
+    | Annotated[Span, Tag("span")],
     Discriminator(lambda value: "span" if isinstance(value, Span | dict) else "values"),
 ]
 
@@ -89,13 +95,14 @@ class Group(FileSchema):
     """
 
     maneuver: str = Field(description="registered name")
-    start: list[str] = list_of("initial conditions; the model's first by default")
-    points: list[list[float]] = list_of("[frequency, amplitude] or [frequency, amplitude, speed]")
-    frequency: list[float] = list_of("factors, 1 by default")
-    amplitude: list[float] = list_of("factors, 1 by default")
-    speed: list[float] = list_of("m/s, that of the model by default")
-    parameters: Annotated[dict[str, list[float]], AfterValidator(without_speed)] = table_of(
-        "parameter -> values in SI units, to combine with all else; that of the model by default"
+    start: list[str] = list_of("initial conditions; the model's first by default", 1)
+    points: list[Point] = list_of("[frequency, amplitude] or [frequency, amplitude, speed]", 1)
+    frequency: list[float] = list_of("factors, 1 by default", 1)
+    amplitude: list[float] = list_of("factors, 1 by default", 1)
+    speed: list[float] = list_of("m/s, that of the model by default", 1)
+    parameters: Annotated[dict[str, Samples], AfterValidator(without_speed)] = table_of(
+        "parameter -> values in SI units, to combine with all else; that of the model by default",
+        1,
     )
 
     @property
@@ -108,16 +115,8 @@ class Group(FileSchema):
 
     @model_validator(mode="after")
     def _either(self) -> "Group":
-        for name in self.model_fields_set - {"maneuver"}:
-            if not getattr(self, name):
-                raise ValueError(f"{name} is empty")
-        for name, values in self.parameters.items():
-            if not values or not all(map(math.isfinite, values)):
-                raise ValueError(f"parameters: {name} is not a list of finite numbers")
         if self.points and (self.frequency or self.amplitude or self.speed):
             raise ValueError("give points or lists of factors, not both")
-        if any(len(point) not in (2, 3) for point in self.points):
-            raise ValueError("a point is [frequency, amplitude] or [frequency, amplitude, speed]")
         return self
 
 
@@ -126,7 +125,7 @@ class Box(FileSchema):
 
     maneuver: str = Field(description="registered name")
     share: Limit = Field(1.0, description="of the runs, against the other boxes' shares")
-    frequency: Range = Field([1.0, 1.0], description="factors, from and to")
+    frequency: Positive = Field([1.0, 1.0], description="factors, from and to")
     amplitude: Range = Field([1.0, 1.0], description="factors, from and to")
     both_signs: bool = Field(True, description="whether a coin gives the amplitude its sign")
     speed: Range | None = Field(None, description="m/s, that of the model by default")
@@ -137,13 +136,6 @@ class Box(FileSchema):
     parameters: Drawn = table_of(
         "parameter -> [from, to] in SI units; that of the model by default"
     )
-
-    @field_validator("frequency")
-    @classmethod
-    def _positive(cls, value: list[float]) -> list[float]:
-        if value[0] <= 0.0:
-            raise ValueError("frequency factors are positive")
-        return value
 
 
 class Draw(FileSchema):
