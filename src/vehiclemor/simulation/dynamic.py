@@ -30,7 +30,6 @@ from vehiclemor.simulation.trajectory import (
     Names,
     Start,
     Trajectory,
-    Trust,
     output_names,
 )
 from vehiclemor.simulation.workspaces import ALL_SAMPLES, Run, Solver
@@ -124,10 +123,9 @@ class DynamicModel(Model):
         point = x, u, self.rhs(x, u), self.outputs_at(x[None], u[None])[0]
         return LinearModel.of(self, self.definition.states, point)
 
-    def mass_matrix(self, x: Any, u: Any = None) -> np.ndarray:
-        """Mass matrix (n, n) of the second derivatives of the coordinates; inputs 0 by default."""
-        inputs = self.inputs_at_rest if u is None else u
-        return self.evaluated("second_order", x, inputs)[:, :-1]
+    def mass_matrix(self, x: Any) -> np.ndarray:
+        """Mass matrix (n, n) of the second derivatives of the coordinates, without inputs."""
+        return self.evaluated("second_order", x, self.inputs_at_rest)[:, :-1]
 
     def descriptor(self, x: Any, u: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """M (n, n), F (n,), C (c, n), gamma (c,) of the equations before they are solved.
@@ -237,14 +235,13 @@ class DynamicModel(Model):
         run: Run,
         inputs: np.ndarray,
         states: np.ndarray,
-        trust: Trust | None = None,
         outputs: tuple[str, ...] | None = None,
     ) -> Trajectory:
         """Trajectory of a run whose path has been brought to the model's states.
 
         Inputs are those at the output times (samples, inputs); states stand where the run is
-        recorded, those of the model and what may follow them.  Trust is what a reduced model tells
-        of the run.  Where outputs are named, these alone are computed; else all can be read.
+        recorded, those of the model and what may follow them.  Where outputs are named, these alone
+        are computed; else all can be read.
         """
         remark = "" if maneuver is None else cut_short(maneuver)
         recorder, times, n = self._recorder, run.times, len(self.definition.states)
@@ -278,7 +275,6 @@ class DynamicModel(Model):
             "status": status,
             "message": message,
             "remark": "; ".join(remarks),
-            "trust": trust,
             "names": self.outputs,
             "model": self,
             "maneuver": "" if maneuver is None else maneuver.name,
@@ -286,19 +282,14 @@ class DynamicModel(Model):
         if outputs not in (None, self.outputs) and not message:
             histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]
             fields |= {"names": outputs, **dict.fromkeys(STATE_KINDS, nothing)}
-            trajectory = Trajectory.of(**fields, outputs=histories)
-        else:
-            points = points[0][:, :n], *points[1:]
-            recording = Recording(recorder, *(array.copy() for array in points))
-            if left < end and (status == "stopped" or not run.failure):
-                # What follows means nothing.
-                recording.end = left
-            trajectory = Trajectory.of(**fields, recording=recording)
-            if outputs is not None:
-                trajectory = trajectory.chosen(outputs)
-        if trust is not None and trust.reason:
-            return trajectory.judged(trust)
-        return trajectory
+            return Trajectory.of(**fields, outputs=histories)
+        points = points[0][:, :n], *points[1:]
+        recording = Recording(recorder, *(array.copy() for array in points))
+        if left < end and (status == "stopped" or not run.failure):
+            # What follows means nothing.
+            recording.end = left
+        trajectory = Trajectory.of(**fields, recording=recording)
+        return trajectory if outputs is None else trajectory.chosen(outputs)
 
     def histories_at(
         self, names: tuple[str, ...], states: np.ndarray, inputs: np.ndarray

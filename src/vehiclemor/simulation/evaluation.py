@@ -63,11 +63,10 @@ def evaluate(
     constants: np.ndarray,
     paths: tuple[np.ndarray, np.ndarray],
     result: np.ndarray,
-    results: tuple[int, ...] = (),
 ) -> None:
-    """Write results of a kernel along a path, some of them where `results` names their numbers."""
+    """Write the results of a kernel along a path."""
     lanes = LANES if len(result) >= LANES else 1
-    address = np.array([address_of(kernels, name, lanes, results)], dtype=np.int64)
+    address = np.array([address_of(kernels, name, lanes)], dtype=np.int64)
     loop = path_loops()["lane_path" if lanes == LANES else "kernel_path"]
     loop(*paths, address, constants, result)
 

@@ -74,7 +74,7 @@ class Model(ShortRepr):
     kernel_hash: str
     constants: np.ndarray
     initial: Mapping[str, np.ndarray]
-    rebuilt: Callable[[Any, ModelDefinition], Any] | None = None
+    rebuilt: Callable[[Any, ModelDefinition], Any]
 
     def __post_init__(self) -> None:
         """Methods share it: what a plug-in writes into it is refused."""
@@ -183,7 +183,7 @@ class Model(ShortRepr):
         return self._with_driven(other.inputs)
 
     def _with_driven(self, names: Sequence[str]) -> Self:
-        if self._undriven.isdisjoint(names) or self.rebuilt is None:
+        if self._undriven.isdisjoint(names):
             return self
         return self.rebuilt(self, driving(self.definition, names))
 

@@ -157,11 +157,11 @@ class SteppedSystem:
             return kernels.at_state("derivative", state, len(state))
         return self._projected_rates(kernels, state, time)[1]
 
-    def projected(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:
-        """State (n,) where the subspace of its time is nearest: there a step begins."""
+    def projected(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """State (n,) where the subspace of the first window is nearest: there a run begins."""
         if self.spaces.formulation == "full":
             return state
-        return self._nearest(_Kernels(self.system, inputs), state, self._subspace(time))[0]
+        return self._nearest(_Kernels(self.system, inputs), state, self._subspace(0.0))[0]
 
     def _subspace(self, time: float) -> tuple[np.ndarray, ...]:
         """Mean (n,) and bases by rows: of states (r, n), or of coordinates (r / 2, n / 2)."""

@@ -22,7 +22,7 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.reduction.interface import Method, offline_cost
-from vehiclemor.reduction.settings import AnyIntegrator, FallbackSettings, Solver, Tolerance
+from vehiclemor.reduction.settings import AnyIntegrator, FallbackSettings, Tolerance
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.axle_forces import add_axles
 from vehiclemor.reduction.vehicle.candidates import (
@@ -81,8 +81,6 @@ class SlowManifoldSettings(FallbackSettings):
         description="error of heading in rad that the steps weigh like 0.03 m of place; by "
         "default the paper's bound on yaw, which also judges",
     )
-    solver: Solver = "etdrk4"
-    tolerance: Tolerance = 1e-3
 
 
 class GuardedSettings(SlowManifoldSettings):
