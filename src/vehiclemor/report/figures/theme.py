@@ -175,8 +175,6 @@ def hide_rounding(axis: Axes) -> None:
 def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
     """The one legend, below all panels, of the lines in some of them."""
     shown = {text: h for a in axes for h, text in zip(*a.get_legend_handles_labels(), strict=True)}
-    for legend in list(figure.legends):
-        legend.remove()
     if not shown:
         return
     lengths = [len(text.replace("$", "")) for text in shown]
