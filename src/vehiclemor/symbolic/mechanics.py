@@ -180,7 +180,7 @@ def carried(tape: Tape, base: Motion, rotation: Motion, lever: Vector) -> Motion
 
 
 def with_inertia(tape: Tape, inertia: Tensor, turning: Motion) -> Motion:
-    """Rotation of a `Body` from its angular velocity and acceleration, see `MovingFrame.turning`.
+    """Rotation of a `Body` from its angular velocity, see `MovingFrame.angular_velocity_of`.
 
     The tensor is about the centre of mass, in components of the frame at this moment.
     """

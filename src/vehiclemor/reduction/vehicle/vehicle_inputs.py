@@ -31,11 +31,6 @@ class VehicleInputs:
         return any(name.startswith((DRIVE, BRAKE)) for name in self.names)
 
     @property
-    def friction(self) -> bool:
-        """Whether the friction of the tires is an input."""
-        return any(name.startswith(FRICTION) for name in self.names)
-
-    @property
     def steps(self) -> np.ndarray:
         """Steps (inputs,) of differences."""
         torque = [name.startswith((DRIVE, BRAKE)) for name in self.names]
