@@ -123,16 +123,10 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         direct = self.model.jacobian_of(function, full, inputs, by)
         return direct + by_state @ slopes[INPUTS] if sensitivity.argument == INPUTS else direct
 
-    def run(
-        self,
-        maneuver: Excitation,
-        state: np.ndarray,
-        times: np.ndarray | None = None,
-        direct_until: float = np.inf,
-    ) -> Run:
+    def run(self, maneuver: Excitation, state: np.ndarray, record_all_until: float = np.inf) -> Run:
         """Path of the states, from a state (dim,); see `System.run`."""
-        how = Solver(self.solver, self.tolerance, times)
-        return self.system.run(maneuver, state, self.spaces, how, direct_until)
+        how = Solver(self.solver, self.tolerance)
+        return self.system.run(maneuver, state, self.spaces, how, record_all_until)
 
     def simulate(
         self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None

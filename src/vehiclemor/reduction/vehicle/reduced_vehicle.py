@@ -245,13 +245,11 @@ class ReducedVehicle(ReducedSystem):
         shape, features = self.shape, self.decoded_features or self.features
         return Decoding(features, self.parameters, self.decoding, shape.reference, shape.layout)
 
-    def path(
-        self, maneuver: Excitation, start: Start, times: np.ndarray | None = None
-    ) -> np.ndarray | None:
+    def path(self, maneuver: Excitation, start: Start) -> np.ndarray | None:
         """Reduced states (samples, states + 3), if the run comes to its end."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
         state = self.encode(self.model.start(start), maneuver.recorded_inputs[1][0])
-        run = self.run(maneuver, state, times)
+        run = self.run(maneuver, state)
         return None if run.failure or not np.isfinite(run.path).all() else run.path
 
     def simulate(
@@ -261,7 +259,7 @@ class ReducedVehicle(ReducedSystem):
         maneuver = checked_maneuver(maneuver, self.model.definition)
         inputs = maneuver.recorded_inputs[1]
         state, encoded = self.known(start, inputs[0])
-        run = self.run(maneuver, encoded, direct_until=0.0)
+        run = self.run(maneuver, encoded, record_all_until=0.0)
         states = self.decoder.of_run(run, inputs)
         if not len(run.point_of_sample) or run.point_of_sample[0, 1] < 0.0:
             # The start is known better than its slow part.
