@@ -10,6 +10,8 @@ from typing import Any
 
 # Names of which all are listed where none is near.
 MANY = 40
+# Likeness of near names, how many are offered, and letters of a text that is looked for in others.
+NEAR, NEAREST, SHORTEST = 0.7, 3, 3
 # What of the system's errors is the machine's doing, whoever has asked for it.
 MACHINE_ERRORS = {
     getattr(errno, name)
@@ -155,11 +157,13 @@ class blamed:  # noqa: N801
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Question that offers the nearest of the known names; of few, if none is near, nothing."""
+    """Question that offers near names, or such as contain it; of few names, if none is, nothing."""
     name, known = name if isinstance(name, str) else "", list(known)
-    if near := difflib.get_close_matches(name, known, n=3, cutoff=0.5):
+    near = difflib.get_close_matches(name, known, n=NEAREST, cutoff=NEAR)
+    if not near and len(name) >= SHORTEST:
+        near = [other for other in known if name in other][:NEAREST]
+    if near:
         return f"did you mean {' or '.join(near)}?"
     if len(known) <= MANY:
         return ""
-    near = difflib.get_close_matches(name, known, n=3, cutoff=0.0)
-    return f"nearest of {len(known)}: {', '.join(near)}; all: vehiclemor list, vehiclemor show NAME"
+    return f"{len(known)} are known: vehiclemor list, vehiclemor show NAME"

@@ -1,11 +1,13 @@
 """The runner of protocols: nothing is chosen by what it is tested on."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 import xarray as xr
 
+from vehiclemor.netcdf_file import read_dataset, write_dataset
 from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.screens import comparison_text
 from vehiclemor.report.unseen import method_rows, protocol_of, target_rows
@@ -144,3 +146,19 @@ def test_a_study_without_full_order_says_so(done):
     protocol = protocol_of(dataset).model_copy(update={"targets": targets})
     row = target_rows(alone, protocol, method_rows(alone, protocol))[-1]
     assert row["reason"].endswith("`rows` takes no full order")
+
+
+def test_times_that_are_missing_or_of_another_source_are_taken_again(done, tmp_path, monkeypatch):
+    folder, study, first = done
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    path = tmp_path / "studies" / "timing-small0.nc"
+    times = read_dataset(path, "source", "vehiclemor")
+    times["seconds"][0] = np.nan
+    write_dataset(times, path)
+    mended = run_studies(study, tmp_path)["small0"]
+    assert (np.isnan(mended["seconds"]) == np.isnan(first["seconds"])).all()
+    assert not mended["seconds"].equals(first["seconds"])
+    xr.testing.assert_equal(run_studies(study, tmp_path)["small0"], mended)
+    monkeypatch.setattr(timing, "source_digest", lambda *_: "another")
+    renewed = run_studies(study, tmp_path)["small0"]
+    assert not renewed["seconds"].equals(mended["seconds"])

@@ -19,6 +19,7 @@ from vehiclemor.exceptions import (
     machine_reason,
     printable,
 )
+from vehiclemor.registry import unknown
 
 # Wrong input; and what the number of a signal is added to.
 WRONG_INPUT, STOPPED = 2, 128
@@ -73,9 +74,9 @@ def ended(run: Callable[[], int | None]) -> int:
         text, status = str(error), FAILED
     except (CycloptsError, VehiclemorError) as error:
         text, status = str(error), WRONG_INPUT
-        if isinstance(error, UnknownOptionError) and "Did you mean" not in text:
-            names = sorted({argument.name for argument in error.argument_collection})
-            text = f"{text} Known: {', '.join(names)}"
+        if isinstance(error, UnknownOptionError):
+            options = [argument.name for argument in error.argument_collection]
+            text = str(unknown("option", error.token.keyword or error.token.value, options))
     except (ImportError, MemoryError, OSError) as error:
         text = machine_reason(error) or str(error)
         # An error of the system has a number; what has none is of a library that can't be loaded.

@@ -25,6 +25,7 @@ import numpy as np
 import xarray as xr
 
 from vehiclemor.codegen.cache import compiler_identity
+from vehiclemor.codegen.sources import source_digest
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import Maneuver
@@ -33,13 +34,13 @@ from vehiclemor.progress import tell
 from vehiclemor.provenance import attributes, machine
 from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.run_timer import CLOCK, one_thread, timed
+from vehiclemor.simulation.run_timer import one_thread, timed
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.evaluate import cached_fit, evaluate, for_run, fresh_fit, model_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.result import variables
 from vehiclemor.study.scenario import model_of_run, start_of
-from vehiclemor.study.store import stored
+from vehiclemor.study.store import stored, without_bugs
 
 # Rounds of a cost table, and of the test set of a protocol, which has many runs; and those of them
 # in which long runs stand, which scatter less.
@@ -65,14 +66,20 @@ def timed_starts(experiments: Mapping[str, Mapping[str, Experiment]], path: Path
     keys: dict[str, dict[str, str]] = {}
     for start, cases in experiments.items():
         keys[start] = {case: experiment.key for case, experiment in cases.items()}
-    return stored_timing(path, [keys, CASE_ROUNDS], every_start)
+    return stored_timing(path, keys, every_start)
 
 
-def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -> xr.Dataset:
-    """What is stored for this content and machine, or else what `make` gives, stored at `path`."""
-    text = json.dumps([content, machine(), compiler_identity(), INPUTS, INPUTS_OF_LONG, CLOCK])
+def stored_timing(
+    path: Path,
+    content: object,
+    make: Callable[[], xr.Dataset],
+    complete: Callable[[xr.Dataset], bool] = without_bugs,
+) -> xr.Dataset:
+    """What is stored for this content, machine and source, else what `make` gives, see `stored`."""
+    source = source_digest((), ("study/timing.py",))
+    text = json.dumps([content, machine(), compiler_identity(), source])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    return stored(path, "timing", key, make)
+    return stored(path, "timing", key, make, complete=complete)
 
 
 def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:

@@ -76,7 +76,8 @@ def run_protocol(
     tests = tuple(sets[judged][run] for run in sample)
     timed = _timed(protocol, rows, tests, np.isin(ends, FINISHED), path)
     keys = sorted(workers.asked)
-    parts = [layout_digest(), protocol.definition.model_dump_json(), timed.attrs["timing"], *keys]
+    times = str(timed["seconds"].values.tolist())
+    parts = [layout_digest(), protocol.definition.model_dump_json(), times, *keys]
     return stored(
         path,
         "cells",
@@ -142,7 +143,8 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
         validation = protocol.sets["validation"]
         sample = protocol.timed_runs(len(validation))
         tests = tuple(validation[run] for run in sample)
-        timed = _timed(protocol, fitting, tests, None, path)
+        every = np.ones((len(fitting), len(tests)), dtype=bool)
+        timed = _timed(protocol, fitting, tests, every, path, "validation-")
         seconds = timed["seconds"].mean("scenario").values
         near = np.flatnonzero(seconds <= (1.0 + TIE_OF_TIMES) * seconds.min())
         best = min((fitting[k] for k in near), key=lambda row: row.result.score)
@@ -155,21 +157,17 @@ def _timed(
     protocol: Protocol,
     rows: Sequence[Row],
     scenarios: Scenarios,
-    finished: np.ndarray | None,
+    finished: np.ndarray,
     path: Path,
+    name: str = "",
 ) -> xr.Dataset:
-    """Stored timing of rows on some scenarios, measured first if it is missing.
-
-    `finished` says which test runs are timed (rows, scenarios); without it the scenarios are those
-    of the validation set.
-    """
-    what, name = ("test", "") if finished is not None else ("validation", "validation-")
+    """Stored timing of the finished runs (rows, scenarios), measured first if one is missing."""
     experiments = {
         row.label: row.entry.experiment(protocol.model, row.candidate, scenarios) for row in rows
     }
-    content = [[label, experiment.key] for label, experiment in experiments.items()]
     return timing.stored_timing(
         path.with_name(f"timing-{name}{path.name}"),
-        [content, timing.PROTOCOL_ROUNDS],
-        lambda: timing.timed_tests(experiments, finished, what=f"{what} set of {protocol.study}"),
+        [[label, experiment.key] for label, experiment in experiments.items()],
+        lambda: timing.timed_tests(experiments, finished, what=f"{name}runs of {protocol.study}"),
+        lambda times: bool(np.isfinite(times["seconds"].values[finished]).all()),
     )
