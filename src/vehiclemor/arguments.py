@@ -7,7 +7,7 @@ sizes would reach into other memory.  A class that may be part of a saved model 
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +18,37 @@ from vehiclemor.short_repr import shortened
 
 # Processes, names in a list, and numbers of a range.
 MOST_JOBS, MOST_NAMES, MOST_NUMBERS = 1024, 10_000, 100_000_000
+# Pydantic's word for a bound, and its kind of an error -> ours.
+BOUNDS = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
+ERRORS = {
+    "bool_type": "is {}, neither true nor false",
+    "int_type": "is {}, not an integer",
+    "float_type": "is {}, not a number",
+    "string_type": "is {}, not a text",
+    "list_type": "is {}, not a list",
+    "dict_type": "is {}, not a table",
+    "missing": "is missing",
+    "extra_forbidden": "is not a known key",
+}
 
 
 def quoted(value: object) -> str:
     """A value as an error shows it: one line, cut short."""
     return shortened(repr(value))
+
+
+def complaint(error: Mapping[str, Any]) -> str:
+    """What is wrong with a value, of an error of pydantic, in the words of this package."""
+    value, limits = error["input"], error.get("ctx", {})
+    for limit, words in BOUNDS.items():
+        if limit in limits:
+            return f"is {value:g}; it must be {words} {limits[limit]:g}"
+    if error["type"] == "literal_error":
+        allowed = limits["expected"].replace(" or ", ", ").replace("'", "")
+        return f"is {quoted(value)}; allowed: {allowed}"
+    if error["type"] in ERRORS:
+        return ERRORS[error["type"]].format(quoted(value))
+    return error["msg"].removeprefix("Value error, ").replace(" after validation", "")
 
 
 def line_of_text(name: str, value: object) -> str:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
+from vehiclemor.arguments import complaint
 from vehiclemor.exceptions import FileError
 from vehiclemor.files import read_regular
 from vehiclemor.short_repr import shortened
@@ -70,5 +71,6 @@ def fitting(path: Path, content: dict[str, Any], schema: type[Schema]) -> Schema
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "top level"
         more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-        message = first["msg"].removeprefix("Value error, ").replace(" after validation", "")
-        raise FileError(f"{path}: {where}: {message}{more}") from None
+        message = complaint(first)
+        colon = "" if message.startswith("is ") else ":"
+        raise FileError(f"{path}: {where}{colon} {message}{more}") from None

@@ -31,6 +31,7 @@ STUDIES = {
         ("rank = 3", "grid.rank"),
         ("rank = [3, 3]", "same value twice"),
         ("rank = [12]", "rank 12"),
+        ("rank = [true]", "grid.rank.values.0 is True, neither a number nor a text"),
         ("rang = [3]", "unknown grid dimension"),
         ("frequency_factor = [-1.0]", "frequency"),
     ],
@@ -71,6 +72,7 @@ PROTOCOLS = {
             "keep is not a key of a study with bounds: it belongs to a grid",
         ),
         ("report = ['toe']\ntitle =", "did you mean reported"),
+        ("sampling = 1\ntitle =", "sampling is not a key of a study with bounds: known: title"),
     ],
     '"for the tests"': [('""', "title: ''")],
     'label = "newton"': [('label = "a\\nb"', r"label: 'a\nb'")],
@@ -101,6 +103,7 @@ TWICE = '[[outside]]\nmaneuver = "chirp_travel"\npoints = [[1.0, 0.0]]\n\n[drawn
 # Part of the protocol with drawn sets -> what stands in its place; words of the line in order.
 DRAWS = [
     (DRAWN, "members = [2, 1]", "members...in order"),
+    (DRAWN, 'both_signs = "yes"', "both_signs is 'yes', neither true nor false"),
     (DRAWN, "parameters.wheel = [0.0, 1.0]", "drawn, box 1: ...wheel"),
     (DRAWN, "parameters.wheel = [0.0, 0.0004]", "3 decimals"),
     (DRAWN, "parameters.initial_speed = [1.0, 2.0]", "by speed = ["),

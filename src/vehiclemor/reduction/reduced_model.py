@@ -150,7 +150,9 @@ class ReducedOrderModel(ShortRepr):
 
     def checked_bounds(self, bounds: Mapping[str, Any], off: bool = False) -> dict[str, Any]:
         """Bounds of `simulate` by output; `InputError` if one is wrong, or none can be judged."""
-        if off or self._own_limits:
+        if off:
+            raise InputError("bounds: runs with trust='off' are not judged")
+        if self._own_limits:
             raise InputError(f"bounds: errors of these runs by {self.method} are not estimated")
         return checked_bounds(self.model, bounds)
 

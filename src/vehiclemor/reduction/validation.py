@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from vehiclemor.arguments import quoted
+from vehiclemor.arguments import complaint, quoted
 from vehiclemor.exceptions import InputError, PlugInError, blamed
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import STATE_KINDS
@@ -17,9 +17,6 @@ from vehiclemor.reduction.training import Training, difference
 from vehiclemor.registry import choice
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import STATUSES, Start, Trajectory
-
-# Pydantic's word for a bound -> ours.
-BOUNDS = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
 
 
 def validated(
@@ -49,7 +46,7 @@ def validated(
         except ValidationError as error:
             first = error.errors()[0]
             name = first["loc"][0] if first["loc"] else "settings"
-            raise InputError(f"{method.name}: {name} {_wrong(first)}") from None
+            raise InputError(f"{method.name}: {name} {complaint(first)}") from None
 
 
 def checked_settings(method: Method, model: Model, settings: Any) -> None:
@@ -122,17 +119,3 @@ def checked_run(model: Model, maneuver: Excitation, start: Start, reduced: Any) 
     if not isinstance(run.counts, Mapping):
         raise PlugInError(f"{whose} counts {quoted(run.counts)}, not numbers by name")
     return run
-
-
-def _wrong(error: Any) -> str:
-    """What is wrong with a value, in the words of this package."""
-    value, limits = error["input"], error.get("ctx", {})
-    for limit, words in BOUNDS.items():
-        if limit in limits:
-            return f"is {value:g}; it must be {words} {limits[limit]:g}"
-    allowed = limits.get("expected", "text").replace(" or ", ", ").replace("'", "")
-    kinds = {"int_type": ", not an integer", "float_type": ", not a number"}
-    kinds |= dict.fromkeys(("string_type", "literal_error"), f"; allowed: {allowed}")
-    if error["type"] in kinds:
-        return f"is {quoted(value)}{kinds[error['type']]}"
-    return error["msg"].removeprefix("Value error, ")

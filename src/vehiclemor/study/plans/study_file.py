@@ -20,6 +20,7 @@ from vehiclemor.study.plans.study_runs import (
     Group,
     Limit,
     Pair,
+    Value,
     list_of,
     table_of,
     values,
@@ -35,7 +36,7 @@ DRAWN = ("drawn", "drawn_outside")
 OF_TEST = ("outside", *DRAWN, "straight", "targets", "failure_rate")
 
 Training = str | Annotated[list[str], Field(min_length=1)]
-Settings = dict[str, int | float | str]
+Settings = dict[str, Value]
 # By its form, so that what is wrong with one is not read as the other.
 Part = Annotated[
     Annotated[Group, Tag("maneuver")] | Annotated[Log, Tag("log")],

@@ -4,8 +4,16 @@ import math
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
 
+from vehiclemor.arguments import quoted
 from vehiclemor.reduction.training import SPEED
 from vehiclemor.toml_files import FileSchema
 
@@ -53,6 +61,15 @@ Positive = Annotated[list[Limit], Field(min_length=2, max_length=2), AfterValida
 Samples = Annotated[list[Annotated[float, Field(allow_inf_nan=False)]], Field(min_length=1)]
 
 
+def _number_or_text(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"is {quoted(value)}, neither a number nor a text")
+    return value
+
+
+Value = Annotated[int | float | str, BeforeValidator(_number_or_text)]
+
+
 def list_of(description: str, least: int = 0) -> Any:
     """Field with a list, empty by default; one that is given has so many entries at least."""
     return Field(default_factory=list, description=description, min_length=least)
@@ -73,8 +90,7 @@ class Span(FileSchema):
 
 # By its form, so that what is wrong with one is not read as the other.
 Axis = Annotated[
-    Annotated[list[int | float | str], Field(min_length=1), Tag("values")]
-    | Annotated[Span, Tag("span")],
+    Annotated[list[Value], Field(min_length=1), Tag("values")] | Annotated[Span, Tag("span")],
     Discriminator(lambda value: "span" if isinstance(value, Span | dict) else "values"),
 ]
 
