@@ -166,11 +166,15 @@ def alone(reduced: ReducedOrderModel) -> ReducedOrderModel:
 def braking_car(name: str, results: Path) -> ReducedOrderModel:
     """What the second protocol has chosen, which brakes and drives; it is fitted once."""
     path = results / "models" / f"braking_{name}.nc"
-    if not path.exists():
-        protocol = load_protocol(f"predictive-{name}-2")
-        entry = next(entry for entry in protocol.entries if entry.label == "guarded")
-        make_folder(path.parent)
-        fitted(Choice(protocol, entry.method, entry.candidates[0], entry.training)).save(path)
+    try:
+        return vm.load(path)
+    except VehiclemorError as error:
+        print(f"{error}: fitted anew", flush=True)
+    protocol = load_protocol(f"predictive-{name}-2")
+    entry = next(entry for entry in protocol.entries if entry.label == "guarded")
+    reduced = fitted(Choice(protocol, entry.method, entry.candidates[0], entry.training))
+    make_folder(path.parent)
+    reduced.save(path, overwrite=True)
     return vm.load(path)
 
 
