@@ -52,7 +52,7 @@ def bump(times, frequency, amplitude):
 
 
 BUMP = Maneuver(
-    name="bump",
+    name="my_bump",
     summary="a bump of 4 cm",
     signal=bump,
     inputs=("road",),
@@ -64,7 +64,7 @@ CAR = ModelDefinition(
     name="quarter_car",
     kind="ode",
     summary="quarter car, 2 degrees of freedom",
-    maneuver="bump",
+    maneuver="my_bump",
     coordinates=(Quantity("z_s", "m", "body"), Quantity("z_u", "m", "wheel")),
     speeds=(Quantity("v_s", "m/s", "body"), Quantity("v_u", "m/s", "wheel")),
     inputs=(Quantity("road", "m", "height of the road"),),
@@ -79,7 +79,7 @@ CAR = ModelDefinition(
 # Names come from entry points. A package declares them in ``pyproject.toml``
 # (``vehiclemor new-plugin`` writes one); a script can write the same lines itself.
 entries = "[vehiclemor.models]\nquarter_car = __main__:CAR\n"
-entries += "[vehiclemor.maneuvers]\nbump = __main__:BUMP\n"
+entries += "[vehiclemor.maneuvers]\nmy_bump = __main__:BUMP\n"
 (folder / "quarter_car-1.0.dist-info").mkdir()
 (folder / "quarter_car-1.0.dist-info" / "entry_points.txt").write_text(entries)
 (folder / "quarter_car-1.0.dist-info" / "METADATA").write_text("Name: quarter_car\nVersion: 1.0\n")
@@ -88,7 +88,7 @@ sys.path.append(str(folder))
 # From here on the model is like any other.
 figure, axis = plt.subplots(figsize=(6.7, 3.4))
 for stiffness in (8e3, 16e3, 32e3):
-    run = vm.model("quarter_car", parameters={"k": stiffness}).simulate("bump")
+    run = vm.model("quarter_car", parameters={"k": stiffness}).simulate("my_bump")
     axis.plot(run.times, run["acceleration"], label=f"{stiffness / 1e3:.0f} N/mm")
 axis.set(xlabel="time (s)", ylabel="acceleration of the body (m/s²)", xlim=(0.4, 3.0))
 axis.legend(title="stiffness")
@@ -96,7 +96,7 @@ plt.show()
 
 # %%
 # Methods reduce it, too. One coordinate is not enough for a car that moves at two frequencies.
-car, twice = vm.model("quarter_car"), vm.maneuver("bump", amplitude=2.0)
+car, twice = vm.model("quarter_car"), vm.maneuver("my_bump", amplitude=2.0)
 full = car.simulate(twice)
 for rank in (1, 2):
     run = vm.reduce(car, "pod", rank=rank, training="nominal").simulate(twice)
