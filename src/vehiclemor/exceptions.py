@@ -5,11 +5,12 @@ import dis
 import errno
 from collections.abc import Iterable
 from contextlib import suppress
+from textwrap import shorten
 from traceback import walk_tb
 from typing import Any
 
-# Names of which all are listed where none is near.
-MANY = 40
+# Names of which all are listed where none is near, and characters of their list.
+MANY, MOST_LISTED = 40, 450
 # Likeness of near names, how many are offered, and letters of a text that is looked for in others.
 NEAR, NEAREST, SHORTEST = 0.7, 3, 3
 # What of the system's errors is the machine's doing, whoever has asked for it.
@@ -157,13 +158,14 @@ class blamed:  # noqa: N801
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Question that offers near names, or such as contain it; of few names, if none is, nothing."""
-    name, known = name if isinstance(name, str) else "", list(known)
+    """What is meant: near names, or such as contain it; else all known ones, or how to see them."""
+    name, known = name if isinstance(name, str) else "", sorted(set(known))
     near = difflib.get_close_matches(name, known, n=NEAREST, cutoff=NEAR)
     if not near and len(name) >= SHORTEST:
-        near = [other for other in known if name in other][:NEAREST]
+        longer = [other for other in known if name in other]
+        near = difflib.get_close_matches(name, longer, n=NEAREST, cutoff=0.0)
     if near:
         return f"did you mean {' or '.join(near)}?"
-    if len(known) <= MANY:
-        return ""
-    return f"{len(known)} are known: vehiclemor list, vehiclemor show NAME"
+    if len(known) > MANY:
+        return f"{len(known)} are known: vehiclemor list, vehiclemor show NAME"
+    return f"known: {shorten(', '.join(known), MOST_LISTED, placeholder=' ...') or 'none'}"

@@ -210,7 +210,7 @@ def parameter_and_axis(
     point, _, axis = str(name).partition(".")
     declared = expected.get(name, expected.get(point))
     if declared is None:
-        hint = did_you_mean(point, expected) or f"it has {', '.join(expected)}"
+        hint = did_you_mean(point, expected)
     elif name == point:
         return name, None
     elif declared.size == len(AXES) and axis in AXES:

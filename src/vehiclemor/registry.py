@@ -9,7 +9,6 @@ import re
 from collections.abc import Collection, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from textwrap import shorten
 from typing import Any
 
 from vehiclemor.arguments import quoted
@@ -23,8 +22,6 @@ CLASSES = {
 }
 # Groups of entry points.
 GROUPS = {kind: f"vehiclemor.{kind}s" for kind in CLASSES}
-# Characters of a list of names in a message.
-MOST_LISTED = 450
 # One name for each member.  No number has more digits.
 FAMILY = re.compile(r"([^:]+):(0|[1-9][0-9]{0,17})")
 
@@ -83,10 +80,7 @@ def choice(kind: str, name: Any, known: Collection[str]) -> str:
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> InputError:
     """Error for an unknown name, with the nearest known ones."""
-    known = sorted(set(known))
-    listed = shorten(", ".join(known), MOST_LISTED, placeholder=" ...")
-    hint = did_you_mean(name, known) or f"known: {listed}"
-    return InputError(f"unknown {kind} {quoted(name)}; {hint}")
+    return InputError(f"unknown {kind} {quoted(name)}; {did_you_mean(name, known)}")
 
 
 @cache

@@ -5,12 +5,11 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationError
 
-from vehiclemor.arguments import complaint
+from vehiclemor.arguments import complaint, quoted
 from vehiclemor.exceptions import FileError
 from vehiclemor.files import read_regular
-from vehiclemor.short_repr import shortened
 
 # Bytes of a file, characters of a line in it, and parts of a key: the parser takes a time that
 # grows with their square.
@@ -22,13 +21,20 @@ Schema = TypeVar("Schema", bound="FileSchema")
 
 def _line(text: str) -> str:
     if not (text.strip() and text.isprintable()):
-        raise ValueError(f"{shortened(repr(text))} is not a line of text")
+        raise ValueError(f"{quoted(text)} is not a line of text")
     if len(text) > LONGEST:
         raise ValueError(f"a text of {len(text)} characters; the longest has {LONGEST}")
     return text
 
 
+def _number_or_text(value: object) -> object:
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"is {quoted(value)}, neither a number nor a text")
+    return value
+
+
 Line = Annotated[str, AfterValidator(_line)]
+Value = Annotated[int | float | str, BeforeValidator(_number_or_text)]
 
 
 class FileSchema(BaseModel):

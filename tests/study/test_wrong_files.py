@@ -72,7 +72,7 @@ PROTOCOLS = {
             "keep is not a key of a study with bounds: it belongs to a grid",
         ),
         ("report = ['toe']\ntitle =", "did you mean reported"),
-        ("sampling = 1\ntitle =", "sampling is not a key of a study with bounds: known: title"),
+        ("sampling = 1\ntitle =", "sampling is not a key of a study with bounds: known: "),
     ],
     '"for the tests"': [('""', "title: ''")],
     'label = "newton"': [('label = "a\\nb"', r"label: 'a\nb'")],

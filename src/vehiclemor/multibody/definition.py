@@ -321,7 +321,7 @@ class ModelDefinition(ShortRepr):
         allowed = set(known)
         for name in names:
             if name not in allowed:
-                hint = did_you_mean(name, allowed) or f"known: {', '.join(sorted(allowed))}"
+                hint = did_you_mean(name, allowed)
                 raise InputError(f"model {self.name!r}: {where} names {name!r}; {hint}")
 
 
@@ -353,8 +353,7 @@ def with_constants(definition: ModelDefinition, names: Iterable[str]) -> ModelDe
     optional = {quantity.name for quantity in definition.optional_inputs}
     for name in names:
         if name not in optional:
-            known = ", ".join(sorted(optional)) or "none"
-            hint = did_you_mean(name, optional) or f"optional inputs: {known}"
+            hint = did_you_mean(name, optional)
             raise InputError(f"{name!r} is not an optional input of {definition.name}; {hint}")
     constant = {*definition.choice.constant, *names}
     driven = (name for name in definition.choice.driven if name not in constant)

@@ -35,7 +35,7 @@ from vehiclemor.provenance import attributes, machine
 from vehiclemor.reduction.interface import FittedModel
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import one_thread, timed
-from vehiclemor.simulation.trajectory import Trajectory
+from vehiclemor.simulation.trajectory import FINISHED, Trajectory
 from vehiclemor.study.evaluate import cached_fit, evaluate, for_run, fresh_fit, model_of
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.result import variables
@@ -97,7 +97,8 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
     dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop_conflicts")
     dataset = dataset.drop_vars("output_unit").assign_coords(case=list(experiments))
     rounds, what = (CASE_ROUNDS, CASE_ROUNDS), f"from {start}"
-    seconds, offline = _rounds(list(experiments.values()), rounds, what)
+    finished = np.isin(dataset["status"].values[:, None], FINISHED)
+    seconds, offline = _rounds(list(experiments.values()), rounds, what, finished)
     times = _dataset(experiments, seconds, offline, f"{samples} time points")
     dataset = dataset.merge(times.isel(scenario=0, drop=True))
     columns: dict[str, object] = {
@@ -115,7 +116,7 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
 
 def timed_tests(
     experiments: Mapping[str, Experiment],
-    finished: np.ndarray | None = None,
+    finished: np.ndarray,
     what: str = "test set",
 ) -> xr.Dataset:
     """Time experiments on their test scenarios, which are the same for all.
@@ -153,7 +154,7 @@ def _rounds(
     experiments: Sequence[Experiment],
     rounds: tuple[int, int],
     what: str,
-    finished: np.ndarray | None = None,
+    finished: np.ndarray,
 ) -> tuple[np.ndarray, list[float]]:
     """Seconds of runs (rounds, experiments, scenarios, parts of `Seconds`), and of fits.
 
@@ -163,22 +164,19 @@ def _rounds(
     model = model_of(experiments[0])
     scenarios = experiments[0].test
     tests = [(as_signal(model, s.maneuver), start_of(model, s)) for s in scenarios]
-    shape = (len(experiments), len(tests))
-    wanted = np.ones(shape, dtype=bool) if finished is None else finished.copy()
+    wanted = finished.copy()
     # The names differ, so that progress never goes back.
     work = f"rounds of times on {model.name}, {what}"
     tell(work, 0, rounds[0] + 1)
     fits = [_warm_fit(model, e, bool(w.any())) for e, w in zip(experiments, wanted, strict=True)]
     for (reduced, _), runs in zip(fits, wanted, strict=True):
-        if isinstance(reduced, Failure):
-            if finished is not None and runs.any():
-                raise RuntimeError(f"its runs have finished, but the fit fails: {reduced.message}")
-            runs[:] = False
+        if isinstance(reduced, Failure) and runs.any():
+            raise RuntimeError(f"its runs have finished, but the fit fails: {reduced.message}")
     models = [model_of_run(model, scenario) for scenario in scenarios]
     for_test: list[list[Any]] = []
     for reduced, _ in fits:
         for_test.append([for_run(reduced, changed) for changed in models])
-    seconds = np.full((rounds[0] + 1, *shape, len(Seconds._fields)), np.nan)
+    seconds = np.full((rounds[0] + 1, *wanted.shape, len(Seconds._fields)), np.nan)
     for turn in range(rounds[0] + 1):
         for number, (maneuver, start) in enumerate(tests):
             for index in range(len(fits)):

@@ -20,12 +20,11 @@ from vehiclemor.study.plans.study_runs import (
     Group,
     Limit,
     Pair,
-    Value,
     list_of,
     table_of,
     values,
 )
-from vehiclemor.toml_files import FileSchema, Line
+from vehiclemor.toml_files import FileSchema, Line, Value
 
 # Of the test sets of every study without a seed.
 SEED, MOST_SEED = 20261122, 2**63 - 1
@@ -328,4 +327,4 @@ def _hint(key: str, schema: type[StudyFile | CollectionFile]) -> str:
     if others:
         kinds = " or ".join(other.kind for other in others)
         return f"it belongs to {kinds}"
-    return did_you_mean(key, schema.model_fields) or f"known: {', '.join(schema.model_fields)}"
+    return did_you_mean(key, schema.model_fields)

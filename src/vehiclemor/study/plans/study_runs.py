@@ -4,18 +4,10 @@ import math
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    Tag,
-    model_validator,
-)
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from vehiclemor.arguments import quoted
 from vehiclemor.reduction.training import SPEED
-from vehiclemor.toml_files import FileSchema
+from vehiclemor.toml_files import FileSchema, Value
 
 FACTORS = ("frequency_factor", "amplitude_factor")
 # Axes that say what is run and what is trained on; and how the name of a parameter's begins.
@@ -59,15 +51,6 @@ Drawn = Annotated[dict[str, Printable], AfterValidator(without_speed)]
 Limit = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Positive = Annotated[list[Limit], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
 Samples = Annotated[list[Annotated[float, Field(allow_inf_nan=False)]], Field(min_length=1)]
-
-
-def _number_or_text(value: object) -> object:
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError(f"is {quoted(value)}, neither a number nor a text")
-    return value
-
-
-Value = Annotated[int | float | str, BeforeValidator(_number_or_text)]
 
 
 def list_of(description: str, least: int = 0) -> Any:
