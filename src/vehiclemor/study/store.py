@@ -247,11 +247,6 @@ def result_path(folder: Path, study: str, content: str) -> Path | None:
     return path if attributes.get("content") == content else None
 
 
-def without_bugs(dataset: xr.Dataset) -> bool:
-    """Whether no bug has ended a run: such a run is tried again."""
-    return "status" not in dataset or "error" not in dataset["status"].values
-
-
 def stored(
     path: Path,
     attribute: str,
@@ -259,20 +254,22 @@ def stored(
     make: Callable[[], xr.Dataset],
     sources: Callable[[], Iterable[Path]] = list,
     content: str = "",
-    complete: Callable[[xr.Dataset], bool] = without_bugs,
 ) -> xr.Dataset:
     """What is stored for this key, else what `make` gives, which is then stored.
 
     That replaces the results of another study of that name, which can be combined again.
     The global `attribute` holds the key, `content` is the hash of a study file.  `make` is called
-    again if one of its sources is missing, or what is stored is not complete.
+    again if one of its sources is missing, a bug has ended a run, or the attribute `missing` says
+    that something was not measured.
     """
     # Asked before it is read: what another process stores meanwhile is none of others.
     there = os.path.lexists(path)
     held = global_attributes(path, stored=True)
     if held.get(attribute) == key and all(source.exists() for source in sources()):
         dataset = read_dataset(path, "source", "vehiclemor", stored=True)
-        if complete(dataset):
+        # What a bug has ended is tried again.
+        ended = "status" not in dataset or "error" not in dataset["status"].values
+        if ended and not held.get("missing"):
             dataset.encoding["source"] = str(path)
             return dataset
     make_folder(path.parent)

@@ -40,7 +40,7 @@ from vehiclemor.study.evaluate import cached_fit, evaluate, for_run, fresh_fit, 
 from vehiclemor.study.experiment import Experiment
 from vehiclemor.study.result import variables
 from vehiclemor.study.scenario import model_of_run, start_of
-from vehiclemor.study.store import stored, without_bugs
+from vehiclemor.study.store import stored
 
 # Rounds of a cost table, and of the test set of a protocol, which has many runs; and those of them
 # in which long runs stand, which scatter less.
@@ -69,17 +69,12 @@ def timed_starts(experiments: Mapping[str, Mapping[str, Experiment]], path: Path
     return stored_timing(path, keys, every_start)
 
 
-def stored_timing(
-    path: Path,
-    content: object,
-    make: Callable[[], xr.Dataset],
-    complete: Callable[[xr.Dataset], bool] = without_bugs,
-) -> xr.Dataset:
+def stored_timing(path: Path, content: object, make: Callable[[], xr.Dataset]) -> xr.Dataset:
     """What is stored for this content, machine and source, else what `make` gives, see `stored`."""
     source = source_digest((), ("study/timing.py",))
     text = json.dumps([content, machine(), compiler_identity(), source])
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    return stored(path, "timing", key, make, complete=complete)
+    return stored(path, "timing", key, make)
 
 
 def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
@@ -99,7 +94,7 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
     rounds, what = (CASE_ROUNDS, CASE_ROUNDS), f"from {start}"
     finished = np.isin(dataset["status"].values[:, None], FINISHED)
     seconds, offline = _rounds(list(experiments.values()), rounds, what, finished)
-    times = _dataset(experiments, seconds, offline, f"{samples} time points")
+    times = _dataset(experiments, seconds, offline, f"{samples} time points", finished)
     dataset = dataset.merge(times.isel(scenario=0, drop=True))
     columns: dict[str, object] = {
         "tolerance": [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()],
@@ -126,13 +121,20 @@ def timed_tests(
     """
     rounds = PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG
     seconds, offline = _rounds(list(experiments.values()), rounds, what, finished)
-    return _dataset(experiments, seconds, offline, what)
+    return _dataset(experiments, seconds, offline, what, finished)
 
 
 def _dataset(
-    experiments: Mapping[str, Experiment], seconds: np.ndarray, offline: list[float], what: str
+    experiments: Mapping[str, Experiment],
+    seconds: np.ndarray,
+    offline: list[float],
+    what: str,
+    finished: np.ndarray,
 ) -> xr.Dataset:
-    """Median and quartiles of rounds (rounds, cases, scenarios, parts of `Seconds`)."""
+    """Median and quartiles of rounds (rounds, cases, scenarios, parts of `Seconds`).
+
+    The attribute `missing` counts `finished` runs without a time.
+    """
     of_calls = seconds[..., CALL]
     with warnings.catch_warnings():
         # What was never timed has none.
@@ -146,7 +148,9 @@ def _dataset(
     first = next(iter(experiments.values()))
     labels = {"case": list(experiments), "scenario": [scenario.label for scenario in first.test]}
     title = f"timing of {first.model}, interleaved, {len(seconds)} rounds, {what}"
-    return xr.Dataset(columns, labels, attributes(title, first.kernel, model=first.model))
+    missing = np.count_nonzero(np.isnan(quantiles["seconds_median"][finished]))
+    about = attributes(title, first.kernel, model=first.model, missing=missing)
+    return xr.Dataset(columns, labels, about)
 
 
 @one_thread()
