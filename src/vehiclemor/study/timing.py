@@ -91,10 +91,9 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
     results = [evaluate(experiment)[names] for experiment in experiments.values()]
     dataset = xr.concat(results, dim="case", join="exact", combine_attrs="drop_conflicts")
     dataset = dataset.drop_vars("output_unit").assign_coords(case=list(experiments))
-    rounds, what = (CASE_ROUNDS, CASE_ROUNDS), f"from {start}"
     finished = np.isin(dataset["status"].values[:, None], FINISHED)
-    seconds, offline = _rounds(list(experiments.values()), rounds, what, finished)
-    times = _dataset(experiments, seconds, offline, f"{samples} time points", finished)
+    what = f"{samples} time points from {start}"
+    times, seconds = _measured(experiments, (CASE_ROUNDS, CASE_ROUNDS), what, finished)
     dataset = dataset.merge(times.isel(scenario=0, drop=True))
     columns: dict[str, object] = {
         "tolerance": [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()],
@@ -120,21 +119,14 @@ def timed_tests(
     quartiles and `loop_seconds`, on `case` and `scenario`, are missing.
     """
     rounds = PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG
+    return _measured(experiments, rounds, what, finished)[0]
+
+
+def _measured(
+    experiments: Mapping[str, Experiment], rounds: tuple[int, int], what: str, finished: np.ndarray
+) -> tuple[xr.Dataset, np.ndarray]:
+    """Median and quartiles of `_rounds`, with the number of missing times, and their seconds."""
     seconds, offline = _rounds(list(experiments.values()), rounds, what, finished)
-    return _dataset(experiments, seconds, offline, what, finished)
-
-
-def _dataset(
-    experiments: Mapping[str, Experiment],
-    seconds: np.ndarray,
-    offline: list[float],
-    what: str,
-    finished: np.ndarray,
-) -> xr.Dataset:
-    """Median and quartiles of rounds (rounds, cases, scenarios, parts of `Seconds`).
-
-    The attribute `missing` counts `finished` runs without a time.
-    """
     of_calls = seconds[..., CALL]
     with warnings.catch_warnings():
         # What was never timed has none.
@@ -150,7 +142,7 @@ def _dataset(
     title = f"timing of {first.model}, interleaved, {len(seconds)} rounds, {what}"
     missing = np.count_nonzero(np.isnan(quantiles["seconds_median"][finished]))
     about = attributes(title, first.kernel, model=first.model, missing=missing)
-    return xr.Dataset(columns, labels, about)
+    return xr.Dataset(columns, labels, about), seconds
 
 
 @one_thread()

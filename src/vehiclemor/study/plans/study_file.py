@@ -323,8 +323,7 @@ def schema_of(content: Mapping[str, Any]) -> type[StudyFile | CollectionFile]:
 
 def _hint(key: str, schema: type[StudyFile | CollectionFile]) -> str:
     """Where a key belongs, or what it may be meant to be."""
-    others = [other for other in (GridFile, *SCHEMAS.values()) if key in other.model_fields]
+    others = [other.kind for other in (GridFile, *SCHEMAS.values()) if key in other.model_fields]
     if others:
-        kinds = " or ".join(other.kind for other in others)
-        return f"it belongs to {kinds}"
+        return f"it belongs to {' or '.join(others)}"
     return did_you_mean(key, schema.model_fields)
