@@ -75,7 +75,7 @@ def ended(run: Callable[[], int | None]) -> int:
     except (CycloptsError, VehiclemorError) as error:
         text, status = str(error), WRONG_INPUT
         if isinstance(error, UnknownOptionError):
-            options = [argument.name for argument in error.argument_collection]
+            options = [a.name for a in error.argument_collection if a.name.startswith("--")]
             text = str(unknown("option", error.token.keyword or error.token.value, options))
     except (ImportError, MemoryError, OSError) as error:
         text = machine_reason(error) or str(error)
