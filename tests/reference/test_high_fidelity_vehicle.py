@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
-from scipy.spatial.transform import Rotation
 
 from tests.oracles import high_fidelity_pinocchio as pinocchio
 from tests.oracles import high_fidelity_vehicle as oracle
@@ -263,10 +262,3 @@ def test_eigenvalues_are_those_of_the_specification(straight):
     gaps = found[match[0]] - expected[match[1]]
     # Printed with one digit after the point.
     assert max(np.abs(gaps.real).max(), np.abs(gaps.imag).max()) < 0.0501
-
-
-def heading(q: np.ndarray, corner: int) -> float:
-    """Angle in the plane from the y axis to the axis of a front wheel."""
-    chassis, carrier = (Rotation.from_euler("ZYX", q[k : k + 3]) for k in (3, corner))
-    axis = (chassis * carrier).apply([0.0, 1.0, 0.0])
-    return np.arctan2(-axis[0], axis[1])

@@ -196,14 +196,3 @@ def test_one_fit_serves_all_solvers_tolerances_and_fallbacks(vehicle, fits):
     np.testing.assert_array_equal(anew.reduced.coefficients, alone.coefficients)
     failed = cached_fit(vehicle, experiment(vehicle, "guarded", terms=FAILING, steps=0))
     assert failed == Failure("diverged", "no fit")
-
-
-MODELS = {
-    "independent_suspension_vehicle": "lane_change",
-    "high_fidelity_vehicle": "rack_multisine",
-}
-
-
-def scenario(model, frequency=1.0, amplitude=1.0, speed=20.0):
-    maneuver = component("maneuver", MODELS[model]).perturbed(frequency, amplitude)
-    return Scenario(maneuver, "equilibrium", speed)

@@ -3,19 +3,12 @@
 import numpy as np
 
 import vehiclemor as vm
-from tests.models import CAR, WISHBONE
+from tests.models import CAR
 from tests.study.small import small_study
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.loading import load_studies, read_study, write_study
 from vehiclemor.study.plans.results import flattened
-from vehiclemor.study.plans.study_file import GridFile
 from vehiclemor.study.run import run_studies
-
-
-def grid_of(**given):
-    """A grid of a study with these entries."""
-    study = {"title": "t", "model": WISHBONE, "keep": "metrics", "methods": [{"method": "pod"}]}
-    return expand("mine", GridFile.model_validate(study | given))
 
 
 def test_a_method_that_a_setting_does_not_concern_is_computed_once():

@@ -30,7 +30,6 @@ OUTPUTS = [
     sp.Piecewise((a, (b > 0) & (p > q)), (b, sp.Ge(c, d)), (u, sp.true)),
     sp.Max(sp.Piecewise((a, b < c), (d, True)), sp.Min(b, c)),
 ]
-LIMITED = 5
 
 
 def derive() -> Program:

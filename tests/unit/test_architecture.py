@@ -1,47 +1,15 @@
-"""The rooms of the package: no circle of files, no long file, nothing heavy before it is needed."""
+"""Nothing heavy is imported before it is needed; what is compiled is compiled once."""
 
-import ast
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-import vehiclemor as vm
 from vehiclemor.codegen.cache import cache_folder
 
-PACKAGE = Path(vm.__file__).parent
 # What takes longer to import than a model to run.
 HEAVY = ("numba", "sympy", "scipy", "pandas", "xarray", "matplotlib")
-
-
-def module_of(path: Path) -> str:
-    parts = (PACKAGE.name, *path.relative_to(PACKAGE).with_suffix("").parts)
-    return ".".join(parts).removesuffix(".__init__")
-
-
-FILES = {module_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
-
-
-def imported(path: Path) -> set[str]:
-    """Modules that a file imports, inside of functions too."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: imports are absolute"
-            found |= {f"{node.module}.{alias.name}" for alias in node.names} | {str(node.module)}
-    return found & set(FILES)
-
-
-def test_no_files_import_one_another_in_a_circle():
-    waiting = {name: imported(path) - {name} for name, path in FILES.items()}
-    while free := [name for name, needed in waiting.items() if not needed & set(waiting)]:
-        for name in free:
-            del waiting[name]
-    assert not waiting
 
 
 SIMULATION = """

@@ -5,22 +5,15 @@ from functools import cache
 
 import numpy as np
 import pytest
-from reduced_models import in_bounds
 
 import vehiclemor as vm
 from tests.models import CAR
 from vehiclemor.exceptions import InputError
-from vehiclemor.study.plans.protocol import load_protocol
 
 
 @cache
 def shipped(name):
     return vm.rom(name)
-
-
-def missed(rom, run, full):
-    """Largest error of a run, in parts of the bounds of its model's protocol."""
-    return in_bounds(load_protocol(f"predictive-{rom.model.name}"), run, full)
 
 
 def test_the_whole_signal_is_looked_at():
@@ -48,31 +41,6 @@ def test_bounds_of_inputs_hold_between_output_times_in_full_order_too():
     many = vm.simulate_many(car, signals, outputs=["yaw"])
     assert many["status"].values.tolist() == ["rejected", "ok"]
     assert "holds from -1.066 to 1.066 rad" in many["message"].values[0]
-
-
-def test_pod_of_the_suspension_tells_of_inputs_with_which_it_is_wrong():
-    pod = vm.reduce("double_wishbone", "pod", rank=3, training="nominal")
-    for factors in ({}, {"amplitude": 0.9}):
-        assert pod.simulate(vm.maneuver("sine_travel", **factors)).status == "ok"
-    run = pod.simulate(vm.maneuver("sine_travel", frequency=1.2))
-    assert run.status == "untrusted"
-    assert "the estimated error of second_euler_angle" in run.message
-    one = vm.simulate("double_wishbone", "pod", training="nominal", frequency=1.2)
-    assert one["remark"].item() == f"not to be trusted: {run.message}"
-
-
-def test_pod_tells_when_it_leaves_its_training_run():
-    car = vm.model(CAR)
-    pod = vm.reduce(car, "pod", rank=3, training="nominal")
-    assert pod.simulate("lane_change").status == "ok"
-    times = np.linspace(0.0, 12.0, 601)
-    steering = vm.Signal.from_samples(times, 0.02 * np.sin(times) * np.clip(times, 0.0, 1.0))
-    run, full = pod.simulate(steering), car.simulate(steering)
-    assert missed(pod, run, full) > 10.0
-    assert run.status == "untrusted"
-    assert run.error_estimate.in_bounds == pytest.approx(missed(pod, run, full), rel=0.05)
-    # Half a second of the training run is known; what comes then is not.
-    assert 0.0 < run.trust.until < 1.0
 
 
 def test_a_vehicle_without_error_bounds_knows_its_training():

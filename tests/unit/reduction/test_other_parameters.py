@@ -60,15 +60,6 @@ def test_a_map_of_paths_is_made_anew_between_the_inputs_of_its_training():
     np.testing.assert_array_equal(known.simulate().outputs, direct.simulate().outputs)
 
 
-def test_what_was_trained_on_runs_is_of_no_other_model(tmp_path):
-    trained = vm.reduce(car(), "pod", training="nominal")
-    for rom in (trained, vm.load(trained.save(tmp_path / "pod.nc"))):
-        with pytest.raises(InputError, match="trained on runs of one model"):
-            rom.for_parameters(HEAVY)
-        with pytest.raises(InputError, match="trained on runs of one model"):
-            vm.simulate_many(rom, [LANE], parameters=HEAVY)
-
-
 def test_how_a_run_starts_is_not_of_which_model_it_is():
     assert difference(car(), heavy()) in HEAVY
     faster = reparametrised(car(), {"initial_speed": 25.0, "drop_height": 0.02})

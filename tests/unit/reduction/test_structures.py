@@ -101,9 +101,6 @@ def test_more_vectors_of_pod_are_better_until_they_are_all(model):
     assert relative_error(exact.simulate(test, "equilibrium").outputs, full.outputs) < 1e-7
 
 
-# States
-
-
 @pytest.fixture(scope="module")
 def small(model):
     return vm.reduce(model, "craig_bampton", training=[signal()], highest=60.0, tolerance=1e-4)

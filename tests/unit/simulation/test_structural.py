@@ -14,8 +14,7 @@ from vehiclemor.simulation.structures.model import (
     relative_error,
 )
 
-TRUCK, HEIGHTS = "flexible_truck", ("road_FL", "road_FR", "road_RL", "road_RR")
-# Nothing takes energy away, and the tire, which is one-sided and damped, is gone.
+TRUCK = "flexible_truck"
 
 
 def bump(size):

@@ -133,9 +133,7 @@ def test_a_learned_car_drives_straight_on_and_turns_with_its_heading(car, runs):
     distance = straight["longitudinal_position"][-1]
     assert abs(straight["lateral_position"]).max() < 1e-9
     assert distance == pytest.approx(reduced.states.shape.speed * straight.times[-1], rel=1e-9)
-    turned, (x, y, heading) = car.start(), car.planar
-    turned[[heading, x, y]] = 0.5 * np.pi, 3.0, -2.0
-    turned = car.start("equilibrium").copy()
+    turned, (x, y, heading) = car.start("equilibrium").copy(), car.planar
     for a, b in zip(car.rotating[1::2], car.rotating[2::2], strict=True):
         turned[b], turned[a] = turned[a], -turned[b]
     turned[[heading, x, y]] = 0.5 * np.pi, 3.0, -2.0

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
+from tests.models import CAR
+from tests.oracles import vehicle_lagrange
 from tests.reducing import fitted
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import (
@@ -85,6 +87,8 @@ def single_track(model, speed):
 def test_single_track_corners_as_the_linearised_vehicle(shape):
     turn = -np.linalg.solve(*single_track(shape.model, shape.speed))[1]
     assert turn == pytest.approx(steady_turn(shape), rel=1e-6)
+    if shape.model.name == CAR:
+        assert turn == pytest.approx(vehicle_lagrange.single_track_yaw_gain(), rel=1e-6)
 
 
 @pytest.mark.parametrize(

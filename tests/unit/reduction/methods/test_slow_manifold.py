@@ -87,20 +87,6 @@ def test_slow_coordinates_obey_their_linear_equation_where_steering_is_small(car
     assert np.abs(speed).max() < 1e-6
 
 
-@pytest.mark.parametrize("start", ["equilibrium", "dropped"])
-def test_without_steering_the_reduced_car_drives_straight(reduced, start):
-    run = reduced.simulate(straight_ahead, start)
-    lateral = run.outputs[:, reduced.model.outputs.index("lateral_position")]
-    assert np.abs(lateral).max() < 1e-9
-
-
-def test_a_mirrored_input_is_answered_by_the_mirrored_path(reduced):
-    left, right = (reduced.path(lane_change.perturbed(1.0, a), "equilibrium") for a in (1, -1))
-    lateral = [0, 1, 2, 3, 9, 11]
-    np.testing.assert_allclose(right[:, lateral], -left[:, lateral], rtol=0, atol=1e-8)
-    np.testing.assert_allclose(right[:, [4, 6]], left[:, [4, 6]], rtol=0, atol=1e-7)
-
-
 def test_it_is_right_on_inputs_between_those_that_it_has_seen(reduced):
     unseen = lane_change.perturbed(1.1, 0.85)
     found = errors(reduced, unseen)

@@ -5,15 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import vehiclemor as vm
-from tests.models import CAR
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change, step_steer
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
-from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.workspaces import Solver
@@ -104,32 +101,3 @@ def test_windows_refuse_runs_of_different_durations(model):
     runs = [TrainingRun(model, maneuver, "dropped") for maneuver in (lane_change, step_steer)]
     with pytest.raises(InputError, match="5, 25 s"):
         pod.fit(model, runs, settings)
-
-
-@pytest.fixture(scope="module")
-def car():
-    return vm.model(CAR)
-
-
-@pytest.fixture(scope="module")
-def maneuver():
-    # Of a few seconds, with more steering than the training has.
-    return replace(component("maneuver", "lane_change"), duration=4.0, samples=201).perturbed(
-        1.0, 1.2
-    )
-
-
-@pytest.mark.parametrize("formulation", ["coordinates", "state"])
-def test_its_rates_are_those_of_its_steps_and_its_jacobian_theirs(car, maneuver, formulation):
-    rom = vm.reduce(car, "pod", formulation=formulation)
-    x, u, t = car.simulate(maneuver).states[90], maneuver.at(np.array([1.8]))[0], 1.8
-    # What comes after a step lies in the subspace.
-    y, dt = rom.step(x, u, 1e-3, t), 1e-5
-    slopes = (rom.step(y, u, dt, t) - y) / dt
-    np.testing.assert_allclose(rom.rhs(y, u, t), slopes, rtol=1e-3, atol=1e-2)
-    found, columns = rom.jacobian(x, u, time=t), []
-    for step in 1e-6 * np.maximum(np.abs(x), 1.0) * np.eye(len(x)):
-        sides = rom.rhs(x + step, u, t) - rom.rhs(x - step, u, t)
-        columns.append(sides / (2.0 * step.sum()))
-    scale = np.abs(found).max()
-    np.testing.assert_allclose(np.transpose(columns) / scale, found / scale, atol=1e-7)
