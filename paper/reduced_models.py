@@ -1,11 +1,12 @@
 """Makes the reduced models that ship with the package: of each protocol the one that it has chosen.
 
-Usage: python paper/reduced_models.py [--check] [--results FOLDER] [MODEL ...]
+Usage: python paper/reduced_models.py [--check | --refit] [--results FOLDER] [MODEL ...]
 
 Protocols are run first where their results are missing.  What is chosen is fitted on the protocol's
 training runs and written to data/reduced/MODEL.nc, unless a file made by the same source of the
 same choice is there.  With --check nothing is run or written: what each file says that it was made
-of is fitted anew and compared with it; the exit status is 1 if one differs.
+of is fitted anew and compared with it; the exit status is 1 if one differs.  With --refit that is
+written: no protocol is run, and tests need not fit anew what this source has fitted.
 """
 
 import argparse
@@ -118,6 +119,7 @@ def main() -> int:
     """Write or check the files; exit status."""
     parser = argparse.ArgumentParser(description="Make the reduced models that ship.")
     parser.add_argument("--check", action="store_true", help="compare with a fit, write nothing")
+    parser.add_argument("--refit", action="store_true", help="keep the choice that files tell")
     parser.add_argument("--results", type=Path, default=RESULTS, help="results folder")
     parser.add_argument("models", nargs="*", default=[*protocol_names()], metavar="MODEL")
     given = parser.parse_args()
@@ -125,7 +127,7 @@ def main() -> int:
         raise VehiclemorError("the package does not run from a checkout: pip install -e . there")
     status = 0
     for name in given.models:
-        choice = shipped(name) if given.check else chosen(name, given.results)
+        choice = shipped(name) if given.check or given.refit else chosen(name, given.results)
         path = path_of(name)
         reasons = stale(name, choice)
         if not reasons and not given.check:

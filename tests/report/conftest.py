@@ -43,7 +43,7 @@ def few_rounds():
 @pytest.fixture(scope="session")
 def results_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results")
-    run_studies("paper", folder, jobs=2)
+    run_studies("paper", folder)
     return folder
 
 

@@ -14,6 +14,7 @@ from tests.report.figure_texts import checked
 from vehiclemor.cli import main
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import component
+from vehiclemor.report import default_studies
 from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.default_studies import nominal, unseen
 from vehiclemor.report.figures import theme
@@ -171,7 +172,8 @@ def folder(plug_in_package, tmp_path_factory):
     return tmp_path_factory.mktemp("results")
 
 
-def test_a_model_is_compared_by_every_method_and_output(folder, capsys):
+def test_a_model_is_compared_by_every_method_and_output(folder, capsys, monkeypatch):
+    monkeypatch.setattr(default_studies, "FACTORS", (0.8, 1.0, 1.2))
     assert main(["compare", CAR, "--results", str(folder)]) == 0
     printed = capsys.readouterr().out
     assert main(["compare", CAR, "--json", "--results", str(folder)]) == 0

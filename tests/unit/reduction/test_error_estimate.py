@@ -11,6 +11,8 @@ import vehiclemor as vm
 from tests.models import CAR
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.maneuver import registered
+from vehiclemor.registry import component
+from vehiclemor.study.plans.loading import read_study, study_path
 from vehiclemor.study.plans.protocol import fixed_protocols, load_protocol
 
 # Random steering that no model is trained on.
@@ -185,10 +187,10 @@ def test_a_run_that_is_too_short_says_so():
 
 def test_bounds_are_those_of_the_studies():
     for name in fixed_protocols():
-        protocol = load_protocol(name)
-        known = protocol.model.definition.error_bounds
+        study = read_study(study_path(name))
+        known = component("model", study.model).error_bounds
         if known:
-            bounds = protocol.definition.bounds.items()
+            bounds = study.bounds.items()
             assert {o: (b.measure, b.bound) for o, b in bounds} == {
                 o: (b.measure, b.bound) for o, b in known.items()
             }
