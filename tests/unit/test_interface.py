@@ -84,14 +84,6 @@ def test_what_a_run_does_not_have_is_one_line(car, call, word):
         call(run)
 
 
-@pytest.mark.parametrize("method", [None, "pod", "full_order", "fixed_basis", "replay"])
-def test_an_output_that_there_is_not_is_one_line(car, method):
-    turn = vm.maneuver("lane_change")
-    model = car if method is None else vm.reduce(car, method, training="lane_change")
-    with pytest.raises(vm.VehiclemorError, match=r"'lateral_postion'.*lateral_position"):
-        model.simulate(turn, outputs=["lateral_postion"])
-
-
 @pytest.mark.parametrize("method", [None, "pod", "replay", "slow_manifold"])
 def test_what_is_written_into_a_run_changes_no_other(car, method):
     turn = vm.maneuver("lane_change")

@@ -246,12 +246,8 @@ def test_what_cannot_be_learned_is_said_in_one_line(car, runs, monkeypatch, tmp_
     reduced = vm.reduce(car, "operator_inference", training="lane_change")
     with pytest.raises(InputError, match="it can't be saved: reduced is"):
         reduced.save(tmp_path / "model.nc")
-    with pytest.raises(InputError, match="has no state: it gives whole runs alone"):
-        reduced.step([0.0], [0.0, 0.0], 0.01)
     with pytest.raises(InputError, match="nothing moves in the training runs"):
         vm.reduce(car, "gaussian_process", training="straight_ahead")
-    with pytest.raises(InputError, match="reduces kind"):
-        vm.reduce("double_wishbone", "sparse_identification")
 
 
 def test_a_network_trained_on_whole_runs_repeats_them_better_than_one_of_steps(car, runs):
