@@ -174,6 +174,7 @@ def folder(plug_in_package, tmp_path_factory):
 
 def test_a_model_is_compared_by_every_method_and_output(folder, capsys, monkeypatch):
     monkeypatch.setattr(default_studies, "FACTORS", (0.8, 1.0, 1.2))
+    monkeypatch.setitem(default_studies.POINTS, "test", [[0.9, 1.0], [1.3, 1.0]])
     assert main(["compare", CAR, "--results", str(folder)]) == 0
     printed = capsys.readouterr().out
     assert main(["compare", CAR, "--json", "--results", str(folder)]) == 0
