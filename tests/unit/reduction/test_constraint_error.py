@@ -80,13 +80,3 @@ def test_another_branch_is_an_error_though_it_closes_all_joints():
     errors_of, reached = constraint_errors(elsewhere, still)
     assert reached
     assert np.abs(errors_of(model.outputs)).max() > 0.01
-
-
-def test_a_mechanism_without_error_bounds_knows_its_training():
-    model = path_map().model
-    model = replace(model, definition=replace(model.definition, error_bounds={}))
-    rom = vm.reduce(model, "path_map", training="sine_travel")
-    assert rom.simulate("sine_travel").status == "ok"
-    run = rom.simulate(vm.maneuver("sine_travel", amplitude=1.3))
-    assert run.status == "untrusted"
-    assert "input z leaves its known range" in run.message

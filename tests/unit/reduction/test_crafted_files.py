@@ -29,8 +29,7 @@ ROOM = "vehiclemor.reduction"
 
 NAMES = [
     *("os:system", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
-    *("vehiclemor.simulation.dynamic:DynamicModel",),
-    *(f"{ROOM}.reduced_system:ReducedMechanism"),
+    *("vehiclemor.simulation.dynamic:DynamicModel", f"{ROOM}.reduced_system:ReducedMechanism"),
     *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.blocks", "PLANAR")),
     # Defined elsewhere.
     f"{ROOM}.vehicle.reduced_vehicle:Features",
