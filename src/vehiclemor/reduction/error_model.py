@@ -139,16 +139,18 @@ class ErrorModel:
         (n,) of the full model; the most passes, and the change that ends them, in ranges of the
         coordinates; bounds of outputs.
         """
-        kind = step, len(states), *passes, *bounds.items()
-        space = self.pool.taken(kind, lambda: self._space(step, len(states), passes, bounds))
-        path = space.path
+        kind = step, len(states), passes, tuple(bounds)
+        space = self.pool.taken(kind, lambda: self._space(*kind))
+        path, bounded = space.path, space.bounded
         space.call.give("modes", _modes_of_errors(self, step))
         np.copyto(path.run, states)
         np.copyto(path.inputs, inputs)
         np.copyto(path.start, start)
+        bounded.bounds[:] = [bound.bound for bound in bounds.values()]
+        bounded.is_peak[:] = [bound.measure == "max" for bound in bounds.values()]
         self._write_violated(start, inputs[0], step, space.violated)
         unsettled = space.call()
-        known = path.corrected.copy(), float(space.errors.max())
+        known = path.corrected.copy(), float(bounded.errors.max())
         self.pool.give_back(kind, space)
         return Corrected(*known, unsettled == 0) if unsettled >= 0 else LOST
 
@@ -157,9 +159,9 @@ class ErrorModel:
         step: float,
         nodes: int,
         passes: tuple[int, float],
-        bounds: Mapping[str, ErrorBound],
+        names: tuple[str, ...],
     ) -> Space:
-        """Arrays of a run, and the loop that uses them."""
+        """Arrays of a run with bounds of outputs of these names, and the loop that uses them."""
         model, modes = self.shape.model, len(self.modes.shapes)
         n, violations = len(model.definition.states), len(self.free.correction)
         rows, of_modes, of_shape = map(_up_to_lanes, (nodes, modes, n + 3))
@@ -171,11 +173,9 @@ class ErrorModel:
         path = Path(step, run, corrected, np.empty((nodes, len(model.inputs))), np.empty(n))
         first = min(max(int(SETTLED / step) + 1, 5), nodes)
         violated = Violated(*map(np.zeros, ((first, violations), (first, n), (first, n), 3)))
-        outputs, results = model.packed(tuple(bounds), nodes)
+        outputs, results = model.packed(names, nodes)
         own, full = np.empty((2, nodes, results))
-        sizes = np.array([bound.bound for bound in bounds.values()])
-        is_peak = np.array([float(bound.measure == "max") for bound in bounds.values()])
-        bounded = Bounded(outputs.bundle, own, full, sizes, is_peak, np.empty(len(bounds)))
+        bounded = Bounded(outputs, own, full, *np.empty((3, len(names))))
         call = loops(LOOPS, ("corrected_run",))["corrected_run"].prepared(
             path,
             violated,
@@ -185,7 +185,7 @@ class ErrorModel:
             scratch,
             bounded,
         )
-        return Space(path, violated, bounded.errors, call)
+        return Space(path, violated, bounded, call)
 
     def _write_violated(
         self, start: np.ndarray, inputs: np.ndarray, step: float, violated: Violated
@@ -358,11 +358,11 @@ LOST = Corrected(None, math.inf, False)
 
 
 class Space(NamedTuple):
-    """Arrays of a run, what its start violates, errors of bounded outputs, and the loop."""
+    """Arrays of a run, what its start violates, bounded outputs, and the loop."""
 
     path: Path
     violated: Violated
-    errors: np.ndarray
+    bounded: Bounded
     call: Prepared
 
 
