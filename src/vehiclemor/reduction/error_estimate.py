@@ -98,10 +98,11 @@ class ErrorEstimate(ShortRepr):
         indicator = RESERVE * self.in_bounds
         if not indicator > 1.0:
             return Trust(indicator)
-        used = self.used
+        used, last = self.used, len(self.times) - 1
         since = {name: part.searchsorted(1.0 / RESERVE, "right") for name, part in used.items()}
-        first = min(since, key=lambda name: since[name])
-        until, share = float(self.times[since[first]]), used[first][-1]
+        first = min(since, key=lambda name: (since[name], -used[name][-1]))
+        # Used parts may differ from the largest error by rounding.
+        until, share = float(self.times[min(since[first], last)]), used[first][-1]
         size = "too large to be known" if np.isinf(share) else f"{share:.3g} times its bound"
         return Trust(indicator, until, f"the estimated error of {first} is {size}")
 

@@ -94,6 +94,21 @@ def test_a_run_is_judged_by_the_bounds_that_are_given():
             model.simulate(bounds={"yaw": 1.0}, **how)
 
 
+def test_an_error_that_passes_its_bound_by_rounding_has_a_message():
+    estimate = shipped(CAR).simulate().error_estimate
+    trust = replace(estimate, in_bounds=np.nextafter(0.8, 1.0)).trust()
+    largest = max(estimate.used, key=lambda name: estimate.used[name][-1])
+    assert trust.until == estimate.times[-1]
+    assert f"the estimated error of {largest} is" in trust.reason
+
+
+def test_errors_in_bounds_follow_the_parameters_of_the_model():
+    heavy = vm.model(CAR, parameters={"sprung_mass": 1437.37})
+    run = vm.reduce(heavy, "linear_single_track").simulate(bounds={"Fx_FL": 1.0})
+    used = run.error_estimate.used["Fx_FL"][-1]
+    assert run.error_estimate.in_bounds == pytest.approx(used, rel=1e-9)
+
+
 def test_many_runs_are_judged_as_single_ones_by_the_bounds_that_are_given():
     rom, times = shipped(CAR), np.linspace(0.0, 2.0, 101)
     signals = vm.many_signals(times, [0.01 * times, 0.02 * times])
