@@ -24,6 +24,7 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned_model import (
     LearnedModel,
     LearnedSettings,
+    Path,
     TrainingData,
     predicted,
     stepped,
@@ -84,17 +85,59 @@ def operators(data: TrainingData, settings: OperatorInferenceSettings) -> Learne
     """Operators of one step by opinf, with the regularisation that it selects."""
     import opinf
 
-    form = "c" * data.constant + FORMS[settings.form]
-    step: Any = opinf.models.DiscreteModel(form, solver=opinf.lstsq.L2Solver(RIDGES[0]))
     # The library wants inputs at the last sample too.
     inputs = [np.vstack([u, u[-1:]]).T for u in data.inputs]
+    paths = [z.T for z in data.paths]
+
+    class Step(opinf.models.DiscreteModel):
+        """One step; training runs go on together, where the library takes one after the other."""
+
+        def refit(self) -> Any:
+            super().refit()
+            self.runs = solved_together(stepped(lambda z, u: self.rhs(z.T, u.T).T), paths, inputs)
+            return self
+
+        def predict(self, state0: np.ndarray, niters: int, inputs: Any = None) -> np.ndarray:
+            return self.runs[state0.tobytes() + inputs.tobytes()]
+
+    class Reduced(opinf.lstsq.L2Solver):
+        """Least squares of as many rows as there are unknowns, which have the same solution."""
+
+        def fit(self, data_matrix: np.ndarray, lhs_matrix: np.ndarray) -> Any:
+            arguments, results = same_least_squares(data_matrix, lhs_matrix.T)
+            return super().fit(arguments, results.T)
+
+    step: Any = Step("c" * data.constant + FORMS[settings.form], solver=Reduced(RIDGES[0]))
     chosen = {"stability_margin": STABLE, "gridsearch_only": True}
     try:
-        paths = [z.T for z in data.paths]
         opinf.ROM(step).fit_regselect_discrete([*RIDGES], paths, inputs, **chosen)
     except RuntimeError as error:
         raise InputError("opinf finds no ridge that keeps all training runs stable") from error
     return data.model(stepped(lambda z, u: step.rhs(z.T, u.T).T))
+
+
+def solved_together(
+    path: Path, paths: list[np.ndarray], inputs: list[np.ndarray]
+) -> dict[bytes, np.ndarray]:
+    """Start and inputs of each run as bytes -> its path (r, samples) by a learned step.
+
+    Known are paths (r, samples) and inputs (2 inputs, samples).
+    """
+    driven = np.zeros((max(u.shape[1] for u in inputs) - 1, len(inputs), len(inputs[0])))
+    for run, u in enumerate(inputs):
+        driven[: u.shape[1] - 1, run] = u[:, :-1].T
+    with np.errstate(all="ignore"):
+        found = path(np.array([z[:, 0] for z in paths]), driven)
+    return {
+        z[:, 0].tobytes() + u.tobytes(): found[: z.shape[1], run].T
+        for run, (z, u) in enumerate(zip(paths, inputs, strict=True))
+    }
+
+
+def same_least_squares(arguments: np.ndarray, results: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """As many rows as there are columns, whose residuals differ from those of all by a constant."""
+    triangle = np.linalg.qr(np.hstack([arguments, results]), mode="r")
+    return triangle[:, : arguments.shape[1]], triangle[:, arguments.shape[1] :]
 
 
 def sparse_terms(data: TrainingData, settings: SparseIdentificationSettings) -> LearnedModel:
@@ -106,7 +149,9 @@ def sparse_terms(data: TrainingData, settings: SparseIdentificationSettings) -> 
 
     features = PolynomialFeatures(settings.degree, include_bias=data.constant)
     sparse: Any = STLSQ(threshold=settings.threshold, alpha=settings.ridge)
-    return data.model(predicted((make_pipeline(features, sparse).fit(*data.regression), 1.0)))
+    arguments, results = data.regression
+    sparse.fit(*same_least_squares(features.fit_transform(arguments), results))
+    return data.model(predicted((make_pipeline(features, sparse), 1.0)))
 
 
 def linear_step(data: TrainingData, settings: DynamicModeSettings) -> LearnedModel:
