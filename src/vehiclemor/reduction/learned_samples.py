@@ -95,12 +95,16 @@ def gathered(model: Any, training: Training, steps: int, skipped: float) -> Samp
     """
     starts = (r.start if isinstance(r.start, str) else tuple(r.start) for r in training)
     runs = tuple((r.model, r.maneuver, start) for r, start in zip(training, starts, strict=True))
-    return _gathered(model, runs, steps, skipped)
+    samples, parts = _gathered(model, runs, steps), []
+    for run, part in zip(training, samples.runs, strict=True):
+        left_out = int(min(skipped / run.maneuver.duration, 0.5) * (len(part.inputs) - 1))
+        parts.append(RunSamples(*(history[left_out:] for history in part)))
+    return replace(samples, runs=tuple(parts))
 
 
 # Candidates of one method, and methods one after the other, learn from the same samples.
 @lru_cache(maxsize=2)
-def _gathered(model: Any, runs: tuple[Any, ...], steps: int, skipped: float) -> Samples:
+def _gathered(model: Any, runs: tuple[Any, ...], steps: int) -> Samples:
     began = time.process_time()
     training = [TrainingRun(*run) for run in runs]
     states, maneuvers = States.of_model(model), [run.maneuver for run in training]
@@ -113,32 +117,31 @@ def _gathered(model: Any, runs: tuple[Any, ...], steps: int, skipped: float) -> 
     count = sum((maneuver.samples - 1) * steps for maneuver in maneuvers)
     if count < FEWEST:
         raise InputError(f"learned models need at least {FEWEST} samples of training, not {count}")
-    found = [_of_run(states, run, steps, skipped) for run in training]
+    found = [_of_run(states, run, steps) for run in training]
     parts, evaluations = zip(*found, strict=True)
     seconds = time.process_time() - began
     return Samples(states, spacings[0], parts, sum(evaluations), seconds)
 
 
-def _of_run(states: States, run: TrainingRun, steps: int, skipped: float) -> tuple[RunSamples, int]:
+def _of_run(states: States, run: TrainingRun, steps: int) -> tuple[RunSamples, int]:
     """Samples of a run, and evaluations of its equations."""
     model: Any = run.model
     maneuver = run.maneuver.subdivided(steps)
-    rows = slice(int(min(skipped / maneuver.duration, 0.5) * (maneuver.samples - 1)), None)
     further = 0
     if model.kind == "structural":
         full = model.run(maneuver, recorded=True)
         # Runs record coordinates alone.
         speeds = np.gradient(full.coordinates, full.times, axis=0, edge_order=2)
-        deviations, values = np.hstack([full.coordinates, speeds])[rows], full.outputs[rows]
+        deviations, values = np.hstack([full.coordinates, speeds]), full.outputs
     else:
         full = replace(run, maneuver=maneuver).recorded()
         static = model.kind == "ae"
-        values = deviations = (full.coordinates if static else states.of(full.states))[rows]
+        values = deviations = full.coordinates if static else states.of(full.states)
         if shape := states.shape:
-            motion = shape.rates(deviations + shape.reference, full.inputs[rows])[1]
+            motion = shape.rates(deviations + shape.reference, full.inputs)[1]
             values = np.hstack([deviations, motion - [0.0, shape.speed, 0.0]])
             further = len(motion)
-    samples = RunSamples(online_inputs(model, full.inputs)[rows], deviations, values)
+    samples = RunSamples(online_inputs(model, full.inputs), deviations, values)
     return samples, full.counts[model.evaluations] + further
 
 

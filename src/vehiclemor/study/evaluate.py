@@ -48,7 +48,7 @@ FALLBACK = ("fallback", "fallback_tolerance")
 # More than the fits of a study of protocols, some of which take a minute.
 MOST_FITS = 128
 # Runs that a learned model solves together: their paths stay in memory.
-MOST_IN_STEP = 100
+MOST_IN_STEP = 300
 
 
 class Fit(NamedTuple):

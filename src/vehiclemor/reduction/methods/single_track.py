@@ -12,6 +12,7 @@ Least squares over runs find the 20 constants.  Polynomials give all other state
 """
 
 from functools import partial
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from scipy.optimize import least_squares
 
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned_model import LearnedModel, SampledSettings, TrainingData
-from vehiclemor.reduction.learned_samples import Coordinates, Samples
+from vehiclemor.reduction.learned_samples import MOST_SAMPLES, Coordinates, Samples
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.vehicle.shape import RANK, VehicleShape, no_steered_vehicle
 
@@ -75,12 +76,13 @@ def rates(constants: np.ndarray, speed: float, z: np.ndarray, steer: Any) -> np.
 def driven(rate: Any, start: np.ndarray, steer: np.ndarray, step: float) -> np.ndarray:
     """States and heading (steps + 1, 6, ...) by Runge and Kutta.
 
-    States at the start are (5, ...), the steering at both ends of each step is (steps, 2, ...).
+    States at the start are (5, ...), the steering at the start, in the middle and at the end of
+    each step is (steps, 3, ...).
     """
     path = np.zeros((len(steer) + 1, len(start) + 1, *start.shape[1:]))
     path[0, :-1] = start
-    for row, (first, last) in enumerate(steer):
-        z, middle = path[row], 0.5 * (first + last)
+    for row, (first, middle, last) in enumerate(steer):
+        z = path[row]
         k1 = rate(z, first)
         k2 = rate(z + 0.5 * step * k1, middle)
         k3 = rate(z + 0.5 * step * k2, middle)
@@ -91,11 +93,15 @@ def driven(rate: Any, start: np.ndarray, steer: np.ndarray, step: float) -> np.n
 
 def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: int) -> np.ndarray:
     """Constants by least squares of states and heading over whole runs, each by its size."""
-    step, runs, of_length = data.samples.spacing, [], {}
+    # A step of two samples is short beside all motions of the car.
+    step, runs, of_length = 2.0 * data.samples.spacing, [], {}
+    every = ceil(sum(map(len, data.paths)) / (2 * MOST_SAMPLES))
     for z, u in zip(data.paths, data.inputs, strict=True):
-        heading = np.cumsum(np.append(0.0, 0.5 * step * (z[1:, 1] + z[:-1, 1])))
-        runs.append(np.column_stack([z, heading]))
-        of_length.setdefault(len(u), []).append((steering(data, u), runs[-1]))
+        heading = np.cumsum(np.append(0.0, 0.25 * step * (z[1:, 1] + z[:-1, 1])))
+        history = np.column_stack([z, heading])[: len(u) // 2 * 2 + 1 : 2]
+        runs.append(history)
+        steer = steering(data, u)[: len(u) // 2 * 2].reshape(-1, 4)[:, [0, 1, 3]]
+        of_length.setdefault(len(steer), []).append((steer, history))
     # Runs of one length are driven together.
     groups = [
         tuple(np.stack(part, axis=-1)[..., None] for part in zip(*group, strict=True))
@@ -109,7 +115,7 @@ def fitted_constants(data: TrainingData, first: np.ndarray, speed: float, most: 
         for inputs, wanted in groups:
             start = np.repeat(wanted[0, :-1], count, axis=-1)
             path = driven(partial(rates, sets[:, None], speed), start, inputs, step)
-            parts.append(((path - wanted) / size).reshape(-1, count))
+            parts.append(((path - wanted)[::every] / size).reshape(-1, count))
         return np.concatenate(parts)
 
     def slopes(constants: np.ndarray) -> np.ndarray:
@@ -143,7 +149,8 @@ def fit(model: Any, training: Training, settings: SingleTrackSettings) -> Learne
     rate, step = partial(rates, constants, shape.speed), data.samples.spacing
 
     def path(start: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        steer = np.moveaxis(steering(data, inputs), -1, 1)
+        first, last = np.moveaxis(steering(data, inputs), -1, 0)
+        steer = np.stack([first, 0.5 * (first + last), last], axis=1)
         return np.moveaxis(driven(rate, start.T, steer, step)[:, :-1], -1, 1)
 
     return data.model(path)

@@ -150,15 +150,16 @@ def test_a_single_track_finds_the_constants_of_its_own_runs():
     times = [step * np.arange(count + 1) for count in (200, 150, 250)]
     steer = [0.05 * a * np.sin(a * t) for a, t in zip((1.0, 1.6, 2.2), times, strict=True)]
     inputs = [np.column_stack([s[:-1], s[1:]]) for s in steer]
-    paths = [driven(partial(rates, true, speed), np.zeros(5), u, step)[:, :5] for u in inputs]
+    thrice = [np.column_stack([s[:-1], 0.5 * (s[:-1] + s[1:]), s[1:]]) for s in steer]
+    paths = [driven(partial(rates, true, speed), np.zeros(5), u, step)[:, :5] for u in thrice]
     spacing = SimpleNamespace(spacing=step)
     data: Any = SimpleNamespace(samples=spacing, inputs=inputs, input_scale=[1.0], paths=paths)
     found = fitted_constants(data, first, speed, 30)
-    again = driven(partial(rates, found, speed), np.zeros(5), inputs[2], step)[:, :5]
+    again = driven(partial(rates, found, speed), np.zeros(5), thrice[2], step)[:, :5]
     size = np.abs(paths[2]).max(axis=0)
     np.testing.assert_allclose(again / size, paths[2] / size, atol=1e-3)
     # The mirror image of steering drives the mirror image.
-    mirrored = driven(partial(rates, found, speed), np.zeros(5), -inputs[2], step)[:, :5]
+    mirrored = driven(partial(rates, found, speed), np.zeros(5), -thrice[2], step)[:, :5]
     np.testing.assert_allclose(mirrored * [-1, -1, -1, -1, 1], again, atol=1e-9)
 
 
