@@ -45,8 +45,9 @@ from vehiclemor.study.store import stored
 # Rounds of a cost table, and of the test set of a protocol, which has many runs; and those of them
 # in which long runs stand, which scatter less.
 CASE_ROUNDS, PROTOCOL_ROUNDS, PROTOCOL_ROUNDS_OF_LONG = 31, 3, 2
-# New inputs in a row for a short and a long run, the first to warm up; length (s) of a long run.
-INPUTS, INPUTS_OF_LONG, LONG_RUN = 3, 2, 2e-3
+# New inputs in a row for a short and a long run, the first to warm up; length (s) of a long run,
+# and of one beside which warming up is nothing.
+INPUTS, INPUTS_OF_LONG, LONG_RUN, LONGEST_RUN = 3, 2, 2e-3, 2e-2
 # Fits whose median counts, as long as they take no more than these seconds together; and the length
 # (s) of a fit beside which loading machine code is nothing.
 FITS, FIT_SECONDS, LONG_FIT = 9, 2.0, 1.0
@@ -182,6 +183,8 @@ def _rounds(
                     continue
                 simulate = for_test[index][number].simulate
                 inputs = INPUTS_OF_LONG if long else INPUTS
+                if turn > 0 and seconds[0, index, number, CALL] >= LONGEST_RUN:
+                    inputs = 1
                 measured = attempt(partial(called, simulate, (maneuver, start), inputs))
                 if isinstance(measured, Failure):
                     wanted[index, number], seconds[:, index, number] = False, np.nan
@@ -223,9 +226,10 @@ def called(
     *,
     again: bool = True,
 ) -> Seconds | Failure:
-    """Median seconds of a run with so many new inputs, the first to warm up; or the failure.
+    """Median seconds of a run with so many new inputs, or the failure.
 
-    The maneuver comes first of what the run takes.  Without `again` no call is repeated.
+    The first of several inputs warms up.  The maneuver comes first of what the run takes.  Without
+    `again` no call is repeated.
     """
     maneuver, *further = run
 
@@ -245,7 +249,7 @@ def called(
         if again:
             trajectory, repeated = timed(partial(delivered, new))
         measured.append(Seconds(seconds, repeated, trajectory.seconds))
-    return Seconds(*np.median(measured[1:], axis=0).tolist())
+    return Seconds(*np.median(measured[1:] or measured, axis=0).tolist())
 
 
 def _warm_fit(

@@ -98,7 +98,7 @@ def operators(data: TrainingData, settings: OperatorInferenceSettings) -> Learne
             return self
 
         def predict(self, state0: np.ndarray, niters: int, inputs: Any = None) -> np.ndarray:
-            return self.runs[state0.tobytes() + inputs.tobytes()]
+            return self.runs[state0.tobytes() + inputs.tobytes()][:, :niters]
 
     class Reduced(opinf.lstsq.L2Solver):
         """Least squares of as many rows as there are unknowns, which have the same solution."""

@@ -55,7 +55,7 @@ def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings)
 
     data = TrainingData.of(model, training, settings, "sklearn", settings.of_samples)
     now, inputs, _ = data.steps
-    r, m, runs = now.shape[1], inputs.shape[1], len(data.paths)
+    r, m, lanes = now.shape[1], inputs.shape[1], in_lanes([*map(len, data.inputs)])
 
     def step(x: Any, u: Any, parameters: Any) -> Any:
         """Coordinates of one run or of all, one behind the other, after a step."""
@@ -64,12 +64,23 @@ def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings)
         v = jnp.hstack([z, u.reshape(-1, m)])
         return (z + v @ a + (jnp.tanh(v @ w + b) - jnp.tanh(b)) @ c).reshape(-1)
 
-    # All runs are one experiment: the library would compile a loop for each.
+    def step_of_lanes(x: Any, u: Any, parameters: Any) -> Any:
+        """Coordinates after a step, those of the next run of a lane where it begins."""
+        u, start = jnp.split(u.reshape(-1, m + r), [m], axis=1)
+        after = step(x, u, parameters)
+        return jnp.where(jnp.isnan(start.reshape(-1)), after, start.reshape(-1))
+
+    # All lanes are one experiment: the library would compile a loop for each.
     longest = max(map(len, data.inputs))
-    wanted, driven = np.full((longest, runs * r), np.nan), np.zeros((longest, runs * m))
-    for run, (z, u) in enumerate(zip(data.paths, data.inputs, strict=True)):
-        wanted[: len(u), run * r : (run + 1) * r] = z[:-1]
-        driven[: len(u), run * m : (run + 1) * m] = u
+    wanted, driven = (np.full((longest, len(lanes), size), np.nan) for size in (r, m + r))
+    driven[..., :m] = 0.0
+    for lane, of_lane in enumerate(lanes):
+        for run, first in of_lane:
+            rows = slice(first, first + len(data.inputs[run]))
+            wanted[rows, lane] = data.paths[run][:-1]
+            driven[rows, lane, :m] = data.inputs[run]
+            driven[first - 1 : first, lane, m:] = data.paths[run][0]
+    wanted, driven = wanted.reshape(longest, -1), driven.reshape(longest, -1)
     known = np.isfinite(wanted)
     wanted[~known] = 0.0
     # Whole runs are no start for small random weights: one step is fitted first.
@@ -77,7 +88,8 @@ def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings)
     begun: Any = MLPRegressor(**shape, max_iter=STEPS, random_state=SEED)
     linear, size = data.fit_residual(begun, slice(None))
     first = [linear.coef_.T, begun.coefs_[0], begun.intercepts_[0], begun.coefs_[1] * size]
-    network = Model(runs * r, runs * r, runs * m, state_fcn=step, output_fcn=lambda x, *_: x)
+    sizes = len(lanes) * r, len(lanes) * r, len(lanes) * (m + r)
+    network = Model(*sizes, state_fcn=step_of_lanes, output_fcn=lambda x, *_: x)
     network.init(params=first, x0=wanted[0])
 
     # Runs are of different lengths.
@@ -93,6 +105,21 @@ def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings)
         return np.asarray(compiled(z, u, parameters)).reshape(z.shape)
 
     return data.model(stepped(of_runs))
+
+
+def in_lanes(lengths: list[int]) -> list[list[tuple[int, int]]]:
+    """Lanes as long as the longest run, of runs one behind the other and their first rows."""
+    lanes: list[list[tuple[int, int]]] = []
+    taken: list[int] = []
+    for run in sorted(range(len(lengths)), key=lambda run: -lengths[run]):
+        fitting = (k for k, rows in enumerate(taken) if rows + lengths[run] <= max(lengths))
+        lane = next(fitting, len(lanes))
+        if lane == len(lanes):
+            lanes.append([])
+            taken.append(0)
+        lanes[lane].append((run, taken[lane]))
+        taken[lane] += lengths[run]
+    return lanes
 
 
 METHOD = Method(

@@ -93,7 +93,9 @@ def second_runs(protocol: Protocol, scenarios: Scenarios) -> Experiment:
     model = protocol.model
     preset = "recommended" if model.kind == "ae" else "paper"
     settings = complete_settings(model, "full_order", preset=preset)
-    return make_experiment(model, "full_order", settings, (), scenarios, "errors")
+    # With the training, of which it learns nothing, it may be a row of the protocol too.
+    training = protocol.sets["training"]
+    return make_experiment(model, "full_order", settings, training, scenarios, "errors")
 
 
 def validation_keys(protocol: Protocol) -> set[str]:
