@@ -23,6 +23,7 @@ from vehiclemor.reduction.methods.single_track import (
     fitted_constants,
     rates,
 )
+from vehiclemor.reduction.methods.trajectory_network import in_lanes
 from vehiclemor.reduction.vehicle.linear_modes import slow_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.registry import component
@@ -251,6 +252,21 @@ def test_what_cannot_be_learned_is_said_in_one_line(car, runs, monkeypatch, tmp_
         vm.reduce(car, "gaussian_process", training="straight_ahead")
 
 
+def test_every_run_has_its_rows_of_a_lane_as_long_as_the_longest():
+    lengths = [3, 10, 4, 3, 10, 2]
+    lanes = in_lanes(lengths)
+    taken = [
+        (lane, first + k)
+        for lane, of_lane in enumerate(lanes)
+        for run, first in of_lane
+        for k in range(lengths[run])
+    ]
+    assert sorted(run for of_lane in lanes for run, _ in of_lane) == list(range(6))
+    assert len(set(taken)) == sum(lengths)
+    assert max(row for _, row in taken) == 9
+    assert len(lanes) == 4
+
+
 def test_a_network_trained_on_whole_runs_repeats_them_better_than_one_of_steps(car, runs):
     pytest.importorskip("jax_sysid")
     off = {}
@@ -261,3 +277,17 @@ def test_a_network_trained_on_whole_runs_repeats_them_better_than_one_of_steps(c
         found = [reduced.path(z[:1], u[:, None])[:, 0] for z, u in pairs]
         off[epochs] = np.linalg.norm(np.concatenate(found) - np.concatenate(data.paths))
     assert off[60] < 0.5 * off[0]
+
+
+def test_a_network_learns_the_same_of_runs_that_share_a_lane(car, runs, monkeypatch):
+    pytest.importorskip("jax_sysid")
+    samples = 2 * (lane_change.samples - 1) // 5 + 1
+    short = {"duration": 0.4 * lane_change.duration, "samples": samples}
+    runs = [*runs, *(replace(run, maneuver=replace(run.maneuver, **short)) for run in runs)]
+    given = {"coordinates": "slow", "width": 4, "epochs": 5}
+    sharing, data = learned("trajectory_network", car, runs, **given)
+    alone = "vehiclemor.reduction.methods.trajectory_network.in_lanes"
+    monkeypatch.setattr(alone, lambda lengths: [[(run, 0)] for run in range(len(lengths))])
+    other, _ = learned("trajectory_network", car, runs, **given)
+    start, inputs = data.paths[0][:1], data.inputs[0][:, None]
+    np.testing.assert_allclose(sharing.path(start, inputs), other.path(start, inputs), atol=1e-6)
