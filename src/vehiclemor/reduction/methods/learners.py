@@ -136,8 +136,9 @@ def solved_together(
 
 def same_least_squares(arguments: np.ndarray, results: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """As many rows as there are columns, whose residuals differ from those of all by a constant."""
-    triangle = np.linalg.qr(np.hstack([arguments, results]), mode="r")
-    return triangle[:, : arguments.shape[1]], triangle[:, arguments.shape[1] :]
+    triangle: Any = np.linalg.qr(np.hstack([arguments, results]), mode="r")
+    of_arguments, of_results = np.hsplit(triangle, [arguments.shape[1]])
+    return of_arguments, of_results
 
 
 def sparse_terms(data: TrainingData, settings: SparseIdentificationSettings) -> LearnedModel:
