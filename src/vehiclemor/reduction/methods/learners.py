@@ -113,6 +113,7 @@ def operators(data: TrainingData, settings: OperatorInferenceSettings) -> Learne
         opinf.ROM(step).fit_regselect_discrete([*RIDGES], paths, inputs, **chosen)
     except RuntimeError as error:
         raise InputError("opinf finds no ridge that keeps all training runs stable") from error
+    step.runs.clear()
     return data.model(stepped(lambda z, u: step.rhs(z.T, u.T).T))
 
 
