@@ -252,19 +252,9 @@ def test_what_cannot_be_learned_is_said_in_one_line(car, runs, monkeypatch, tmp_
         vm.reduce(car, "gaussian_process", training="straight_ahead")
 
 
-def test_every_run_has_its_rows_of_a_lane_as_long_as_the_longest():
-    lengths = [3, 10, 4, 3, 10, 2]
-    lanes = in_lanes(lengths)
-    taken = [
-        (lane, first + k)
-        for lane, of_lane in enumerate(lanes)
-        for run, first in of_lane
-        for k in range(lengths[run])
-    ]
-    assert sorted(run for of_lane in lanes for run, _ in of_lane) == list(range(6))
-    assert len(set(taken)) == sum(lengths)
-    assert max(row for _, row in taken) == 9
-    assert len(lanes) == 4
+def test_runs_stand_one_behind_the_other_in_lanes_as_long_as_the_longest():
+    lanes = in_lanes([3, 10, 4, 3, 10, 2])
+    assert lanes == [[(1, 0)], [(4, 0)], [(2, 0), (0, 4), (3, 7)], [(5, 0)]]
 
 
 def test_a_network_trained_on_whole_runs_repeats_them_better_than_one_of_steps(car, runs):
