@@ -82,13 +82,19 @@ def _alike(model: DynamicModel) -> Alike:
 
 @lru_cache(maxsize=256)
 def _at_speed(alike: Alike, speed: float) -> ErrorModel:
-    return ErrorModel(*_shape(alike), speed)
+    return ErrorModel(_shape(alike), _pool(*alike.key[:2]), speed)
 
 
-# Its derivatives serve all speeds, and so do the arrays of its runs.
+# Its derivatives serve all speeds, the arrays of runs all constants too.
 @lru_cache(maxsize=64)
-def _shape(alike: Alike) -> tuple[VehicleShape, Pool[Space]]:
-    return VehicleShape(alike.model), Pool()
+def _shape(alike: Alike) -> VehicleShape:
+    return VehicleShape(alike.model)
+
+
+@lru_cache(maxsize=64)
+def _pool(kernel_hash: str, inputs: tuple[str, ...]) -> Pool[Space]:
+    del kernel_hash, inputs
+    return Pool()
 
 
 @lru_cache(maxsize=256)
@@ -139,10 +145,12 @@ class ErrorModel:
         (n,) of the full model; the most passes, and the change that ends them, in ranges of the
         coordinates; bounds of outputs.
         """
-        kind = step, len(states), passes, tuple(bounds)
+        kind = step, len(states), passes, tuple(bounds), len(self.modes.shapes)
         space = self.pool.taken(kind, lambda: self._space(*kind))
         path, bounded = space.path, space.bounded
+        space.call.give("shape", self._of_shape)
         space.call.give("modes", _modes_of_errors(self, step))
+        space.call.words[space.constants] = self._constants
         np.copyto(path.run, states)
         np.copyto(path.inputs, inputs)
         np.copyto(path.start, start)
@@ -160,9 +168,10 @@ class ErrorModel:
         nodes: int,
         passes: tuple[int, float],
         names: tuple[str, ...],
+        modes: int,
     ) -> Space:
         """Arrays of a run with bounds of outputs of these names, and the loop that uses them."""
-        model, modes = self.shape.model, len(self.modes.shapes)
+        model = self.shape.model
         n, violations = len(model.definition.states), len(self.free.correction)
         rows, of_modes, of_shape = map(_up_to_lanes, (nodes, modes, n + 3))
         widths = n, len(model.inputs), n, n, n, 3, of_modes, of_modes, violations + modes
@@ -175,7 +184,7 @@ class ErrorModel:
         violated = Violated(*map(np.zeros, ((first, violations), (first, n), (first, n), 3)))
         outputs, results = model.packed(names, nodes)
         own, full = np.empty((2, nodes, results))
-        bounded = Bounded(outputs, own, full, *np.empty((3, len(names))))
+        bounded = Bounded(outputs.bundle, own, full, *np.empty((3, len(names))))
         call = loops(LOOPS, ("corrected_run",))["corrected_run"].prepared(
             path,
             violated,
@@ -185,7 +194,7 @@ class ErrorModel:
             scratch,
             bounded,
         )
-        return Space(path, violated, bounded, call)
+        return Space(path, violated, bounded, call, call.address("bounded.outputs.constants"))
 
     def _write_violated(
         self, start: np.ndarray, inputs: np.ndarray, step: float, violated: Violated
@@ -260,6 +269,11 @@ class ErrorModel:
         settling, free = np.zeros_like(decayed), self.free
         settling[free.indices] = free.shapes.T @ (np.eye(len(kept)) - kept) @ decayed
         return slow, settling
+
+    @cached_property
+    def _constants(self) -> int:
+        """Address of the constants of the full model."""
+        return self.shape.model.constants.ctypes.data
 
     @cached_property
     def _of_shape(self) -> Ready:
@@ -358,12 +372,16 @@ LOST = Corrected(None, math.inf, False)
 
 
 class Space(NamedTuple):
-    """Arrays of a run, what its start violates, bounded outputs, and the loop."""
+    """Arrays of a run, what its start violates, bounded outputs, and the loop.
+
+    Constants is the index of the word with the address of the outputs' constants.
+    """
 
     path: Path
     violated: Violated
     bounded: Bounded
     call: Prepared
+    constants: int
 
 
 class Free(NamedTuple):

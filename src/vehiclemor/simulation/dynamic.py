@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import loop_array, number
+from vehiclemor.codegen.loops import Ready
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.excitation import Excitation
@@ -20,7 +21,6 @@ from vehiclemor.simulation.evaluation import By, chosen
 from vehiclemor.simulation.integrators.catalogue import frozen, integrator
 from vehiclemor.simulation.integrators.step_kernels import partners
 from vehiclemor.simulation.linear_model import LinearModel
-from vehiclemor.simulation.loop_arguments import Outputs
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.recording import Recorder, Recording
 from vehiclemor.simulation.system import System
@@ -297,11 +297,12 @@ class DynamicModel(Model):
         """Outputs, coordinates or speeds (samples, names) along a path of states and inputs."""
         return Recording(self._recorder, states, inputs, ALL_SAMPLES).columns(names)
 
-    def packed(self, names: tuple[str, ...], samples: int) -> tuple[Outputs, int]:
-        """Outputs, coordinates or speeds for loops over so many samples, see `Recorder.packed`."""
-        outputs, results = self._recorder.packed(names, samples)
-        # Those of the recorder may have the constants of the model nearby.
-        return outputs.bundle._replace(constants=self.constants), results
+    def packed(self, names: tuple[str, ...], samples: int) -> tuple[Ready, int]:
+        """Outputs, coordinates or speeds for loops over so many samples, see `Recorder.packed`.
+
+        They may have the constants of another model with the same equations.
+        """
+        return self._recorder.packed(names, samples)
 
     @cached_property
     def _recorder(self) -> Recorder:
