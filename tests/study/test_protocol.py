@@ -21,7 +21,6 @@ from vehiclemor.study.plans.protocol import (
     sampled_runs,
     sampled_sets,
 )
-from vehiclemor.study.plans.protocol_run import second_runs
 from vehiclemor.study.plans.study_file import Bound
 from vehiclemor.study.plans.study_runs import Box, Draw, Group
 
@@ -215,10 +214,3 @@ def test_the_strongest_full_order_keeps_all_bounds_on_the_validation_runs(protoc
     settings = complete_settings(protocol.model, "full_order", preset="strongest")
     tested = protocol.model, "full_order", settings, (), protocol.sets["validation"], "errors"
     assert scores(evaluate(make_experiment(*tested)), protocol.definition.bounds).max() <= 1.0
-
-
-def test_a_second_integrator_that_is_a_row_is_run_once(protocols):
-    truck = protocols["flexible_truck"]
-    (row, *_), runs = truck.entries, truck.sets["validation"]
-    experiments = row.experiments(truck.model, runs)
-    assert second_runs(truck, runs).key in [experiment.key for experiment in experiments]
