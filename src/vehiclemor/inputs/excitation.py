@@ -53,6 +53,14 @@ class Extent(NamedTuple):
         return np.maximum(-self.low, self.high)
 
 
+class Jumps(NamedTuple):
+    """Times (jumps,) in s at which jumps begin, how long they last; by how much inputs change."""
+
+    begins: np.ndarray
+    lengths: np.ndarray
+    sizes: np.ndarray
+
+
 @lru_cache(maxsize=64)
 def _equidistant(duration: float, samples: int) -> np.ndarray:
     times = np.linspace(0.0, duration, samples)
@@ -132,11 +140,12 @@ class Excitation(ShortRepr):
 
     @property
     @cached
-    def jumps(self) -> tuple[np.ndarray, np.ndarray]:
-        """Times (jumps,) in s inside the run at which inputs may jump; by how much they do."""
+    def jumps(self) -> Jumps:
+        """Jumps of the inputs inside the run."""
         edges, first, _, coefficients = self.pieces
         after = first[1:-1]
-        return edges[1:-1], coefficients[after, 0] - coefficients[after - 1].sum(axis=1)
+        sizes = coefficients[after, 0] - coefficients[after - 1].sum(axis=1)
+        return Jumps(edges[1:-1], np.zeros(len(after)), sizes)
 
     @property
     @cached

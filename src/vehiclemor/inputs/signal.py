@@ -23,6 +23,7 @@ from vehiclemor.inputs.excitation import (
     LONGEST_DURATION,
     MOST_SAMPLES,
     Excitation,
+    Jumps,
     cached,
     checked_factor,
     checked_times,
@@ -38,7 +39,8 @@ from vehiclemor.registry import choice
 OUTPUT_STEP = 0.02
 # Time (s) between the samples that are taken of a function.
 FUNCTION_STEP = 0.01
-NO_JUMPS = np.empty(0), np.empty((0, 0))
+# Part of an input's range that changes between two samples as if it jumped.
+STEEP = 0.25
 
 # Inputs that an angle's unit or a steering ratio is not meant for.
 OF_ANOTHER_UNIT = frozenset(quantity.name for quantity in OPTIONAL_INPUTS)
@@ -155,9 +157,19 @@ class Signal(Excitation):
         return tuple(self.pieces.edges[1:-1].tolist())
 
     @property
-    def jumps(self) -> tuple[np.ndarray, np.ndarray]:
-        """Times (jumps,) in s inside the run at which inputs jump; by how much they do."""
-        return super().jumps if self.hold == "zero" else NO_JUMPS
+    def jumps(self) -> Jumps:
+        """Jumps of the inputs inside the run, of a linear hold steep changes between samples."""
+        return super().jumps if self.hold == "zero" else self._steep
+
+    @property
+    @cached
+    def _steep(self) -> Jumps:
+        edges, _, _, coefficients = self.pieces
+        if self.hold == "cubic":
+            return Jumps(edges[:0], edges[:0], coefficients[:0, 0])
+        least = STEEP * np.ptp(coefficients[:, 0], axis=0)
+        found = np.flatnonzero((np.abs(coefficients[:, 1]) > least).any(axis=1))
+        return Jumps(edges[found], np.diff(edges)[found], coefficients[found, 1])
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Inputs (n, number of inputs) at times (n,) in s; `InputError` beyond the samples."""

@@ -33,6 +33,8 @@ SMALL, ROOM = 0.4, 0.2
 FEWEST_NODES = 8
 # What the estimate is multiplied by for its own error before a run is judged.
 RESERVE = 1.25
+# Of times between nodes.
+ROUNDING = 1e-8
 # Of bounds in SI units: squares of errors in bounds are numbers.
 SMALLEST = 1e-100
 # Of mechanisms: largest last step (rad or m) of Newton's method, after which its error is far
@@ -252,22 +254,32 @@ def error_estimate(
 
 
 def _averaged_jumps(maneuver: Excitation, times: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """Inputs (nodes, inputs) at times; the node next to a jump has the mean over its interval.
+    """Inputs (nodes, inputs) at times; nodes next to a jump have the means over their intervals.
 
     So sums over nodes are integrals, wherever inputs jump.
     """
-    at, sizes = maneuver.jumps
-    if not len(at):
+    begins, lengths, sizes = maneuver.jumps
+    step = times[1] - times[0]
+    short = lengths < 2.0 * step
+    if not short.any():
         return inputs
-    position = at / (times[1] - times[0])
-    node = np.rint(position).astype(int)
-    inside = (node > 0) & (node < len(times) - 1)
-    node, before = node[inside], (node - position)[inside]
+    begins, lengths = begins[short, None] / step, lengths[short, None] / step
+    node = np.rint(begins + 0.5 * lengths).astype(int) + np.arange(-1, 2)
+    since = node - begins
+    # Times that differ by rounding are one.
+    passed = np.where(lengths > 0.0, since / np.maximum(lengths, ROUNDING), since > -ROUNDING)
+    mean = _passed_until(since + 0.5, lengths) - _passed_until(since - 0.5, lengths)
+    jump, column = np.nonzero((node > 0) & (node < len(times) - 1))
+    more = mean - passed.clip(0.0, 1.0)
     averaged = inputs.copy()
-    # Of a jump the node has all, or nothing; times that differ by rounding are one.
-    shares = 0.5 + before - (before > -1e-8)
-    np.add.at(averaged, node, shares[:, None] * sizes[inside])
+    np.add.at(averaged, node[jump, column], more[jump, column, None] * sizes[short][jump])
     return averaged
+
+
+def _passed_until(since: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Integral of the part of a steady change that has passed, from its beginning on."""
+    during = since.clip(0.0, lengths)
+    return 0.5 * during**2 / np.maximum(lengths, ROUNDING) + (since - lengths).clip(0.0)
 
 
 def _errors_of_states(

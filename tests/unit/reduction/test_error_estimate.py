@@ -184,6 +184,14 @@ def test_inputs_that_jump_are_no_error(apart):
     assert run.error_estimate.in_bounds < 0.5
 
 
+@pytest.mark.parametrize("rise", [1e-6, 3e-3, 0.03])
+def test_a_steep_change_between_two_samples_is_like_a_jump(rise):
+    samples = [0.0, 0.5, 0.5 + rise, 1.0, 1.0 + rise, 2.0], [0.0, 0.0, 0.02, 0.02, -0.02, -0.02]
+    run = shipped(CAR).simulate(vm.Signal.from_samples(*samples, hold="linear"))
+    # Taken as they are at the nodes they would be 3.7 and 1.6 bounds; the error is 0.2 to 0.3.
+    assert run.error_estimate.in_bounds < 0.5
+
+
 def test_inputs_that_jump_may_stand_in_any_order():
     t = np.linspace(0.0, 2.0, 21)
     sine, cosine = 1e-3 * np.sin(3.0 * t), 1e-3 * np.cos(3.0 * t)
