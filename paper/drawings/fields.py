@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 from mesh_sizes import FULL, KINDS, growth, size_rows
 
 from drawings import look
@@ -42,6 +43,7 @@ def figure_pareto(results: look.Results) -> Figure:
         axis.set_yscale("log")
         axis.set_ylim(bottom=max(axis.get_ylim()[0], 1e-3))
         look.decades(axis.yaxis, 1)
+        axis.xaxis.set_minor_formatter(NullFormatter())
         axis.set_xlabel("whole call (ms)")
     grid[0, 0].set_ylabel("worst error / bound")
     look.legend(figure, grid.flat, 5)
@@ -70,7 +72,7 @@ LOOKS: tuple[Style, ...] = (
     {"color": "#D55E00", "marker": "s"},
     {"color": "#CC79A7", "marker": "^"},
 )
-OFFSETS = (4, 4), (-16, -13), (4, -17)
+OFFSETS = (-8, -12), (-2, -21), (5, -10)
 NAMES = {"double_wishbone": "suspension", "independent_suspension_vehicle": "14-DOF"}
 NAMES |= {"high_fidelity_vehicle": "high-fidelity"}
 
@@ -118,7 +120,7 @@ def figure_size(results: look.Results) -> Figure:
         right.plot(*zip(*at, strict=True), label=label, markersize=7, **style)
     right.axhline(1.0, **THIN)
     # Room for the names of the vehicles.
-    right.set_ylim(0.2, 2.0 * float(np.nanmax(full / reduced)))
+    right.set_ylim(0.1, 2.0 * float(np.nanmax(full / reduced)))
     for axis in (left, right):
         axis.set_xscale("log")
         axis.set_yscale("log")
