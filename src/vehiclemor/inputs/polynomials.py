@@ -265,13 +265,17 @@ def mark_rests(
         breaks[:, 1:] |= swings
 
 
+def piece_lengths(pieces: Pieces) -> np.ndarray:
+    """How long each piece lasts (pieces,), in s."""
+    if len(pieces.starts):
+        return np.diff(pieces.starts, append=pieces.edges[-1])
+    counts = np.diff(pieces.first)
+    return np.repeat(np.diff(pieces.edges) / counts, counts)
+
+
 def time_derivative(pieces: Pieces) -> Pieces:
     """Derivative by time; jumps have none."""
-    if len(pieces.starts):
-        lengths = np.diff(pieces.starts, append=pieces.edges[-1])
-    else:
-        counts = np.diff(pieces.first)
-        lengths = np.repeat(np.diff(pieces.edges) / counts, counts)
+    lengths = piece_lengths(pieces)
     rates = np.zeros_like(pieces.coefficients)
     powers = np.arange(1.0, rates.shape[1])[:, None]
     rates[:, :-1] = pieces.coefficients[:, 1:] * powers

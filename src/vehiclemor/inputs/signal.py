@@ -31,7 +31,7 @@ from vehiclemor.inputs.excitation import (
     values_at,
 )
 from vehiclemor.inputs.polynomial_loops import Pieces
-from vehiclemor.inputs.polynomials import HOLDS, interpolants, time_derivative
+from vehiclemor.inputs.polynomials import HOLDS, interpolants, piece_lengths, time_derivative
 from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, integral_of
 from vehiclemor.registry import choice
 
@@ -164,12 +164,16 @@ class Signal(Excitation):
     @property
     @cached
     def _steep(self) -> Jumps:
-        edges, _, _, coefficients = self.pieces
-        if self.hold == "cubic":
-            return Jumps(edges[:0], edges[:0], coefficients[:0, 0])
-        least = STEEP * np.ptp(coefficients[:, 0], axis=0)
-        found = np.flatnonzero((np.abs(coefficients[:, 1]) > least).any(axis=1))
-        return Jumps(edges[found], np.diff(edges)[found], coefficients[found, 1])
+        coefficients = self.pieces.coefficients
+        steep = np.array([], dtype=int)
+        if self.hold == "linear":
+            least = STEEP * np.ptp(coefficients[:, 0], axis=0)
+            steep = np.flatnonzero((np.abs(coefficients[:, 1]) > least).any(axis=1))
+        if not len(steep):
+            return Jumps(np.empty(0), np.empty(0), coefficients[:0, 0])
+        lengths = piece_lengths(self.pieces)
+        begins = self.pieces.edges[0] + np.cumsum(lengths) - lengths
+        return Jumps(begins[steep], lengths[steep], coefficients[steep, 1])
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Inputs (n, number of inputs) at times (n,) in s; `InputError` beyond the samples."""
