@@ -100,13 +100,19 @@ class ErrorEstimate(ShortRepr):
         indicator = RESERVE * self.in_bounds
         if not indicator > 1.0:
             return Trust(indicator)
-        used, last = self.used, len(self.times) - 1
-        since = {name: part.searchsorted(1.0 / RESERVE, "right") for name, part in used.items()}
-        first = min(since, key=lambda name: (since[name], -used[name][-1]))
+        used = self.used
         # Used parts may differ from the largest error by rounding.
-        until, share = float(self.times[min(since[first], last)]), used[first][-1]
-        size = "too large to be known" if np.isinf(share) else f"{share:.3g} times its bound"
-        return Trust(indicator, until, f"the estimated error of {first} is {size}")
+        first = min(part.searchsorted(1.0 / RESERVE, "right") for part in used.values())
+        until = float(self.times[min(first, len(self.times) - 1)])
+        worst = max(used, key=lambda name: used[name][-1])
+        bound, unit = self.bounds[worst], self.units[self.names.index(worst)]
+        error, rms = used[worst][-1] * bound.bound, " RMS" if bound.measure == "rms" else ""
+        size = "too large to be known" if np.isinf(error) else f"{error:.3g} {unit}{rms}"
+        reason = (
+            f"the estimated error of {worst} is {size}, its bound {bound.bound:.3g} {unit}{rms}; "
+            f"errors pass the limit, {1.0 / RESERVE:g} of a bound"
+        )
+        return Trust(indicator, until, reason)
 
 
 def used_parts(errors: np.ndarray, bounds: Mapping[str, ErrorBound]) -> dict[str, np.ndarray]:
