@@ -28,6 +28,8 @@ WRONG = [
     (f"{TRAVEL} --out run.txt", "run.txt"),
     (f"{TRAVEL} --out none/run.nc", "none/run.nc"),
     (f"{TRAVEL} --plot a.txt", "a.txt"),
+    (f"{TRAVEL} --csv", "--csv"),
+    ("export double_wishbone --to c --input", "--input"),
     ("metrics double_wishbone", "no vehicle"),
     ("metrics independent_suspension_vehicle --maneuver lane_change", "step_steer"),
     ("run figures-6-7 --jobs 1.5", "1.5"),

@@ -21,8 +21,8 @@ Seed = Annotated[
     int | None,
     Parameter(help="Samples fresh test runs of protocols, for an audit with separate results."),
 ]
-# One value or several: separated by spaces, or behind the same option again.
-Several = Parameter(consume_multiple=True)
+# One value or several, at least one: separated by spaces, or behind the same option again.
+Several = Parameter(consume_multiple=1)
 Settings = Annotated[
     list[str] | None,
     Several,

@@ -81,7 +81,7 @@ class Shown:
     """
 
     out: Path | None = None
-    plot: Annotated[list[Path] | None, Several] = None
+    plot: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None
     all_outputs: bool = False
 
 

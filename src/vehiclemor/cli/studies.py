@@ -24,7 +24,6 @@ from vehiclemor.cli.options import (
     check_names,
     new_file,
 )
-from vehiclemor.exceptions import InputError
 from vehiclemor.report.labels import Format
 from vehiclemor.report.printing import Table, ends_text, wrapped
 
@@ -145,8 +144,6 @@ def figures(
     out
         Folder of the figures; by default `figures` in the results folder.
     """
-    if only is not None and not only:
-        raise InputError("--only names no figure")
     check_names("--only", only or ())
     failed: dict[str, str] = {}
     with shown_progress():
