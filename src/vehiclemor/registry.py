@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
+from warnings import warn
 
 from vehiclemor.arguments import quoted
 from vehiclemor.exceptions import InputError, PlugInError, blame, blamed, did_you_mean
@@ -91,7 +92,13 @@ def _class(kind: str) -> type:
 @cache
 def _entries(kind: str) -> dict[str, EntryPoint]:
     choice("kind of component", kind, GROUPS)
-    entries = entry_points(group=GROUPS[kind])
+    entries: dict[str, EntryPoint] = {}
+    registered = entry_points(group=GROUPS[kind])
     # Built-ins come last: no plug-in takes the name of one away.
-    ordered = sorted(entries, key=lambda entry: entry.value.startswith("vehiclemor."))
-    return {entry.name: entry for entry in ordered}
+    for entry in sorted(registered, key=lambda entry: entry.value.startswith("vehiclemor.")):
+        other = entries.get(entry.name, entry).value
+        if other != entry.value:
+            why = f"{other} is left out, since {entry.value} has this name"
+            warn(f"{kind} {entry.name!r}: {why}", stacklevel=2)
+        entries[entry.name] = entry
+    return entries
