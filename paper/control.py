@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 from in_use import Values, store
+from reduced_models import fitted_once
 
 import vehiclemor as vm
-from vehiclemor.files import make_folder
 from vehiclemor.reduction.reduced_model import ReducedOrderModel
 from vehiclemor.simulation.run_timer import one_thread
 
@@ -44,14 +44,6 @@ PARTS, NEAR, ROUNDS = (1, 2, 3, 4, 5, 10, 20), (5e-4, 1e-3, 1e-2), 15
 def example(name: str) -> Any:
     """Names of an example, which runs nothing."""
     return SimpleNamespace(**runpy.run_path(str(EXAMPLES / f"{name}.py")))
-
-
-def braking_car(path: Path) -> ReducedOrderModel:
-    """The example's car that brakes; it is fitted once."""
-    if not path.exists():
-        make_folder(path.parent)
-        example("optimal_control").braking_car().save(path)
-    return vm.load(path)
 
 
 def models(braking: ReducedOrderModel) -> Models:
@@ -183,7 +175,8 @@ def main() -> None:
     results = parser.parse_args().results
     values: Values = {}
     with one_thread():
-        known = models(braking_car(results / "models" / "braking_car.nc"))
+        path = results / "models" / "braking_car.nc"
+        known = models(fitted_once(path, example("optimal_control").braking_car))
         for part in (plans, rollouts, loops, compiled, shooting):
             values |= dict(part(known))
             store(values, "Models in control", results / "control.nc")

@@ -14,6 +14,7 @@ violates a bound and its status is `ok`.
 import argparse
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,11 +22,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 from in_use import Values, store
-from reduced_models import Choice, fitted, in_bounds
+from reduced_models import Choice, fitted, fitted_once, in_bounds
 
 import vehiclemor as vm
 from vehiclemor.exceptions import VehiclemorError
-from vehiclemor.files import make_folder
 from vehiclemor.inputs.driving import FRONT_SHARE, MASS, RADIUS
 from vehiclemor.reduction.reduced_model import ReducedOrderModel
 from vehiclemor.registry import component
@@ -165,17 +165,10 @@ def alone(reduced: ReducedOrderModel) -> ReducedOrderModel:
 
 def braking_car(name: str, results: Path) -> ReducedOrderModel:
     """What the second protocol has chosen, which brakes and drives; it is fitted once."""
-    path = results / "models" / f"braking_{name}.nc"
-    try:
-        return vm.load(path)
-    except VehiclemorError as error:
-        print(f"{error}: fitted anew", flush=True)
     protocol = load_protocol(f"predictive-{name}-2")
     entry = next(entry for entry in protocol.entries if entry.label == "guarded")
-    reduced = fitted(Choice(protocol, entry.method, entry.candidates[0], entry.training))
-    make_folder(path.parent)
-    reduced.save(path, overwrite=True)
-    return vm.load(path)
+    choice = Choice(protocol, entry.method, entry.candidates[0], entry.training)
+    return fitted_once(results / "models" / f"braking_{name}.nc", partial(fitted, choice))
 
 
 def accelerations(run: Trajectory) -> dict[str, float]:

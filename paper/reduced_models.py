@@ -13,6 +13,7 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -71,6 +72,16 @@ def fitted(choice: Choice) -> ReducedOrderModel:
     """The chosen model, fitted."""
     settings: dict[str, Any] = choice.settings
     return reduce(choice.protocol.model, choice.method, training=choice.training, **settings)
+
+
+def fitted_once(path: Path, fit: Callable[[], ReducedOrderModel]) -> ReducedOrderModel:
+    """The model in a file, which is fitted and written where it can't be loaded."""
+    try:
+        return load(path)
+    except FileError as error:
+        print(f"{error}: fitted anew", flush=True)
+    make_folder(path.parent)
+    return load(fit().save(path, overwrite=True))
 
 
 def path_of(name: str) -> Path:

@@ -179,11 +179,12 @@ def test_another_version_that_makes_the_same_of_it_is_not(car, saved, monkeypatc
     assert "linear_single_track makes something else of these numbers" in refusal(saved)
 
 
-def test_other_equations_and_formats_are_refused(saved):
+def test_other_equations_and_formats_are_refused(car, saved):
     rewritten(saved, lambda dataset, _: dataset.update({"fingerprint": 1.01 * dataset.fingerprint}))
     assert "changed since" in refusal(saved)
     rewritten(saved, lambda dataset, _: dataset.attrs.update(saved_model=99))
     assert "format 99 where" in refusal(saved)
+    assert reduced_models.fitted_once(saved, lambda: car).method == vm.load(saved).method
 
 
 SHIPPED = [*protocol_names()]
