@@ -53,7 +53,7 @@ def no_steered_vehicle(model: Model) -> str:
 class Linearisation:
     """Derivatives of the shape's rate, of velocity (psi', U, V) and of outputs at straight running.
 
-    By the shape (rows, n) and by the inputs (rows, inputs).
+    By the shape (rows, n), and of the first two by the inputs (rows, inputs).
     """
 
     a: np.ndarray
@@ -61,7 +61,6 @@ class Linearisation:
     velocity_a: np.ndarray
     velocity_b: np.ndarray
     output_a: np.ndarray
-    output_b: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,11 +153,9 @@ class VehicleShape:
         outputs = self.model.outputs_at(
             self.states(shapes, np.zeros((len(shapes), 3))), np.ascontiguousarray(values)
         )
-        parts = []
-        for image in (*self.rates(shapes, values), outputs):
-            slopes = (image[0::2] - image[1::2]).T / widths
-            parts += [slopes[:, :n], slopes[:, n:]]
-        return Linearisation(*parts)
+        images = *self.rates(shapes, values), outputs
+        rate, speed, output = ((image[0::2] - image[1::2]).T / widths for image in images)
+        return Linearisation(rate[:, :n], rate[:, n:], speed[:, :n], speed[:, n:], output[:, :n])
 
     @cached_property
     def mirror(self) -> np.ndarray:
