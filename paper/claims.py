@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -31,6 +31,7 @@ from vehiclemor.report.labels import Column
 from vehiclemor.report.printed_numbers import (
     TIMING,
     VARIANTS,
+    Finding,
     Results,
     case_of,
     judge_rms_error,
@@ -95,33 +96,6 @@ class ClaimFile(FileSchema):
     """Schema of `claims.toml`."""
 
     claim: list[Claim]
-
-
-class Finding(NamedTuple):
-    """The number that decides about a claim, its bound, and whether it is met.
-
-    That is None if it can't be judged.  `measure` says what the number is, `reason` what else was
-    seen.
-    """
-
-    reproduced: float
-    bound: float
-    within: bool | None
-    measure: str
-    reason: str = ""
-
-    @classmethod
-    def below(cls, value: float, bound: float, *, valid: bool = True, **about: Any) -> Self:
-        """A value that must stay below its bound; a run that has failed is not `valid`.
-
-        `about` are further fields.
-        """
-        return cls(value, bound, valid and value < bound, **about)
-
-    @classmethod
-    def above(cls, value: float, bound: float, *, valid: bool = True, **about: Any) -> Self:
-        """As `below`, of a value that must exceed its bound."""
-        return cls(value, bound, valid and value > bound, **about)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, Self, get_args
 
 import numpy as np
 import xarray as xr
@@ -27,7 +27,7 @@ Results = Mapping[str, xr.Dataset]
 
 
 class Finding(NamedTuple):
-    """A number that stands beside a printed one, which is its bound, and whether it is met.
+    """A number that stands beside a printed one or a claim, its bound, and whether it is met.
 
     That is None if it can't be judged.  `measure` says what the number is, `reason` what else was
     seen.  An error has beside it that of the best approximation in the subspaces (`floor`) and the
@@ -39,11 +39,24 @@ class Finding(NamedTuple):
     bound: float
     within: bool | None
     measure: str
-    reason: str
-    unit: str
+    reason: str = ""
+    unit: str = ""
     floor: float = math.nan
     signal_rms: float = math.nan
     strongest: float = math.nan
+
+    @classmethod
+    def below(cls, value: float, bound: float, *, valid: bool = True, **about: Any) -> Self:
+        """A value that must stay below its bound; a run that has failed is not `valid`.
+
+        `about` are further fields.
+        """
+        return cls(value, bound, valid and value < bound, **about)
+
+    @classmethod
+    def above(cls, value: float, bound: float, *, valid: bool = True, **about: Any) -> Self:
+        """As `below`, of a value that must exceed its bound."""
+        return cls(value, bound, valid and value > bound, **about)
 
 
 def printed_errors_and_savings() -> list[Number]:
