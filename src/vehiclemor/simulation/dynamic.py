@@ -157,15 +157,7 @@ class DynamicModel(Model):
         longest_step: float | None = None,
         begin: float = 0.0,
     ) -> Trajectory:
-        """Full-order trajectory, see `Model.simulate`.
-
-        Parameters
-        ----------
-        longest_step
-            In s; unlimited by default.
-        begin
-            Time in s at which the run begins with the start, in mid-maneuver if it isn't 0.
-        """
+        """Full-order trajectory, see `Model.simulate`."""
         driven = self.driven_by(maneuver)
         if driven is not self:
             how = times, solver, tolerance, outputs, longest_step, begin

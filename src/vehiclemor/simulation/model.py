@@ -244,6 +244,9 @@ class Model(ShortRepr):
             else largest local error of a state relative to its typical size plus its magnitude.
         outputs
             Names of outputs, coordinates or speeds to keep, see `Trajectory.chosen`.
+        longest_step, begin
+            Of models of kind `ode` or `dae` alone, in s: the longest step, unlimited by default,
+            and when the run begins with the start, in mid-maneuver if not at 0.
 
         Raises
         ------
