@@ -35,6 +35,9 @@ def validated(
     choice(f"preset of {method.name}", preset, presets)
     declared = method.settings.get(kind, Settings)
     for name in given:
+        if name in ("bounds", "trust") and name not in declared.model_fields:
+            of = "vm.reduce(...).simulate() takes bounds and trust"
+            raise InputError(f"{name} is no setting of {method.name}: {of}")
         choice(f"setting of {method.name}", name, declared.model_fields)
     chosen: dict[str, Any] = dict(presets[preset])
     with blamed(f"method {method.name!r}: settings", declared):
