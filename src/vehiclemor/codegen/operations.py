@@ -257,9 +257,9 @@ def _read(listed: str) -> tuple[list[Operation], list[int]]:
     return [Operation(*map(_tuples, operation)) for operation in operations], named
 
 
-def padded(count: int) -> int:
-    """Length of a row of so many floats, padded to a multiple of the vectors' length."""
-    return -(-count // WIDTH) * WIDTH
+def padded(count: int, width: int = WIDTH) -> int:
+    """Length of a row of so many floats, padded to a multiple of the vectors' width."""
+    return -(-count // width) * width
 
 
 def is_entry(detail: Any) -> bool:

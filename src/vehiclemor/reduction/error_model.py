@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vehiclemor.codegen.loops import Prepared, Ready, loops, ready
-from vehiclemor.codegen.operations import LANES
+from vehiclemor.codegen.operations import LANES, padded
 from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction.error_arguments import (
     Bounded,
@@ -173,7 +173,7 @@ class ErrorModel:
         """Arrays of a run with bounds of outputs of these names, and the loop that uses them."""
         model = self.shape.model
         n, violations = len(model.definition.states), len(self.free.correction)
-        rows, of_modes, of_shape = map(_up_to_lanes, (nodes, modes, n + 3))
+        rows, of_modes, of_shape = (padded(size, LANES) for size in (nodes, modes, n + 3))
         widths = n, len(model.inputs), n, n, n, 3, of_modes, of_modes, violations + modes
         arrays: list[Any] = [np.empty((rows, columns)) for columns in widths]
         arrays += map(np.empty, ((LANES, n), (LANES, of_shape), n, n, 3))
@@ -278,15 +278,12 @@ class ErrorModel:
     @cached_property
     def _of_shape(self) -> Ready:
         """The shape and the full equations, as the loop takes them."""
-        shape, model = self.shape, self.shape.model
-        x, y, heading = model.planar
+        shape, model, kernels = self.shape, self.shape.model, self.shape.model.kernels
         pairs = np.array(shape.pairs, dtype=np.int64).reshape(-1, 2)
         names = "derivative", "violations"
-        addresses = [
-            address_of(model.kernels, n, LANES) if n in model.kernels else 0 for n in names
-        ]
+        addresses = [address_of(kernels, n, LANES) if n in kernels else 0 for n in names]
         reference = self.in_states(shape.reference[None])[0]
-        places = shape.indices, np.array([heading, x, y]), pairs, reference
+        places = shape.indices, model.planar[[2, 0, 1]], pairs, reference
         return ready(Shape(*places, np.array(addresses), model.constants))
 
     def _violations(self, deviations: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -348,13 +345,9 @@ class ErrorModel:
 def _filled(matrix: np.ndarray) -> np.ndarray:
     """A matrix with further columns of zeros, up to a multiple of the lanes."""
     rows, columns = matrix.shape
-    filled = np.zeros((rows, _up_to_lanes(columns)))
+    filled = np.zeros((rows, padded(columns, LANES)))
     filled[:, :columns] = matrix
     return filled
-
-
-def _up_to_lanes(count: int) -> int:
-    return -(-count // LANES) * LANES
 
 
 class Corrected(NamedTuple):
