@@ -81,14 +81,7 @@ def test_parts_are_what_they_were(monkeypatch):
     monkeypatch.setattr(parts, "_plug_ins", lambda: {__name__.partition(".")[0]})
     table = np.arange(6.0).reshape(2, 3)
     numbers = table.astype(int), table > 2.0, table + 1j * table, np.array(2j)
-    arrays = (
-        table,
-        table.T,
-        *numbers,
-        np.zeros((0, 3)),
-        np.array([np.nan, -np.inf]),
-        np.array(2.0),
-    )
+    arrays = table, table.T, *numbers, np.zeros((0, 3)), np.array([np.nan, -np.inf]), np.array(2.0)
     scalars = 1, -0.0, np.inf, True, None, "text", np.float64(0.1)
     further = Pair(1, (2, (3.0,))), 2.0, [Pair(table, "a")], {"b": (), "c": (1.0,)}, (1, Pair(1, 2))
     kinds = Kinds(arrays, scalars, Pair(1, 2), *further)
