@@ -13,7 +13,7 @@ from tests.plugin.installation import registered
 from tests.report.figure_texts import checked
 from vehiclemor.cli import main
 from vehiclemor.netcdf_file import read_dataset
-from vehiclemor.registry import component
+from vehiclemor.registry import component, names
 from vehiclemor.report import default_studies
 from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.default_studies import nominal, unseen
@@ -165,6 +165,13 @@ def test_figures_of_a_study_and_a_protocol(place, capsys):
 
 CAR = "quarter_car"
 METHODS = {"full_order", "full_order_strongest", "replay", "pod", "pod_literal", "fixed_basis"}
+# Quick to fit; one that accepts no car, one of the plug-in, and one that a test registers.
+FEW = ("fixed_basis", "full_order", "mine", "path_map", "pod", "quarter_car_modes", "replay")
+
+
+@pytest.fixture(autouse=True)
+def few_methods(monkeypatch):
+    monkeypatch.setattr(default_studies, "names", lambda k: [n for n in names(k) if n in FEW])
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +188,7 @@ def test_a_model_is_compared_by_every_method_and_output(folder, capsys, monkeypa
     rows = json.loads(capsys.readouterr().out)
     key = itemgetter("study", "label", "start", "output")
     errors = {key(row): row["largest"] for row in rows if row["kind"] == ERRORS}
-    assert {label for _, label, _, _ in errors} >= METHODS
+    assert {label for _, label, _, _ in errors} == METHODS | {"quarter_car_modes"}
     assert all(words in printed for words in METHODS)
     for output in tabled_outputs(component("model", CAR)):
         full, replayed = (
