@@ -43,8 +43,7 @@ for solver in ("dopri5", "etdrk4"):
 import vehiclemor as vm
 vm.model("double_wishbone").solve([0.05, 0.0])
 car = vm.model("high_fidelity_vehicle")
-for by in ("state", "inputs"):
-    car.jacobian(car.start(), [0.0] * 3, by)
+car.jacobian(car.start(), [0.0] * 3, "state")
 """,
 )
 
@@ -78,12 +77,14 @@ SLOW = (
 )
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark slow tests, so that the quick ones can be run alone."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark slow tests, so that the quick ones can be run alone; with several processes, last."""
     folder = Path(__file__).parent
     for item in items:
         if item.path.relative_to(folder).as_posix().startswith(SLOW):
             item.add_marker("slow")
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -95,6 +96,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
         def _split_scope(self, nodeid: str) -> str:
             return "report" if nodeid.startswith("tests/report/") else nodeid.partition("::")[0]
 
+    # In the order above, not by the number of tests in a file: a long file must not be the last.
+    config.option.loadscopereorder = False
     return ByFile(config, log)
 
 

@@ -69,18 +69,8 @@ SETTINGS: dict[str, dict[str, object]] = {
 }
 
 
-@cache
-def built(name):
-    # The truck's contracts are those of any mesh.
-    return build(name, overrides=COARSE if name == TRUCK else None)
-
-
-@cache
-def full_run(model):
-    return model.simulate(component("maneuver", model.definition.maneuver))
-
-
-# Methods that are fitted to the same runs share them.
+# Methods share models and runs.  The truck's contracts are those of any mesh.
+built = cache(lambda name: build(name, overrides=COARSE if name == TRUCK else None))
 training = cache(training_runs)
 
 
@@ -91,6 +81,7 @@ class Pair:
         self.model: Model = built(model)
         self.name, self.method = method, component("method", method)
         self.maneuver: Maneuver = component("maneuver", component("model", model).maneuver)
+        self.full = training(self.model, self.maneuver, "matched")[0]
         self._fitted: dict[str, FittedModel] = {}
 
     @cached_property
@@ -111,8 +102,8 @@ class Pair:
         self.method.check(self.model, settings)
         before = copy.deepcopy(settings)
         factors = TRAINED_ON.get(self.name, ())
-        policy = "set" if factors else "nominal"
-        runs = training(self.model, self.maneuver, policy, factors)
+        known = [self.maneuver, "set", factors] if factors else [self.maneuver, "matched"]
+        runs = training(self.model, *known)
         reduced = fitted(self.method, self.model, runs, settings)
         assert settings == before
         return reduced
@@ -181,7 +172,6 @@ def test_a_fit_reads_no_more_of_the_training_than_is_declared(pair):
 
 
 def test_every_preset_simulates_the_nominal_maneuver(pair):
-    full = full_run(pair.model)
     for preset in pair.method.presets_of(pair.model.kind):
         run = pair.nominal if preset == "recommended" else pair.run(pair.fit(preset))
         if pair.name not in LEARNED or run.status != "untrusted":
@@ -204,8 +194,8 @@ def test_every_preset_simulates_the_nominal_maneuver(pair):
         # output's range, or as much as its states are off.  Rounding of slips is stiff.
         outputs = pair.model.outputs_at(run.states, run.inputs)
         apart = np.abs(run.outputs - outputs).max(axis=0)
-        off = np.abs(outputs - full.outputs).max(axis=0)
-        allowed = np.maximum(1e-3 * np.ptp(full.outputs, axis=0), off)
+        off = np.abs(outputs - pair.full.outputs).max(axis=0)
+        allowed = np.maximum(1e-3 * np.ptp(pair.full.outputs, axis=0), off)
         rounding = 1e-8 * np.maximum(1.0, np.abs(outputs).max(axis=0))
         assert (apart <= allowed + rounding).all()
 
@@ -215,7 +205,7 @@ def test_matched_training_comes_near_the_full_order(pair):
     dynamic = pair.model.kind in ("ode", "dae")
     if (dynamic and pair.name in ROUGH) or pair.name in LEARNED:
         pytest.skip("not near a lane change: a finding, no defect")
-    run, full = pair.nominal, full_run(pair.model)
+    run, full = pair.nominal, pair.full
     size = full.outputs.max(axis=0) - full.outputs.min(axis=0)
     moving = size > 0.0
     error = np.abs(run.outputs - full.outputs).max(axis=0)
@@ -250,8 +240,7 @@ def test_it_is_exported_or_refused_and_its_runs_are_labelled(pair):
 def test_results_are_deterministic(pair):
     reduced = pair.fit()
     other = pair.maneuver.perturbed(0.9, 0.8)
-    first = pair.nominal
-    _, again = pair.run(reduced, other), pair.run(reduced)
+    first, _, again = pair.nominal, pair.run(reduced, other), pair.run(reduced)
     runs = [again]
     if pair.method.learns_from == "runs" and (pair.name not in LEARNED or pair.model.name == CAR):
         # A learner draws alike whatever the model.  Methods that learn from no run are fitted a
@@ -274,7 +263,7 @@ def test_untrained_inputs_give_a_result_or_say_why_not(pair):
 
 
 def test_reduced_model_tells_its_size_cost_and_floor(pair):
-    reduced, full = pair.fit(), full_run(pair.model)
+    reduced, full = pair.fit(), pair.full
     states = len(pair.model.coordinates) + len(pair.model.speeds)
     # Coordinates of a structure have no names.
     assert 0 <= reduced.order <= getattr(pair.model, "size", states)
@@ -430,8 +419,7 @@ def test_a_saved_model_is_the_same_to_the_bit(pair, tmp_path):
         np.testing.assert_array_equal(second.outputs, first.outputs)
         for name in ("counts", "status", "message", "remark", "trust"):
             assert getattr(second, name) == getattr(first, name)
-    states = full_run(pair.model).states
-    best, nearest = (rom.reduced.best_approximation(states) for rom in (made, again))
+    best, nearest = (rom.reduced.best_approximation(pair.full.states) for rom in (made, again))
     assert (best is None) == (nearest is None)
     if best is not None:
         np.testing.assert_array_equal(nearest, best)

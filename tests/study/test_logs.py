@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vehiclemor as vm
-from tests.models import CAR, FIDELITY, WISHBONE
+from tests.models import CAR, WISHBONE
 from tests.study.conftest import SMALL
 from vehiclemor.cli import main
 from vehiclemor.study.plans.protocol import load_protocol
@@ -126,12 +126,12 @@ def test_a_grid_runs_every_window(folder, tmp_path):
 
 def test_a_log_may_brake(tmp_path):
     times = 0.05 * np.arange(121)
-    columns = times, 0.003 * np.sin(times), 500.0 * (times > 2.0), 0.5 + 0.0 * times
+    columns = times, 0.01 * np.sin(times), 500.0 * (times > 2.0), 0.5 + 0.0 * times
     text = "\n".join(",".join(f"{x:.6g}" for x in row) for row in zip(*columns, strict=True))
-    (tmp_path / "brake.csv").write_text(f"time,s,brake,friction\n{text}\n")
-    inputs = {"s": "s", "brake_torque_FL": "brake", "friction_FL": "friction"}
+    (tmp_path / "brake.csv").write_text(f"time,wheel,brake,friction\n{text}\n")
+    inputs = {"delta": "wheel", "brake_torque_FL": "brake", "friction_FL": "friction"}
     lines = [f'inputs.{name} = "{column}"' for name, column in inputs.items()]
-    study = [f'title = "brake"\nmodel = "{FIDELITY}"\nmethods = [{{ method = "full_order" }}]']
+    study = [f'title = "brake"\nmodel = "{CAR}"\nmethods = [{{ method = "full_order" }}]']
     study += ['[[logs]]\nlog = "brake.csv"\nwindow = 6.0', *lines]
     (tmp_path / "brake.toml").write_text("\n".join(study))
     run = vm.run_study(tmp_path / "brake.toml", results=tmp_path).squeeze()
@@ -139,8 +139,6 @@ def test_a_log_may_brake(tmp_path):
     # The friction goes over from 1, and no spline makes a brake push.
     np.testing.assert_allclose(found[[0, -1]], [[0.0, 1.0], [500.0, 0.5]])
     assert found.min() == 0.0
-    times, rack, rate = run["time"].values, *run["inputs"].sel(input=["s", "s_dot"]).values.T
-    np.testing.assert_allclose(np.gradient(rack, times)[60:-1], rate[60:-1], atol=1e-5)
     assert run["status"] == "ok"
 
 
