@@ -46,6 +46,9 @@ def kernel_module(kernels: Sequence[Kernel], lanes: int = 1) -> ir.Module:
         kinds = [POINTER] * len(kernel.arguments) + [ir.IntType(64)] * len(strided)
         function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), kernel.name)
         function.attributes.add("nounwind")
+        if any(name.startswith(SEED) for name in kernel.arguments):
+            # LLVM would search a derivative long for statements to pack, and it is no faster.
+            function.attributes.add("noimplicitfloat")
         builder = ir.IRBuilder(function.append_basic_block())
         pointers = dict(zip(kernel.arguments, function.args, strict=False))
         strides = dict(zip(strided, function.args[len(pointers) :], strict=True))
@@ -158,9 +161,7 @@ class _Writer:
     def _store(self, value: Any, index: int) -> None:
         value = self._spread_to_lanes(value)
         for lane in range(self._lanes):
-            single = value
-            if self._lanes > 1:
-                single = self._builder.extract_element(value, LANE(lane))
+            single = self._builder.extract_element(value, LANE(lane)) if self._lanes > 1 else value
             self._builder.store(single, self._address("_result", index, lane))
 
     def _address(self, name: str, index: int, lane: int = 0) -> Any:
@@ -177,8 +178,7 @@ class _Writer:
             # The arguments are vectors of samples already.
             results = [elementary(builder, name, argument) for argument in arguments]
             return [value for values in zip(*results, strict=True) for value in values]
-        lanes = [LANE(lane) for lane in range(WIDTH)]
-        parts = []
+        lanes, parts = [LANE(lane) for lane in range(WIDTH)], []
         for first in range(0, LANES, WIDTH):
             vector = ir.Constant(VECTOR, ir.Undefined)
             for k, lane in enumerate(lanes):
