@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -158,22 +159,23 @@ class Signal(Excitation):
 
     @property
     def jumps(self) -> Jumps:
-        """Jumps of the inputs inside the run, of a linear hold steep changes between samples."""
+        """Jumps of the inputs inside the run; unless samples are held, their steep changes."""
         return super().jumps if self.hold == "zero" else self._steep
 
     @property
     @cached
     def _steep(self) -> Jumps:
-        coefficients = self.pieces.coefficients
-        steep = np.array([], dtype=int)
-        if self.hold == "linear":
-            least = STEEP * np.ptp(coefficients[:, 0], axis=0)
-            steep = np.flatnonzero((np.abs(coefficients[:, 1]) > least).any(axis=1))
+        # Derivatives may be nothing but rounding.
+        own = [derivative_order(name, self.inputs) == 0 for name in self.inputs or ("",)]
+        values = self.pieces.coefficients[:, 0]
+        # The last piece ends the run.
+        sizes, least = np.diff(values, axis=0), STEEP * np.ptp(values, axis=0)
+        steep = np.flatnonzero((np.abs(sizes) > np.where(own, least, math.inf)).any(axis=1))
         if not len(steep):
-            return Jumps(np.empty(0), np.empty(0), coefficients[:0, 0])
+            return Jumps(np.empty(0), np.empty(0), sizes[:0])
         lengths = piece_lengths(self.pieces)
         begins = self.pieces.edges[0] + np.cumsum(lengths) - lengths
-        return Jumps(begins[steep], lengths[steep], coefficients[steep, 1])
+        return Jumps(begins[steep], lengths[steep], sizes[steep])
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Inputs (n, number of inputs) at times (n,) in s; `InputError` beyond the samples."""

@@ -25,8 +25,9 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
 # Of looks: time in s between nodes, at last a twentieth of the period of wheel hop; the most
-# passes, and how far corrections are settled.  The last one is that which finds a small error, or
-# one that has changed little since the look before, beside the room that it leaves to the bounds.
+# passes, and how far corrections are settled.  The last one is that which finds a small error by
+# settled corrections, or one that has changed little since the look before, beside the room that it
+# leaves to the bounds.
 FINER = 15, 1e-5
 LOOKS = (0.04, (12, 3e-4)), (0.02, FINER), (0.01, FINER), (0.005, FINER)
 SMALL, ROOM = 0.4, 0.2
@@ -217,7 +218,12 @@ def _looked(
     """Estimate for a vehicle's run by the first look that is fine enough, none if there is none."""
     (maneuver, start), estimate, error = given, None, math.nan
     apart = maneuver.duration / (maneuver.samples - 1)
+    rises = maneuver.jumps.lengths
+    # Half a steep change, so that a look sees it; one at once is seen by none.
+    coarsest = max(0.5 * rises.min(where=rises > 0.0, initial=math.inf), LOOKS[-1][0])
     for spacing, passes in LOOKS:
+        if spacing > coarsest:
+            continue
         parts = math.ceil(apart / spacing - 1e-6)
         finer = simulate(maneuver.subdivided(parts), start) if parts > 1 else run
         every = max(int(parts * spacing / apart + 1e-6), 1)
@@ -227,7 +233,7 @@ def _looked(
         estimate = error_estimate(finer, nodes, given, bounds, passes)
         before, error = error, estimate.in_bounds
         is_within = abs(error - before) < ROOM * (1.0 / RESERVE - error)
-        if error < SMALL or is_within:
+        if is_within or (error < SMALL and estimate.settled):
             break
     return estimate
 

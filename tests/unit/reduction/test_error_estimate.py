@@ -16,7 +16,8 @@ from vehiclemor.study.plans.loading import read_study, study_path
 from vehiclemor.study.plans.protocol import fixed_protocols, load_protocol
 
 # Random steering that no model is trained on.
-STEERING = {CAR: "random_steer:101", "high_fidelity_vehicle": "rack_random_steer:101"}
+RACK = "high_fidelity_vehicle"
+STEERING = {CAR: "random_steer:101", RACK: "rack_random_steer:101"}
 
 
 @cache
@@ -191,6 +192,17 @@ def test_a_steep_change_between_two_samples_is_like_a_jump(rise):
     run = shipped(CAR).simulate(vm.Signal.from_samples(t, steering, hold="linear"))
     # Taken as they are at the nodes they would be 3.7 and 1.6 bounds; the error is 0.2 to 0.3.
     assert run.error_estimate.in_bounds < 0.5
+
+
+@pytest.mark.parametrize(("speed", "rate", "height"), [(27.0, 100, 0.002), (20.0, 50, 0.004)])
+def test_a_spike_of_one_sample_is_looked_at_closely(speed, rate, height):
+    start = vm.model("high_fidelity_vehicle", parameters={"initial_speed": speed}).start()
+    t = np.arange(0.0, 10.0, 1.0 / rate)
+    signal = vm.Signal.from_samples(t, height * (t == 5.0), "cubic", inputs=["s"])
+    # At nodes 40 ms apart the estimate would be 0.2 and 0.4 bounds.
+    run, full = (m.simulate(signal, start) for m in (shipped(RACK), shipped(RACK).model))
+    true = in_bounds(load_protocol(f"predictive-{RACK}"), run, full)
+    assert (run.status, run.error_estimate.in_bounds) == ("untrusted", pytest.approx(true, rel=0.1))
 
 
 def test_inputs_that_jump_may_stand_in_any_order():
