@@ -47,7 +47,7 @@ def kernel_module(kernels: Sequence[Kernel], lanes: int = 1) -> ir.Module:
         function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), kernel.name)
         function.attributes.add("nounwind")
         if any(name.startswith(SEED) for name in kernel.arguments):
-            # LLVM would search a derivative long for statements to pack, and it is no faster.
+            # Keeps LLVM from a long search for statements to pack (SLP), which gains nothing here.
             function.attributes.add("noimplicitfloat")
         builder = ir.IRBuilder(function.append_basic_block())
         pointers = dict(zip(kernel.arguments, function.args, strict=False))
