@@ -97,7 +97,7 @@ def test_two_files_of_one_name_are_refused(tmp_path, monkeypatch, call):
 def test_hostile_titles_are_texts(read):
     assert not list(read.iter("script"))
     assert HOSTILE in texts(read, "h2")
-    assert any(row["method"] == HOSTILE for row in table(read, "largest"))
+    assert any(row["method"] == HOSTILE for row in table(read, "largest RMS"))
 
 
 def test_provenance_and_settings_stand_there(made, read):
