@@ -32,13 +32,13 @@ def signal_range(signal: np.ndarray) -> np.ndarray:
 def errors(run: Trajectory, full: Trajectory) -> xr.Dataset:
     """Errors of a run against the full-order run of the same input, for each output of the run.
 
-    Of a vehicle that stops they are those until the first of both runs has stopped; where a run
-    stops early they are not numbers.
+    They end where the first vehicle stops; of a run that stops early they are not numbers.
 
     Parameters
     ----------
     run, full
-        At the same output times; `full` has the outputs of `run`.
+        Of the same input, at the same output times; `full` has the outputs of `run`.  Start and
+        parameters are not compared: the difference of two cars may be wanted.
 
     Returns
     -------
