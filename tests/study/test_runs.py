@@ -3,6 +3,7 @@
 import errno
 import logging
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -34,6 +35,7 @@ from vehiclemor.files import TEMPORARY, temporary_path
 from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.progress import listening
 from vehiclemor.reduction.methods import pod
+from vehiclemor.report.frames import counted_ends
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.study import evaluate, store, timing, workers
 from vehiclemor.study.plans.grid import expand
@@ -184,7 +186,10 @@ def test_a_study_is_followed_from_nothing_to_its_end(study, tmp_path, capsys, pr
     found = vm.status(study, out)["small"]
     assert (found.runs, found.done, found.to_do, found.result) == (RUNS, 0, RUNS, None)
     assert not out.exists()
-    run_studies(str(study), out)
+    ends, *_ = counted_ends(run_studies(str(study), out)["small"]).split(";")
+    assert main(["status", str(study), "--results", str(out)]) == 0
+    assert re.search(r" ok \(\d+ untrusted\)", ends)
+    assert ends in capsys.readouterr().out
     found = vm.status(study, out)["small"]
     assert (found.runs, found.done, found.to_do) == (RUNS, RUNS, 0)
     # Messages differ in the height and time out of reach: which is shown depends on the runs left.

@@ -76,7 +76,8 @@ def status(study: Study, *, results: Results = RESULTS, seed: Seed = None) -> No
         parts += [progress.later] if progress.later and not progress.result else []
         text = ", ".join(parts)
         if progress.ends:
-            text += f"; {ends_text(kind for kind, _ in progress.ends.elements())}"
+            ends = (kind for kind, _ in progress.ends.elements())
+            text += f"; {ends_text(ends, progress.warned)}"
         older = " is older" if progress.result and progress.to_do else ""
         print(wrapped(f"{text}; {progress.result or 'not combined yet'}{older}", 0, 2))
         _print_reasons(progress.failed)

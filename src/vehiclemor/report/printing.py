@@ -211,9 +211,9 @@ def json_text(rows: pd.DataFrame) -> str:
 
 
 def ends_text(statuses: Iterable[str], warned: int = 0) -> str:
-    """How runs have ended, such as `2 diverged, 12 ok (9 not to be trusted)`."""
+    """How runs have ended, such as `2 diverged, 12 ok (9 untrusted)`."""
     text = ", ".join(f"{n} {status}" for status, n in sorted(Counter(statuses).items()))
-    return text.replace(" ok", f" ok ({warned} not to be trusted)") if warned else text
+    return text.replace(" ok", f" ok ({warned} untrusted)") if warned else text
 
 
 def width() -> int:

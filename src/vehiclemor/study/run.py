@@ -114,13 +114,15 @@ class StudyStatus:
 
     Of its `runs` so many are `done`; a failure of the equations is one of them.  `ends` counts
     (status, message) of the finished ones and of bugs, which are tried again; messages that differ
-    in numbers are one.  `result` is the file of the combined dataset, if there is one, and `later`
-    what a protocol does after these runs, which depends on how they end.
+    in numbers are one.  Of those that are ok so many are `warned`: not to be trusted.  `result` is
+    the file of the combined dataset, if there is one, and `later` what a protocol does after these
+    runs, which depends on how they end.
     """
 
     runs: int
     done: int = 0
     ends: Counter[tuple[str, str]] = field(default_factory=Counter)
+    warned: int = 0
     result: Path | None = None
     later: str = ""
 
@@ -160,4 +162,5 @@ def _status(plan: Plan, folder: Path) -> StudyStatus:
             alike = name, NUMBER.sub("#", message)
             status.ends[examples.setdefault(alike, (name, message))] += runs
         status.done += not run.broken
+        status.warned += run.warned
     return status

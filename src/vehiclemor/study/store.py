@@ -64,6 +64,12 @@ class StoredRun(NamedTuple):
         return Counter(zip(*texts, strict=True))
 
     @property
+    def warned(self) -> int:
+        """How many of its scenarios are ok, but not to be trusted."""
+        warned = self.variables["warned"][1] if "warned" in self.variables else False
+        return int(np.sum((self.variables["status"][1] == "ok") & warned))
+
+    @property
     def layout(self) -> dict[str, tuple[list[str], tuple[int, ...], str]]:
         """Name -> dimensions, shape and kind of a variable."""
         return {
