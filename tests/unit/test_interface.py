@@ -135,9 +135,9 @@ def test_objects_of_a_simulation_show_themselves_in_one_line(name):
         text = repr(shown)
         assert len(text) < LONGEST
         assert "\n" not in text
-    assert name in repr(model)
-    assert model.coordinates[0] in repr(model)
+    assert all(word in repr(model) for word in (name, model.coordinates[0]))
     assert name in repr(rom)
+    assert str(vm.rom(VEHICLE)).count("random_steer") == 1
     assert f"times=ndarray({maneuver.samples},)" in repr(full)
     assert "status='ok'" in repr(full)
     for further in (model.parameters, model.equations):

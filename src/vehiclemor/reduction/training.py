@@ -1,6 +1,7 @@
 """Training runs: full-order simulations that a method may learn from."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -97,9 +98,12 @@ def training_summary(
 
 
 def _span(values: list[Any]) -> str:
-    """Both ends of numbers; all of texts and tables."""
+    """Both ends of numbers; all of texts and tables, but of a family, `NAME:NUMBER`, how many."""
     if not all(isinstance(value, float) for value in values):
-        return ", ".join(sorted(set(map(str, values))))
+        texts = {str(value): isinstance(value, str) and ":" in value for value in values}
+        families = Counter(text.rpartition(":")[0] for text, member in texts.items() if member)
+        parts = [text for text, member in texts.items() if not member]
+        return ", ".join(sorted(parts) + [f"{n} of {name}" for name, n in families.items()])
     low, high = min(values), max(values)
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
