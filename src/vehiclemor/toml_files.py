@@ -14,6 +14,8 @@ from vehiclemor.files import read_regular
 # Bytes of a file, characters of a line in it, and parts of a key: the parser takes a time that
 # grows with their square.
 MOST_BYTES, LONGEST, MOST_PARTS = 1_000_000, 1000, 8
+# Things that are wrong with a file, of which all are named.
+MOST_NAMED = 3
 PART = r"""\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 LONG_KEY = re.compile(f"(?:{PART}){{{MOST_PARTS}}}")
 Schema = TypeVar("Schema", bound="FileSchema")
@@ -73,10 +75,10 @@ def fitting(path: Path, content: dict[str, Any], schema: type[Schema]) -> Schema
     try:
         return schema.model_validate(content)
     except ValidationError as error:
-        # The first thing that is wrong becomes the line.
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "top level"
-        more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
-        message = complaint(first)
-        colon = "" if message.startswith("is ") else ":"
-        raise FileError(f"{path}: {where}{colon} {message}{more}") from None
+        lines = []
+        for wrong in error.errors()[:MOST_NAMED]:
+            where, message = ".".join(map(str, wrong["loc"])) or "top level", complaint(wrong)
+            lines.append(f"{where}{'' if message.startswith('is ') else ':'} {message}")
+        more = error.error_count() - len(lines)
+        ending = f" (and {more} more)" if more else ""
+        raise FileError(f"{path}: {'; '.join(lines)}{ending}") from None

@@ -10,7 +10,7 @@ from tests.study.small import small_study
 from vehiclemor.cli import main
 from vehiclemor.exceptions import VehiclemorError
 
-GRID = 'grid = { "parameters.tie_rod_inner.z" = [-0.1, -0.09], rank = [2, 3] }\n'
+GRID = "grid = { parameters.tie_rod_inner.z = [-0.1, -0.09], rank = [2, 3] }\n"
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ keep = "metrics"
 parameters = { roll_inertia = 250.0 }
 start = ["dropped"]
 methods = [{ method = "full_order" }, { method = "pod", settings = { rank = 4 } }]
-grid = { "parameters.sprung_mass" = [900.0, 1100.0], "parameters.initial_speed" = [25.0] }
+grid = { parameters.sprung_mass = [900.0, 1100.0], "parameters.initial_speed" = [25.0] }
 """
     found = vm.run_study(small_study(tmp_path, text, model=CAR), results=tmp_path)
     axis = found["parameters.sprung_mass"]

@@ -51,6 +51,7 @@ STUDIES = {
     ],
     STUDY: [
         ('title = "mine"\nstudies = ["absent.toml"]', "absent.toml"),
+        ("keep = 'a'\nmodel = 'x'", "title is missing; methods is missing; keep is 'a'; allowed"),
         ('title = "x"\nmodel = "x"\nstudies = ["a"]', "model is not a key of a collection: it"),
     ],
 }

@@ -130,7 +130,7 @@ def trained(points):
         (lambda v: vm.rom(CAR).rhs(vm.rom(CAR).state(), [0], v), [*NONE, np.nan, *WRONG], "time: "),
         (lambda v: vm.model(TRUCK).simulate(vm.road("C"), tolerance=v), LIMITS, "tolerance: "),
         (lambda v: vm.Signal.from_samples([0, 1], [0, 1], v), ["cubics", *WRONG], "unknown hold"),
-        (lambda v: vm.Signal.from_samples(v, [0, 1]), [range(10**12)], "not a number"),
+        (lambda v: vm.Signal.from_samples(v, [0, 1]), [range(10**12)], "signal: range(0, "),
         (lambda v: vm.Signal.from_samples([0, 1], [0, 1], name=v), [None, ""], "name is"),
         (lambda v: STEER.perturbed(amplitude=v), WRONG, "amplitude factor"),
         (lambda v: STEER.perturbed(frequency=v), [0.0, *WRONG], "frequency factor"),

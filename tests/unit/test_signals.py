@@ -86,6 +86,7 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: of_csv(COMMAS), "is separator=';' with decimal=',' meant"),
         (lambda: of_csv("time,delta\n0,1,2\n1,2,3\n"), "no CSV file: .* in line 2"),
         (lambda: of_csv(TABLE, inputs=3), "inputs is 3, not a list of names"),
+        (lambda: of_csv(f"{TABLE}2,\n3,1\n"), "log.csv: column 'delta' has no number in row 3"),
         *[(partial(BEYOND.at, t), "list of finite times") for t in (3.0, "t", [np.nan], [1j])],
         *[(partial(SQUARE.for_inputs, n), "not a list of names") for n in (3, [["s"]], np.ones(2))],
         (partial(vm.many_signals, [0, 2], [[0, 1]], output_step=1e-308), "step: 1e-308 s is below"),

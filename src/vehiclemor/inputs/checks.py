@@ -30,8 +30,18 @@ def checked_maneuver(maneuver: str | Excitation, definition: ModelDefinition) ->
 
 
 def completed(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
-    """A maneuver with all inputs of a model in its order, those that it lacks at their defaults."""
+    """A maneuver with all inputs of a model in its order, those that it lacks at their defaults.
+
+    `InputError` if it gives an optional input that runs of the model don't drive.
+    """
     names = tuple(quantity.name for quantity in definition.inputs)
+    optional = {quantity.name for quantity in definition.optional_inputs}
+    for name in maneuver.inputs:
+        if name in optional and name not in names:
+            raise InputError(
+                f"{maneuver} gives input {name}; this model of {definition.name} takes "
+                f"{', '.join(names)} alone: it is reduced from runs without {name}"
+            )
     return maneuver.for_inputs(names, tuple(q.default or 0.0 for q in definition.inputs))
 
 
@@ -41,12 +51,9 @@ def _checked(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
     names = tuple(quantity.name for quantity in definition.inputs)
     complete = completed(maneuver, definition)
     if complete.inputs != names:
-        optional = {quantity.name for quantity in definition.optional_inputs}
-        undriven = [name for name in maneuver.inputs if name in optional - {*names}]
-        hint = f": it is reduced from runs without {undriven[0]}" if undriven else ""
         raise InputError(
             f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "
-            f"{definition.name} needs {', '.join(names)}{hint}"
+            f"{definition.name} needs {', '.join(names)}"
         )
     _check_bounds(complete, definition)
     return complete

@@ -80,6 +80,15 @@ def csv_samples(
     return table[time].to_numpy(), values, [*columns]
 
 
+def check_numbers(path: Path, columns: Sequence[str], table: np.ndarray, rows: Any) -> None:
+    """Raise `InputError` if a cell of a table (rows, columns) is empty, or not finite."""
+    missing = np.argwhere(~np.isfinite(table))
+    if len(missing):
+        row, column = missing[0]
+        name = columns[column]
+        raise InputError(f"{path}: column {name!r} has no number in row {rows[row]}")
+
+
 def _check_separator(path: Path, separator: str, header: str, row: str) -> None:
     """Raise `FileError` if other characters stand between the columns of the first two lines."""
     other = [character for character in SEPARATORS if character in header.strip()]
@@ -103,7 +112,7 @@ def sample_arrays(t: Any, u: Any) -> tuple[np.ndarray, np.ndarray]:
     try:
         return real_array(t), real_array(u)
     except (TypeError, ValueError) as error:
-        raise InputError(f"samples of a signal: {one_line(error)}") from None
+        raise InputError(f"samples of a signal: {error}") from None
 
 
 def listed(given: Any, argument: str = "inputs") -> tuple[str, ...]:

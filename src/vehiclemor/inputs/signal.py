@@ -13,6 +13,7 @@ import numpy as np
 from vehiclemor.arguments import file_path, line_of_text, number, within
 from vehiclemor.exceptions import InputError, blamed
 from vehiclemor.inputs.columns import (
+    check_numbers,
     column_names,
     csv_samples,
     derivative_order,
@@ -315,6 +316,9 @@ class Signal(Excitation):
         path = file_path("path", path)
         scale = unit_factor(unit, ratio)
         times, values, names = csv_samples(path, separator, decimal, time, inputs)
+        columns = inputs.values() if isinstance(inputs, Mapping) else names
+        table = np.column_stack([times, values])
+        check_numbers(path, [time, *columns], table, range(1, len(table) + 1))
         mixed = [name for name in names if name in OF_ANOTHER_UNIT]
         if scale != 1.0 and mixed:
             raise InputError(

@@ -16,6 +16,7 @@ from vehiclemor.exceptions import ConvergenceError, InputError, VehiclemorError
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.inputs.checks import completed
 from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.inputs.maneuver import registered
 from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.provenance import attributes
 from vehiclemor.registry import choice
@@ -58,7 +59,7 @@ REPORTED = {
 
 def simulate_many(
     model: str | Model | Any,
-    signals: Sequence[Excitation],
+    signals: Sequence[str | Excitation],
     starts: Start | Sequence[Start] | None = None,
     parameters: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     *,
@@ -80,8 +81,8 @@ def simulate_many(
         preset="strongest")` is far faster.  Or whatever has a full `model` and a function
         `simulate` of a maneuver, a start and `outputs`.
     signals
-        A signal or maneuver for each run, see `many_signals`.  They have the same output times,
-        unless `times` are given.
+        A signal, maneuver or registered name for each run, see `many_signals`.  They have the same
+        output times, unless `times` are given.
     starts
         Initial condition of the full model by name, or as a state (n,), for all runs; or a list of
         these, or states (runs, n).
@@ -107,6 +108,8 @@ def simulate_many(
     """
     from joblib import cpu_count
 
+    if isinstance(signals, list | tuple):
+        signals = [registered(each) if isinstance(each, str) else each for each in signals]
     given, full = _driven(model, signals)
     runs, names = _count_of(signals, full), _names(full, outputs)
     kept, rows = _kept_times(times, signals)

@@ -119,10 +119,11 @@ def test_what_fails_is_a_result_beside_the_others(reduced, full):
 
 
 def test_maneuvers_of_different_lengths_share_chosen_times(full):
-    maneuvers = [component("maneuver", name) for name in ("step_steer", "lane_change", "multisine")]
+    names = "step_steer", "lane_change", "multisine"
+    maneuvers = [component("maneuver", name) for name in names]
     with pytest.raises(InputError, match=r"signals\[1\] has other output times"):
         vm.simulate_many(full, maneuvers)
-    found = vm.simulate_many(full, maneuvers, times=[0.0, 1.0, 2.5], outputs=["yaw", "Fz_RR"])
+    found = vm.simulate_many(full, names, times=[0.0, 1.0, 2.5], outputs=["yaw", "Fz_RR"])
     check_alone(full, maneuvers, found)
 
 

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field
 
 from vehiclemor.arguments import within
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.columns import UNITS, csv_samples
+from vehiclemor.inputs.columns import UNITS, check_numbers, csv_samples
 from vehiclemor.inputs.signal import Signal, many_signals
 from vehiclemor.inputs.steering import ramp
 from vehiclemor.registry import choice
@@ -144,11 +144,7 @@ def _read(log: Log, path: Path) -> np.ndarray:
     rows, table = np.flatnonzero(~outside) + 1, table[~outside]
     if len(table) < 2:
         raise InputError(f"{path}: {len(table)} rows lie between begin and end; two are needed")
-    missing = np.argwhere(~np.isfinite(table))
-    if len(missing):
-        row, column = missing[0]
-        name = [*columns.values()][column].column
-        raise InputError(f"{path}: column {name!r} has no number in row {rows[row]}")
+    check_numbers(path, [column.column for column in columns.values()], table, rows)
     steps = np.diff(table[:, 0])
     row, usual = int(steps.argmin()), float(np.median(steps))
     if steps[row] <= 0.0:

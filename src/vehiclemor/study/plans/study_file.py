@@ -20,6 +20,7 @@ from vehiclemor.study.plans.study_runs import (
     Group,
     Limit,
     Pair,
+    dotted,
     list_of,
     table_of,
     values,
@@ -200,6 +201,12 @@ class GridFile(StudyOfModel):
         """Number of points; one run may stand at several of them."""
         sizes = [len(values(axis)) for axis in self.grid.values()]
         return math.prod(sizes) * (len(self.start) or 1) * len(self.methods)
+
+    @field_validator("grid", mode="before")
+    @classmethod
+    def _by_dotted_name(cls, value: Any) -> Any:
+        """Names with dots may stand without quotes, which makes nested tables of them."""
+        return dotted(value) if isinstance(value, dict) else value
 
     @field_validator("grid")
     @classmethod

@@ -86,6 +86,16 @@ def values(entry: Axis) -> list[int | float | str]:
     return list(entry)
 
 
+def dotted(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Axes of nested tables, which hold neither numbers nor texts, under names with dots."""
+    axes: dict[str, Any] = {}
+    for name, axis in table.items():
+        inner = [*axis.values()] if isinstance(axis, dict) else [None]
+        nested = bool(inner) and all(isinstance(each, list | dict) for each in inner)
+        axes |= dotted(axis, f"{prefix}{name}.") if nested else {f"{prefix}{name}": axis}
+    return axes
+
+
 class Group(FileSchema):
     """Scenarios of one maneuver: every point, from every start.
 
