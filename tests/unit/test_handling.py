@@ -207,6 +207,20 @@ def test_reduced_vehicles_have_the_numbers_of_the_full_ones(name, prefix):
         assert float(value) == pytest.approx(float(full[number]), rel=1e-3), number
 
 
+# Test, steering that is not that of it, and what the line says.
+SLOW, FAST = 0.01 * np.sin(np.pi * TIMES / 3.0), 0.01 * np.sin(3.0 * TIMES)
+NO_TESTS = [
+    ("step_steer", 0.0 * ONES, "straight at the end"),
+    ("step_steer", FAST, "rise within 1 s to stay within 10%"),
+    ("step_steer", 0.01 * TIMES, "rise within 1 s to stay within 10%"),
+    ("slow_ramp_steer", FAST, "more than 25% in a second"),
+    ("sine_sweep", SLOW, "at 0.3 to 1.5 Hz"),
+    ("weave", SLOW, "to and fro twice"),
+    ("sine_with_dwell", FAST, "change its side once, and end"),
+    ("sine_with_dwell", np.abs(FAST), "change its side once, and end"),
+]
+
+
 def test_what_has_no_numbers_is_refused():
     run = run_of(TIMES, 0.01 * ONES, "lane_change")
     refused(lambda: vm.metrics(run), "lane_change", "step_steer")
@@ -216,5 +230,8 @@ def test_what_has_no_numbers_is_refused():
     refused(lambda: vm.metrics(vm.rom(WISHBONE).simulate("sine_travel"), "weave"), "no vehicle")
     lost = run_of(TIMES, 0.01 * ONES, "weave", yaw=np.where(TIMES > 2.0, np.nan, 0.0))
     refused(lambda: vm.metrics(lost), "end")
+    for name, steering, words in NO_TESTS:
+        refused(lambda name=name, u=steering: vm.metrics(run_of(TIMES, u, name)), words)
+    refused(lambda: braked("braking_in_turn", 3.0), "drives straight")
     still = vm.metrics(run_of(TIMES, 0.0 * ONES, "slow_ramp_steer"))
     assert np.isnan(still["understeer_gradient"])

@@ -76,7 +76,7 @@ def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the run is of no such maneuver, of no vehicle, or has not come to its end.
+        If the run or its input is of no such maneuver, it is of no vehicle, or has not ended.
 
     Notes
     -----

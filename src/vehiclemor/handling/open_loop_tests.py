@@ -8,8 +8,19 @@ from vehiclemor.handling.motion import Motion, first_time, slope
 RESPONSES = ("yaw_rate", "lateral_acceleration")
 # m/s^2: gradients of a steady turn are those between these lateral accelerations.
 LINEAR_RANGE = (1.0, 3.0)
-# Length (s) of the end of a step's run, whose mean is the steady value.
+# Length (s) of the end of a step's run, whose mean is the steady value; a step rises faster.
 STEADY = 1.0
+# Part of a step's steering that is on either side of its rise, and by which it may be off after it:
+# response times end at nine tenths of the answer, and gains follow the steering.
+HELD = 0.1
+# Part of a slow ramp's largest steering that may be passed in a second.  A car follows its steering
+# by 0.1 to 0.2 s: faster, and gradients would be those of its lag.
+SLOW = 0.25
+# Part of the spectrum's largest amplitude from which on the steering moves at a frequency: beside
+# that of a sine, which moves at no other, the spectrum reaches 0.22.
+MOVED = 0.25
+# m/s^2: what a road that falls to the side by 1 % asks for is no turn.
+STRAIGHT = 0.1
 # Hz: where the sweep moves the steering.
 FREQUENCIES = np.arange(3, 16) / 10.0
 # Order of the difference equation of a frequency response, and its step in s.
@@ -24,8 +35,18 @@ DISPLACEMENT_TIME = 1.07
 AFTER = 1.0
 
 
+def _require(fits: object, otherwise: str, test: str) -> None:
+    """Raise `InputError` if the inputs of a run are not those of a test."""
+    if not fits:
+        raise InputError(f"{otherwise}: the run has no numbers of a {test}")
+
+
 def steady_turn(motion: Motion) -> dict[str, float]:
     """Gradients of a slow ramp: straight lines over the lateral acceleration."""
+    size = abs(motion.steering)
+    changes = np.interp(motion.times + 1.0, motion.times, size) - size
+    slow = max(abs(changes).max(), size[0]) <= SLOW * size.max()
+    _require(slow, f"the steering changes by more than {SLOW:.0%} in a second", "slow ramp")
     acceleration = motion.lateral_acceleration
     low, high = LINEAR_RANGE
     within = (abs(acceleration) >= low) & (abs(acceleration) <= high)
@@ -44,9 +65,12 @@ def step(motion: Motion) -> dict[str, float]:
     last = times >= times[-1] - STEADY
     names = ("steering", "wheel_angle", *RESPONSES)
     steady = {name: float(np.mean(motion[name][last])) for name in names}
-    if not steady["steering"]:
-        raise InputError("the steering is straight at the end: the run has no numbers of a step")
-    half = first_time(times, motion.steering / steady["steering"], 0.5)
+    _require(steady["steering"], "the steering is straight at the end", "step")
+    ratio = motion.steering / steady["steering"]
+    begun, half, risen = (first_time(times, ratio, part) for part in (HELD, 0.5, 1.0 - HELD))
+    held = risen - begun < STEADY and abs(ratio[times > risen] - 1.0).max() <= HELD
+    missed = f"the steering does not rise within {STEADY:g} s to stay within {HELD:.0%} of its end"
+    _require(held, missed, "step")
     yaw_rate, lateral = (motion[name] / steady[name] for name in RESPONSES)
     return {
         "yaw_rate_gain": steady["yaw_rate"] / steady["wheel_angle"],
@@ -61,7 +85,7 @@ def frequency_response(motion: Motion) -> dict[str, np.ndarray]:
     """Gain and phase at `FREQUENCIES` of yaw rate and lateral acceleration over the wheel angle.
 
     A difference equation with delays of `DELAY` is fitted to all samples.  Fourier spectra of a
-    sweep that ends in motion are wrong by 10 %.
+    sweep that ends in motion are wrong by 10 %.  Not a number where the steering does not move.
     """
     spacing = motion.times[1] - motion.times[0]
     delay = max(round(DELAY / spacing), 1)
@@ -69,6 +93,11 @@ def frequency_response(motion: Motion) -> dict[str, np.ndarray]:
     if len(rows) <= 2 * ORDER:
         raise InputError("the run is too short for a frequency response")
     back = np.exp(-2j * np.pi * FREQUENCIES * delay * spacing)
+    moved = abs(np.exp(-2j * np.pi * np.outer(FREQUENCIES, motion.times)) @ motion.wheel_angle)
+    largest = abs(np.fft.rfft(motion.wheel_angle, 8 * len(motion.times))).max()
+    reached = moved > MOVED * largest
+    span = f"{FREQUENCIES[0]:g} to {FREQUENCIES[-1]:g} Hz"
+    _require(reached.any(), f"the steering does not move at {span}", "sweep")
     numbers: dict[str, np.ndarray] = {}
     for name in RESPONSES:
         response, driven = motion[name], motion.wheel_angle
@@ -77,15 +106,16 @@ def frequency_response(motion: Motion) -> dict[str, np.ndarray]:
         fitted = np.linalg.lstsq(np.column_stack(past), response[rows], rcond=None)[0]
         powers = back[:, None] ** np.arange(ORDER + 1)
         ratio = powers @ fitted[ORDER:] / (1.0 - powers[:, 1:] @ fitted[:ORDER])
-        numbers[f"{name}_gain"] = np.abs(ratio)
-        numbers[f"{name}_phase"] = np.unwrap(np.angle(ratio))
+        numbers[f"{name}_gain"] = np.where(reached, np.abs(ratio), np.nan)
+        numbers[f"{name}_phase"] = np.where(reached, np.unwrap(np.angle(ratio)), np.nan)
     return numbers
 
 
 def weave(motion: Motion) -> dict[str, float]:
     """On-centre gain and hysteresis of whole periods, without the first, which sets in."""
     begins = _rises(motion.steering)
-    periods = slice(begins[0], begins[-1] + 1) if len(begins) > 1 else slice(0)
+    _require(len(begins) > 1, "the steering does not go to and fro twice", "weave")
+    periods = slice(begins[0], begins[-1] + 1)
     angle = motion.wheel_angle[periods]
     near = abs(angle) <= ON_CENTRE * abs(angle).max(initial=0.0)
     numbers: dict[str, float] = {}
@@ -121,6 +151,10 @@ def steering_interval(motion: Motion) -> tuple[float, float]:
 def sine_with_dwell(motion: Motion) -> dict[str, float]:
     """Ratios of the yaw rate after the steering, displacement after its beginning."""
     begin, end = steering_interval(motion)
+    parts = motion.steering / (abs(motion.steering).max() or 1.0)
+    sides = np.sign(parts[abs(parts) > BEGUN])
+    once = np.count_nonzero(np.diff(sides)) == 1 and abs(parts[-1]) <= BEGUN
+    _require(once, "the steering does not change its side once, and end", "sine with dwell")
     side = np.sign(motion.at("wheel_angle", begin))
     reversed_steering = motion.steering * np.sign(motion.at("steering", begin)) < 0.0
     turned_back = reversed_steering & (motion.times <= end)
@@ -140,8 +174,7 @@ def sine_with_dwell(motion: Motion) -> dict[str, float]:
 def _begin(motion: Motion) -> int:
     """The last sample before a brake acts; `InputError` of a run without any."""
     braked = (motion.of_wheels("brake_torque") > 0.0).any(axis=0)
-    if not braked.any():
-        raise InputError("no brake acts in the run: it has no numbers of a braking test")
+    _require(braked.any(), "no brake acts", "braking test")
     return max(int(np.argmax(braked)) - 1, 0)
 
 
@@ -165,6 +198,8 @@ def braking_in_turn(motion: Motion) -> dict[str, float]:
     begin = float(motion.times[_begin(motion)])
     then = begin + AFTER
     speed, yaw_rate = motion.at("speed", begin), motion.at("yaw_rate", begin)
+    turns = abs(speed * yaw_rate) >= STRAIGHT
+    _require(turns, "the vehicle drives straight when a brake acts first", "turn")
     # The circle goes on; its centre lies to the left of the course, or at a negative radius right.
     course, radius = motion.at("yaw", begin) + motion.at("sideslip", begin), speed / yaw_rate
     centre = 1j * radius * np.exp(1j * course)
