@@ -58,9 +58,11 @@ def of_csv(text, **given):
         return vm.Signal.from_csv(path, **given)
 
 
-def of_inputs(**given):
-    signal = vm.Signal.from_samples([0.0, 1.0], [0.0, 1.0], **given)
-    return signal.for_inputs(("s", "s_dot", "s_ddot"))
+RACK = "s", "s_dot", "s_ddot"
+
+
+def of_inputs(values=(0.0, 1.0), **given):
+    return vm.Signal.from_samples([0.0, 1.0], values, **given).for_inputs(RACK)
 
 
 TABLE = "time,delta\n0,1\n1,2\n"
@@ -80,6 +82,10 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: vm.Signal.from_samples(*HUGE, "cubic"), "polynomials .* are not finite"),
         (lambda: of_inputs(inputs=["s"]), "derivatives of s follow from a cubic hold alone"),
         (of_inputs, "1 columns without names"),
+        *[
+            (partial(of_inputs, np.eye(2, 3), inputs=n), "s_dot is not the rate")
+            for n in ((), RACK)
+        ],
         (lambda: vm.simulate(CAR, maneuver=BEYOND), r"input delta is 1\.08 rad at t = 0\.54 s"),
         (lambda: of_csv("t,delta\n0,1\n1,2\n"), "no column 'time': set time= to one of t, d"),
         (lambda: of_csv(COMMAS, separator=";"), "'time' holds '0,5', not a number: is decimal=','"),
@@ -206,7 +212,7 @@ def test_factors_scale_time_and_values(hold):
 def test_columns_are_named_and_what_is_not_given_is_zero_or_a_derivative():
     t = np.linspace(0.0, 3.0, 61)
     rack = vm.Signal.from_samples(t, np.sin(t), "cubic", inputs=["s"])
-    complete = rack.for_inputs(("s", "s_dot", "s_ddot"))
+    complete = rack.for_inputs(RACK)
     spline, places = CubicSpline(t, np.sin(t)), np.linspace(0.0, 3.0, 101)
     wanted = np.column_stack([spline(places, order) for order in range(3)])
     np.testing.assert_allclose(complete.at(places), wanted, atol=1e-11)

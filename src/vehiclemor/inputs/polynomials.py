@@ -9,6 +9,7 @@ Of samples: one polynomial between two of them, and the samples at which a time 
 anew.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
 
@@ -17,6 +18,7 @@ import numpy as np
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.polynomial_loops import EQUIDISTANT, Pieces
+from vehiclemor.multibody.quantities import integral_of
 
 ACCURACY = 1e-11
 MOST_PIECES = 1 << 15
@@ -33,6 +35,9 @@ REST = 0.1
 SWING = 1e-6
 # Runs that are computed together: their arrays fit into the cache of a processor.
 TOGETHER = 1000
+# Part of an input's range by which the integral of its rate may be off.  A rate of zero is off by a
+# half at least, samples 20 ms apart of the registered maneuvers are by less than a tenth.
+RATES, ROUNDING = 0.25, 1e-9
 INFINITE = "samples of a signal: the polynomials through them are not finite"
 
 
@@ -263,6 +268,21 @@ def mark_rests(
         swings &= resting
         breaks[:, :-1] |= swings
         breaks[:, 1:] |= swings
+
+
+def check_rates(pieces: Pieces, names: Sequence[str]) -> None:
+    """Raise `InputError` if an input is not the rate of the one whose rate it is named."""
+    for column, name in enumerate(names):
+        if (lower := integral_of(name)) in names:
+            coefficients = pieces.coefficients[:, :, [names.index(lower), column]]
+            values, rates = np.vstack([coefficients[:, 0], coefficients[-1:].sum(axis=1)]).T
+            integral = np.cumsum(0.5 * (rates[1:] + rates[:-1]) * piece_lengths(pieces))
+            off, span = abs(integral - (values[1:] - values[0])).max(), np.ptp(values)
+            if off > RATES * span + ROUNDING:
+                raise InputError(
+                    f"{name} is not the rate of {lower}: its integral is off by {off:.3g}, where "
+                    f"{lower} moves by {span:.3g}; left out, it follows by a cubic hold"
+                )
 
 
 def piece_lengths(pieces: Pieces) -> np.ndarray:

@@ -33,7 +33,13 @@ from vehiclemor.inputs.excitation import (
     values_at,
 )
 from vehiclemor.inputs.polynomial_loops import Pieces
-from vehiclemor.inputs.polynomials import HOLDS, interpolants, piece_lengths, time_derivative
+from vehiclemor.inputs.polynomials import (
+    HOLDS,
+    check_rates,
+    interpolants,
+    piece_lengths,
+    time_derivative,
+)
 from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, integral_of
 from vehiclemor.registry import choice
 
@@ -125,7 +131,8 @@ class Signal(Excitation):
         Raises
         ------
         InputError
-            If times don't increase, a value isn't finite, or shapes don't fit.
+            If times don't increase, a value isn't finite, an input isn't the rate of another that
+            it is named after, or shapes don't fit.
         """
         times, values = sample_arrays(t, u)
         how: dict[str, Any] = {"inputs": inputs, "output_step": output_step, "name": name}
@@ -220,6 +227,7 @@ class Signal(Excitation):
         needed = ", ".join(names)
         if not self.inputs:
             if columns == len(names):
+                check_rates(self.nominal_pieces, names)
                 return replace(self, inputs=names)
             raise InputError(
                 f"{self} has {columns} columns without names, the model needs {needed}: "
@@ -366,6 +374,8 @@ def many_signals(
     if not line_of_text("name", name):
         raise InputError("name is empty")
     runs = interpolants(times, values, hold)
+    for pieces in runs:
+        check_rates(pieces, names)
     duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
     about = name, f"{len(times)} samples, {hold} hold", names, duration
     output_samples = _output_samples(duration, output_step)
