@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from vehiclemor.study.scenario import Scenario
 
 RESULTS = Path("results")
+# Method that stands for the reduced model that ships.
+SHIPPED = "shipped"
 
 
 def models() -> dict[str, str]:
@@ -188,7 +190,7 @@ def simulate(
     model
         Registered name, or a model of `model()`.
     method
-        Registered name, see `methods()`.
+        Registered name, see `methods()`; or `shipped`, the model of `vm.rom`, of a model by name.
     maneuver
         Registered name, maneuver or signal; the model's maneuver by default.
     start
@@ -220,17 +222,24 @@ def simulate(
     """
     from vehiclemor.simulation.build import kept_build
     from vehiclemor.simulation.model import Model
-    from vehiclemor.study.evaluate import evaluate
+    from vehiclemor.study.evaluate import evaluate, evaluate_shipped
     from vehiclemor.study.experiment import complete_settings, make_experiment
     from vehiclemor.study.plans.training import training_set as training_of
 
     ready = model if isinstance(model, Model) else kept_build(model)
     flag("errors", errors)
-    chosen = complete_settings(ready, method, settings, preset)
     test = _scenario(ready, maneuver, start, (frequency, amplitude))
-    trained = training_of(ready, method, training, test, _pairs(training_set))
-    experiment = make_experiment(ready, method, chosen, trained, (test,))
-    dataset = evaluate(experiment, ready, errors=errors)
+    if method == SHIPPED:
+        chosen = settings or len(training_set) or (preset, training) != ("recommended", "matched")
+        if chosen or not isinstance(model, str):
+            with_no = "give a model by its name, no settings, preset, training or parameters"
+            raise InputError(f"method {SHIPPED} is fitted already: {with_no}")
+        dataset = evaluate_shipped(model, test, errors=errors)
+    else:
+        chosen = complete_settings(ready, method, settings, preset)
+        trained = training_of(ready, method, training, test, _pairs(training_set))
+        experiment = make_experiment(ready, method, chosen, trained, (test,))
+        dataset = evaluate(experiment, ready, errors=errors)
     errors_of = {"unreachable": UnreachableError, "rejected": InputError}
     if (status := str(dataset["status"].item())) in errors_of:
         raise errors_of[status](str(dataset["message"].item()))

@@ -106,6 +106,11 @@ def test_a_log_is_simulated_as_its_signal_and_drawn(tmp_path, printed, monkeypat
     with xr.open_dataset("run.nc") as written:
         np.testing.assert_allclose(written["coordinates"], expected["coordinates"], atol=1e-12)
     assert "written: run-histories.png" in printed("plot", "run.nc")
+    printed("simulate", "double_wishbone", *log, "--method", "shipped", "--out", "run.nc", "--plot")
+    run, full = (model("double_wishbone").simulate(signal) for model in (vm.rom, vm.model))
+    with xr.open_dataset("run.nc") as written:
+        np.testing.assert_array_equal(written["outputs"], run.outputs)
+        np.testing.assert_allclose(written["rms_error"], vm.errors(run, full)["rms_error"])
     assert main(["simulate", "double_wishbone", "--csv", "unit=mm"]) == 2
     assert "--maneuver FILE.csv" in capsys.readouterr().err
 

@@ -29,6 +29,7 @@ WRONG = [
     (f"{TRAVEL} --out none/run.nc", "none/run.nc"),
     (f"{TRAVEL} --plot a.txt", "a.txt"),
     (f"{POD} bounds=1 trust=off", "takes bounds and trust"),
+    *[(f"{TRAVEL} --method shipped --{s}", "fitted already") for s in ("set a=1", "training set")],
     (f"{TRAVEL} --csv", "--csv"),
     ("export double_wishbone --to c --input", "--input"),
     ("metrics double_wishbone", "no vehicle"),

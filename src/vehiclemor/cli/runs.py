@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 import vehiclemor as vm
-from vehiclemor.api import RESULTS
+from vehiclemor.api import RESULTS, SHIPPED
 from vehiclemor.cli.options import (
     FAILED,
     Json,
@@ -32,9 +32,6 @@ from vehiclemor.exporting.export import (
 )
 from vehiclemor.report.labels import Kind
 from vehiclemor.report.printing import wrapped
-
-# Method that stands for the model that ships.
-SHIPPED = "shipped"
 
 
 @Parameter(name="*")
@@ -92,7 +89,7 @@ def simulate(
     settings: Settings = None,
     driven: Driven = Driven(),
     preset: str = "recommended",
-    training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = ("matched",),
+    training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = (),
     parameter: Parameters = None,
     shown: Shown = Shown(),
 ) -> int:
@@ -103,7 +100,7 @@ def simulate(
     model
         Registered name.
     method
-        Registered name.
+        Registered name; shipped: the reduced model that ships with the package.
     preset
         Preset of the method's settings.
     training
@@ -119,14 +116,14 @@ def simulate(
         result_file("--out", shown.out)
     ready = vm.model(model, key_values("--parameter", parameter))
     dataset = vm.simulate(
-        ready,
+        ready if parameter else model,
         method,
         maneuver=_maneuver(driven.maneuver, driven.csv),
         start=driven.start,
         frequency=driven.frequency,
         amplitude=driven.amplitude,
         preset=preset,
-        training=training,
+        training=training or "matched",
         **chosen,
     )
     from vehiclemor.report.labels import tabled_outputs

@@ -17,6 +17,7 @@ from vehiclemor.progress import first_use
 from vehiclemor.reduction.error_estimate import judged as judged_by_error
 from vehiclemor.reduction.fallback import with_fallback
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
+from vehiclemor.reduction.reduced_model import rom as shipped
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.trust import InputRange, input_range
 from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
@@ -25,7 +26,7 @@ from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Trajectory
-from vehiclemor.study.experiment import Experiment, default_settings, for_method
+from vehiclemor.study.experiment import Experiment, default_settings, for_method, make_experiment
 from vehiclemor.study.result import Outcome, result_dataset
 from vehiclemor.study.scenario import (
     Overrides,
@@ -113,6 +114,20 @@ def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> 
         and in_training(model, experiment.training, test[0])
     )
     return result_dataset(tested, experiment, outcomes, fit.reduced, seen)
+
+
+def evaluate_shipped(name: str, scenario: Scenario, *, errors: bool = True) -> xr.Dataset:
+    """As `evaluate`, of the reduced model that ships for a model of this name."""
+    rom = shipped(name)
+    experiment = make_experiment(rom.model, rom.method, {**rom.settings}, (), (scenario,))
+
+    def solved() -> Outcome:
+        reference = recent_reference(rom.model, scenario) if errors else None
+        # The first run loads machine code.
+        rom.simulate(scenario.maneuver, scenario.start)
+        return Outcome(rom.simulate(scenario.maneuver, scenario.start), reference)
+
+    return result_dataset(rom.model, experiment, [attempt(solved)], rom.reduced)
 
 
 def model_of(experiment: Experiment) -> Model:
