@@ -323,10 +323,7 @@ def tire_forces(x: np.ndarray, delta: complex, p: Numbers = PARAMETERS) -> dict[
 
 
 def energy(
-    x: np.ndarray,
-    p: Numbers = PARAMETERS,
-    delta: float = 0.0,
-    driven: Driven | None = None,
+    x: np.ndarray, p: Numbers = PARAMETERS, delta: float = 0.0, driven: Driven | None = None
 ) -> float:
     """Kinetic and potential energy."""
     now, d = Instant(np.asarray(x), delta, p, driven), derived(p)

@@ -9,12 +9,7 @@ from claims import CRITERIA, claim_rows, stored_results
 from tests.models import MODELS, VEHICLES
 from vehiclemor.cli import main
 from vehiclemor.report import comparison
-from vehiclemor.report.comparison import (
-    at_published_start,
-    cost_table,
-    paper_comparison,
-    timing_of,
-)
+from vehiclemor.report.comparison import at_published_start, cost_table, paper_comparison, timing_of
 from vehiclemor.report.findings import LARGEST_SPREAD, judged
 from vehiclemor.report.printed_numbers import TIMING, time_saved
 from vehiclemor.report.published import load_published

@@ -24,12 +24,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import vehiclemor as vm
 from tests.study.small import assert_same, small_study
 from vehiclemor.cli import main
-from vehiclemor.exceptions import (
-    ConvergenceError,
-    InputError,
-    MachineError,
-    UnreachableError,
-)
+from vehiclemor.exceptions import ConvergenceError, InputError, MachineError, UnreachableError
 from vehiclemor.failure import Failure
 from vehiclemor.files import TEMPORARY, temporary_path
 from vehiclemor.netcdf_file import write_dataset

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import vehiclemor as vm
-from tests.models import CAR, WISHBONE
+from tests.models import CAR, FIDELITY, WISHBONE
 from tests.refusing import refused
 from vehiclemor.inputs.maneuver import Maneuver
 
@@ -75,16 +75,8 @@ def trained(points):
             "above the largest allowed",
         ),
         # The sprung mass hangs over an axle: the wheels at the other end had to hold it down.
-        (
-            lambda v: vm.model(CAR, {"front_axle_distance": v}),
-            [0.05],
-            "rear wheels leave the ground",
-        ),
-        (
-            lambda v: vm.model("high_fidelity_vehicle", {"tie_rod_outer": v}),
-            [[-150, 770, -120]],
-            "millimetres",
-        ),
+        (lambda v: vm.model(CAR, {"front_axle_distance": v}), [0.05], "rear wheels leave the"),
+        (lambda v: vm.model(FIDELITY, {"tie_rod_outer": v}), [[-150, 770, -120]], "millimetres"),
         # No body has them: the largest moment is at most the sum of the others.
         (
             lambda v: vm.model(CAR, v),

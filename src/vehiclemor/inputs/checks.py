@@ -32,29 +32,25 @@ def checked_maneuver(maneuver: str | Excitation, definition: ModelDefinition) ->
 def completed(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
     """A maneuver with all inputs of a model in its order, those that it lacks at their defaults.
 
-    `InputError` if it gives an optional input that runs of the model don't drive.
+    `InputError` if it gives others.
     """
     names = tuple(quantity.name for quantity in definition.inputs)
+    needed = f"{definition.name} needs {', '.join(names)}"
     optional = {quantity.name for quantity in definition.optional_inputs}
     for name in maneuver.inputs:
         if name in optional and name not in names:
-            raise InputError(
-                f"{maneuver} gives input {name}; this model of {definition.name} takes "
-                f"{', '.join(names)} alone: it is reduced from runs without {name}"
-            )
-    return maneuver.for_inputs(names, tuple(q.default or 0.0 for q in definition.inputs))
+            alone = f"alone: it is reduced from runs without {name}"
+            raise InputError(f"{maneuver} gives input {name}, {needed} {alone}")
+    complete = maneuver.for_inputs(names, tuple(q.default or 0.0 for q in definition.inputs))
+    if complete.inputs != names:
+        raise InputError(f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, {needed}")
+    return complete
 
 
 # A maneuver is checked once for all its runs, and so is a signal that has been completed.
 @cached
 def _checked(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
-    names = tuple(quantity.name for quantity in definition.inputs)
     complete = completed(maneuver, definition)
-    if complete.inputs != names:
-        raise InputError(
-            f"{maneuver} gives inputs {', '.join(maneuver.inputs)}, "
-            f"{definition.name} needs {', '.join(names)}"
-        )
     _check_bounds(complete, definition)
     return complete
 

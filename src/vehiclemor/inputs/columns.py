@@ -85,8 +85,7 @@ def check_numbers(path: Path, columns: Sequence[str], table: np.ndarray, rows: A
     missing = np.argwhere(~np.isfinite(table))
     if len(missing):
         row, column = missing[0]
-        name = columns[column]
-        raise InputError(f"{path}: column {name!r} has no number in row {rows[row]}")
+        raise InputError(f"{path}: column {columns[column]!r} has no number in row {rows[row]}")
 
 
 def _check_separator(path: Path, separator: str, header: str, row: str) -> None:

@@ -131,8 +131,7 @@ class Signal(Excitation):
         Raises
         ------
         InputError
-            If times don't increase, a value isn't finite, an input isn't the rate of another that
-            it is named after, or shapes don't fit.
+            If times don't increase, a value isn't finite, a rate is wrong, or shapes don't fit.
         """
         times, values = sample_arrays(t, u)
         how: dict[str, Any] = {"inputs": inputs, "output_step": output_step, "name": name}

@@ -70,8 +70,7 @@ def test_kernels_are_the_specified_residual_and_its_derivatives(model, program, 
 
 
 @pytest.mark.parametrize(
-    ("result", "size", "named"),
-    [(1, 2, "1"), (sp.nan, 1, "nan"), (y, 1, "y")],
+    ("result", "size", "named"), [(1, 2, "1"), (sp.nan, 1, "nan"), (y, 1, "y")]
 )
 def test_results_that_are_none_are_named(result, size, named):
     with pytest.raises(ValueError, match=rf"\b{named}\b"):

@@ -9,10 +9,7 @@ from scipy.sparse.linalg import spsolve
 import vehiclemor as vm
 from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError
 from vehiclemor.inputs.maneuver import Maneuver, smooth
-from vehiclemor.simulation.structures.model import (
-    first_samples,
-    relative_error,
-)
+from vehiclemor.simulation.structures.model import first_samples, relative_error
 
 TRUCK = "flexible_truck"
 

@@ -186,7 +186,7 @@ class GridFile(StudyOfModel):
     keep: Literal["trajectories", "metrics"] = Field(
         "trajectories", description="histories and errors, or errors alone"
     )
-    grid: dict[str, Axis] = table_of(
+    grid: Annotated[dict[str, Axis], BeforeValidator(dotted)] = table_of(
         "dimension -> values; frequency_factor, amplitude_factor, parameters.NAME, "
         "maneuver, start, training, or any setting"
     )
@@ -201,12 +201,6 @@ class GridFile(StudyOfModel):
         """Number of points; one run may stand at several of them."""
         sizes = [len(values(axis)) for axis in self.grid.values()]
         return math.prod(sizes) * (len(self.start) or 1) * len(self.methods)
-
-    @field_validator("grid", mode="before")
-    @classmethod
-    def _by_dotted_name(cls, value: Any) -> Any:
-        """Names with dots may stand without quotes, which makes nested tables of them."""
-        return dotted(value) if isinstance(value, dict) else value
 
     @field_validator("grid")
     @classmethod

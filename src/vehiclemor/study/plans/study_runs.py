@@ -86,13 +86,14 @@ def values(entry: Axis) -> list[int | float | str]:
     return list(entry)
 
 
-def dotted(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Axes of nested tables, which hold neither numbers nor texts, under names with dots."""
+def dotted(table: Any) -> Any:
+    """Axes by names with dots, which make nested tables in TOML where they stand without quotes."""
+    if not isinstance(table, dict) or not table or table.keys() & Span.model_fields.keys():
+        return table
     axes: dict[str, Any] = {}
     for name, axis in table.items():
-        inner = [*axis.values()] if isinstance(axis, dict) else [None]
-        nested = bool(inner) and all(isinstance(each, list | dict) for each in inner)
-        axes |= dotted(axis, f"{prefix}{name}.") if nested else {f"{prefix}{name}": axis}
+        inner = dotted(axis)
+        axes |= {name: axis} if inner is axis else {f"{name}.{key}": inner[key] for key in inner}
     return axes
 
 

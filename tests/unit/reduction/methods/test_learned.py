@@ -16,13 +16,7 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.steering import lane_change
 from vehiclemor.reduction.learned_model import TrainingData, stepped
 from vehiclemor.reduction.methods.learners import RIDGES
-from vehiclemor.reduction.methods.single_track import (
-    BODY,
-    TIRES,
-    driven,
-    fitted_constants,
-    rates,
-)
+from vehiclemor.reduction.methods.single_track import BODY, TIRES, driven, fitted_constants, rates
 from vehiclemor.reduction.methods.trajectory_network import in_lanes
 from vehiclemor.reduction.vehicle.linear_modes import slow_modes
 from vehiclemor.reduction.vehicle.shape import VehicleShape
