@@ -49,12 +49,7 @@ def list_components(
     print(wrapped("vehiclemor show NAME says more, show study-schema how to write a study", 0, 2))
 
 
-def show(
-    name: str,
-    *,
-    every: All = False,
-    json_output: Json = False,
-) -> None:
+def show(name: str, *, every: All = False, json_output: Json = False) -> None:
     """Show what a name declares: parameters, settings, inputs, outputs, grid.
 
     Parameters

@@ -10,15 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vehiclemor.arguments import (
-    count,
-    line_of_text,
-    loop_array,
-    number,
-    quoted,
-    real_array,
-    within,
-)
+from vehiclemor.arguments import count, line_of_text, loop_array, number, quoted, real_array, within
 from vehiclemor.exceptions import InputError, PlugInError, blamed
 from vehiclemor.inputs.excitation import (
     FACTORS,

@@ -108,11 +108,9 @@ def simulate_many(
     """
     from joblib import cpu_count
 
-    if isinstance(signals, list | tuple):
-        signals = [registered(each) if isinstance(each, str) else each for each in signals]
-    given, full = _driven(model, signals)
-    runs, names = _count_of(signals, full), _names(full, outputs)
-    kept, rows = _kept_times(times, signals)
+    given, full, driven = _driven(model, signals)
+    runs, names = _count_of(driven, full), _names(full, outputs)
+    kept, rows = _kept_times(times, driven)
     begins = _starts_of(starts, runs, full)
     model_of = _models(given, full, parameters, runs)
     threads = cpu_count() if jobs is None else count("jobs", jobs, most=MOST_JOBS)
@@ -125,7 +123,7 @@ def simulate_many(
 
     def written(run: int) -> tuple:
         """What else there is of a run, whose values are written."""
-        done = attempt(lambda: _whole_run(model_of(run), signals[run], begins[run], how))
+        done = attempt(lambda: _whole_run(model_of(run), driven[run], begins[run], how))
         values[run] = np.nan if isinstance(done, Failure) else done.outputs[rows[run]]
         return _report(done, full)
 
@@ -135,12 +133,14 @@ def simulate_many(
     with one_thread(), ThreadPoolExecutor(threads, "vehiclemor") as pool:
         found = list(itertools.chain(*pool.map(reports, range(0, runs, CHUNK))))
     return _dataset(full, list(names), kept, values, found).assign_attrs(
-        _about(given, full, signals)
+        _about(given, full, driven)
     )
 
 
-def _driven(model: Any, signals: Sequence[Excitation]) -> tuple[Any, Model]:
-    """What is to run, and its full model; a full one is driven by the inputs of all signals."""
+def _driven(model: Any, signals: Any) -> tuple[Any, Model, Any]:
+    """What is to run, its full model and what drives it, all inputs of which a full one has."""
+    if isinstance(signals, list | tuple):
+        signals = [registered(each) if isinstance(each, str) else each for each in signals]
     given = build(model) if isinstance(model, str) else model
     full = getattr(given, "model", given)
     if not isinstance(full, Model):
@@ -148,7 +148,7 @@ def _driven(model: Any, signals: Sequence[Excitation]) -> tuple[Any, Model]:
     is_list = isinstance(signals, Sequence) and all(isinstance(s, Excitation) for s in signals)
     if given is full and is_list:
         given = full = full.driving([name for signal in signals for name in signal.inputs])
-    return given, full
+    return given, full, signals
 
 
 def _judgement(given: Any, bounds: Any, trust: str) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
     times, seconds = _measured(experiments, (CASE_ROUNDS, CASE_ROUNDS), what, finished)
     dataset = dataset.merge(times.isel(scenario=0, drop=True))
     columns: dict[str, object] = {
-        "tolerance": [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()],
+        "tolerance": [float(e.settings.get("tolerance", np.nan)) for e in experiments.values()]
     }
     # Round by round, so that a burst of other load on the machine hits both alike.
     calls = seconds[:, :, 0, CALL]
@@ -110,9 +110,7 @@ def timed_cases(experiments: Mapping[str, Experiment]) -> xr.Dataset:
 
 
 def timed_tests(
-    experiments: Mapping[str, Experiment],
-    finished: np.ndarray,
-    what: str = "test set",
+    experiments: Mapping[str, Experiment], finished: np.ndarray, what: str = "test set"
 ) -> xr.Dataset:
     """Time experiments on their test scenarios, which are the same for all.
 
@@ -148,10 +146,7 @@ def _measured(
 
 @one_thread()
 def _rounds(
-    experiments: Sequence[Experiment],
-    rounds: tuple[int, int],
-    what: str,
-    finished: np.ndarray,
+    experiments: Sequence[Experiment], rounds: tuple[int, int], what: str, finished: np.ndarray
 ) -> tuple[np.ndarray, list[float]]:
     """Seconds of runs (rounds, experiments, scenarios, parts of `Seconds`), and of fits.
 
