@@ -3,7 +3,6 @@
 import errno
 import logging
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -183,7 +182,7 @@ def test_a_study_is_followed_from_nothing_to_its_end(study, tmp_path, capsys, pr
     assert not out.exists()
     ends, *_ = counted_ends(run_studies(str(study), out)["small"]).split(";")
     assert main(["status", str(study), "--results", str(out)]) == 0
-    assert re.search(r" ok \(\d+ untrusted\)", ends)
+    assert " untrusted)" in ends
     assert ends in capsys.readouterr().out
     found = vm.status(study, out)["small"]
     assert (found.runs, found.done, found.to_do) == (RUNS, RUNS, 0)

@@ -217,7 +217,7 @@ NO_TESTS = [
     ("sine_sweep", SLOW, "at 0.3 to 1.5 Hz"),
     ("weave", SLOW, "to and fro twice"),
     ("sine_with_dwell", FAST, "change its side once, and end"),
-    ("sine_with_dwell", np.abs(FAST), "change its side once, and end"),
+    ("straight_braking", FAST, "no brake acts"),
 ]
 
 

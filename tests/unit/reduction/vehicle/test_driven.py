@@ -87,9 +87,10 @@ def test_the_mirror_image_of_a_driven_run_is_one(rom):
             for kind, pair in sides.items()
             for side, torque in zip("LR"[::sign], pair, strict=True)
         }
-        inputs = {steering: rise(sign * size)}
+        inputs = {steering: rise(sign * size)(TIMES)}
         if f"{steering}_dot" in rom.inputs:
-            inputs |= {f"{steering}_dot": 0.0, f"{steering}_ddot": 0.0}
+            rate = np.gradient(inputs[steering], TIMES)
+            inputs |= {f"{steering}_dot": rate, f"{steering}_ddot": np.gradient(rate, TIMES)}
         runs.append(simulated(rom, signal(rom, **inputs, **torques), 20.0)[0])
     one, other = runs
     assert np.abs(one["lateral_position"]).max() > 1.0
