@@ -87,13 +87,12 @@ def test_a_run_is_judged_by_the_bounds_that_are_given():
     for wrong in ({"yow": 1.0}, {"yaw": 0.0}, {"yaw": ("mean", 1.0)}, {"yaw": 1e-300}, 3.0, {}):
         with pytest.raises(InputError):
             rom.simulate(bounds=wrong)
-    truck = vm.reduce("flexible_truck", "craig_bampton")
-    with pytest.raises(InputError, match="not estimated"):
-        truck.simulate(bounds={"driver_acceleration": 1.0})
-    full = vm.reduce(CAR, "full_order")
-    for model, how in ((rom, {"trust": "off"}), (full, {}), (vm.reduce(CAR, "replay"), {})):
-        with pytest.raises(InputError, match="trust" if how else "not estimated"):
-            model.simulate(bounds={"yaw": 1.0}, **how)
+    with pytest.raises(InputError, match="trust"):
+        rom.simulate(bounds={"yaw": 1.0}, trust="off")
+    for name, method in ((CAR, "full_order"), (CAR, "replay"), ("flexible_truck", "craig_bampton")):
+        model = vm.reduce(name, method)
+        with pytest.raises(InputError, match="not estimated"):
+            model.simulate(bounds={model.model.outputs[0]: 1.0})
 
 
 def test_an_error_that_passes_its_bound_by_rounding_has_a_message():
@@ -135,8 +134,7 @@ def test_it_can_be_left_out():
     assert (run.status, run.trust, run.error_estimate) == ("ok", None, None)
     assert run.remark == "its error was not estimated"
     np.testing.assert_array_equal(run.outputs, rom.simulate().outputs)
-    times = np.linspace(0.0, 2.0, 101)
-    many = vm.simulate_many(rom, vm.many_signals(times, [0.01 * times]), trust="off")
+    many = vm.simulate_many(rom, ["lane_change"], trust="off")
     assert many["remark"].item() == "its error was not estimated"
     with pytest.raises(InputError, match="trust"):
         rom.simulate(trust="none")
@@ -147,30 +145,29 @@ def test_what_can_not_be_followed_is_not_trusted():
     thrown = rom.model.start()
     thrown[rom.model.definition.states.index("phi")] = 0.9
     run = rom.simulate(start=thrown)
-    assert run.status == "untrusted"
-    assert run.trust.indicator > 10.0
+    assert (run.status, run.trust.indicator > 10.0) == ("untrusted", True)
 
 
 def test_violations_of_a_start_decay_as_those_of_the_full_model():
-    rom = shipped("high_fidelity_vehicle")
+    rom = shipped(RACK)
     bent = rom.model.start()
     bent[rom.model.definition.states.index("beta_FR")] += 0.2  # rad, a tie rod
     maneuver = registered("rack_lane_change")
     run, full = rom.simulate(maneuver, start=bent), rom.model.simulate(maneuver, bent)
-    true = in_bounds(load_protocol("predictive-high_fidelity_vehicle"), run, full)
+    true = in_bounds(load_protocol(f"predictive-{RACK}"), run, full)
     assert true > 2.0
     assert run.error_estimate.in_bounds == pytest.approx(true, rel=0.1)
 
 
 @pytest.mark.parametrize("length", [0.05, 0.2])
 def test_a_short_run_is_judged(length):
-    rom = shipped("high_fidelity_vehicle")
+    rom = shipped(RACK)
     high = rom.model.start()
     high[rom.model.definition.states.index("z")] += 0.1
     straight = {"inputs": ["s"], "hold": "cubic", "output_step": 0.005}
     signal = vm.Signal.from_samples([0.0, length], np.zeros((2, 1)), **straight)
     run, full = rom.simulate(signal, high), rom.model.simulate(signal, high)
-    true = in_bounds(load_protocol("predictive-high_fidelity_vehicle"), run, full)
+    true = in_bounds(load_protocol(f"predictive-{RACK}"), run, full)
     assert true > 2.0
     assert run.status == "untrusted"
     assert run.error_estimate.in_bounds == pytest.approx(true, rel=0.1)
@@ -188,8 +185,9 @@ def test_inputs_that_jump_are_no_error(apart):
 @pytest.mark.parametrize("rise", [1e-6, 3e-3, 0.03])
 def test_a_steep_change_between_two_samples_is_like_a_jump(rise):
     t = [*np.linspace(0.0, 0.5, 26), 0.5 + rise, 1.0, 1.0 + rise, 2.0]
-    steering = np.repeat([0.0, 0.02, -0.02], [26, 2, 2])
-    run = shipped(CAR).simulate(vm.Signal.from_samples(t, steering, hold="linear"))
+    run = shipped(CAR).simulate(
+        vm.Signal.from_samples(t, np.repeat([0.0, 0.02, -0.02], [26, 2, 2]))
+    )
     # Taken as they are at the nodes they would be 3.7 and 1.6 bounds; the error is 0.2 to 0.3.
     assert run.error_estimate.in_bounds < 0.5
 
@@ -213,7 +211,7 @@ def test_inputs_that_jump_may_stand_in_any_order():
     def estimate(*names):
         values = np.stack([named[name] for name in names], axis=1)
         signal = vm.Signal.from_samples(t, values, hold="zero", inputs=names)
-        return shipped("high_fidelity_vehicle").simulate(signal).error_estimate.in_bounds
+        return shipped(RACK).simulate(signal).error_estimate.in_bounds
 
     assert estimate("s_ddot", "s", "s_dot") == estimate("s", "s_dot", "s_ddot")
 
