@@ -64,14 +64,11 @@ def test_figures_of_largest_errors_show_the_rms_beside_the_published(drawn, resu
     error = abs(run["outputs"] - run["reference_outputs"]).squeeze()
     (line,) = (x for x in axis.lines if x.get_label() == "POD*")
     steps = [float(error.sel(time=slice(t + 1e-6, t + 0.5 + 1e-6)).max()) for t in (2.0, 2.5)]
-    np.testing.assert_array_equal(np.interp([2.25, 2.75], *steps_of(line)), steps)
-    assert np.nanmax(line.get_ydata()) == float(error.max())
-
-
-def steps_of(line):
-    """Edges and heights of a stair, each height twice."""
     x, y = line.get_data()
-    return np.repeat(x, 2)[1:-1], np.repeat(y[:-1], 2)
+    # Edges and heights of a stair, each height twice.
+    stair = np.repeat(x, 2)[1:-1], np.repeat(y[:-1], 2)
+    np.testing.assert_array_equal(np.interp([2.25, 2.75], *stair), steps)
+    assert np.nanmax(line.get_ydata()) == float(error.max())
 
 
 def test_files_have_fonts_texts_resolution_and_style(drawn, tmp_path):
