@@ -121,7 +121,7 @@ def test_a_run_is_measured_the_same_way_in_grids_and_protocols(vehicle):
         assert bool(one["warned"])
         assert one["status"].item() == "untrusted"
         assert metrics["status"].item() == "ok"
-        assert "not to be trusted" in metrics["remark"].item()
+        assert "untrusted: " in metrics["remark"].item()
 
 
 def test_of_a_run_that_has_failed_nothing_counts_in_a_protocol(model):

@@ -312,7 +312,7 @@ def _tested(
     judged = Trajectory.of(**judged.__dict__ | {"seconds": run.seconds})
     if judged.status != run.status:
         # A study shows what a protocol would not trust; the status is that of the method.
-        remark = "; ".join(filter(None, (run.remark, f"not to be trusted: {judged.message}")))
+        remark = "; ".join(filter(None, (run.remark, f"untrusted: {judged.message}")))
         judged = replace(judged, status=run.status, message=run.message, remark=remark)
     if reference is None:
         return Outcome(judged, None)
