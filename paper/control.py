@@ -82,10 +82,11 @@ def full_of(label: str) -> str:
     return "braked full" if label.startswith("braked") else "full"
 
 
-def shooting(known: Models) -> Iterator[tuple[str, float]]:
-    """The full car's plan by five Runge-Kutta steps a period."""
-    planner = example("optimal_control").Planner(known["full"][0], steps=5)
-    yield "full shooting, s", planner.plan(planner.start())[1]
+def otherwise(known: Models) -> Iterator[tuple[str, float]]:
+    """The full car's plan by five Runge-Kutta steps a period, the reduced one's by collocation."""
+    for label, how, steps in (("full", "shooting", 5), ("reduced", "collocation", 0)):
+        planner = example("optimal_control").Planner(known[label][0], steps=steps)
+        yield f"{label} {how}, s", planner.plan(planner.start())[1]
 
 
 def loops(known: Models) -> Iterator[tuple[str, float]]:
@@ -177,7 +178,7 @@ def main() -> None:
     with one_thread():
         path = results / "models" / "braking_car.nc"
         known = models(fitted_once(path, example("optimal_control").braking_car))
-        for part in (plans, rollouts, loops, compiled, shooting):
+        for part in (plans, rollouts, loops, compiled, otherwise):
             values |= dict(part(known))
             store(values, "Models in control", results / "control.nc")
 
