@@ -13,7 +13,7 @@ from drawings.fields import MODELS
 
 VEHICLES = "independent_suspension_vehicle", "high_fidelity_vehicle"
 # m/s; m/s^2: lateral acceleration, and that of drive and brakes; radii of the circles.
-SPEEDS, SIDEWAYS, FORWARD, CIRCLES = (8.0, 35.0), (0.0, 10.0), (-7.0, 3.0), (2, 4, 6, 8)
+SPEEDS, SIDEWAYS, FORWARD, CIRCLES = (7.0, 36.0), (0.0, 10.0), (-7.0, 3.0), (2, 4, 6, 8)
 MARK: dict[str, Any] = {"color": "black", "markerfacecolor": "none", "linestyle": "none"}
 MARK |= {"markeredgewidth": 0.6}
 # Errors in bounds, and what an estimate tells, rightly or not.
