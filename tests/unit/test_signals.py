@@ -82,7 +82,7 @@ HUGE = [0.0, 1e-3, 1.0], [-1e308, 1e308, 0.0]
         (lambda: vm.Signal.from_samples(*HUGE, "cubic"), "polynomials .* are not finite"),
         (lambda: of_inputs(inputs=["s"]), "derivatives of s follow from a cubic hold alone"),
         (of_inputs, "1 columns without names"),
-        *[(partial(of_inputs, np.eye(2, 3), inputs=n), "is not the rate of s") for n in ((), RACK)],
+        *[(partial(of_inputs, np.eye(2, 3, -1), inputs=n), "rate s_dot is 0") for n in ((), RACK)],
         (lambda: vm.simulate(CAR, maneuver=BEYOND), r"input delta is 1\.08 rad at t = 0\.54 s"),
         (lambda: of_csv("t,delta\n0,1\n1,2\n"), "no column 'time': set time= to one of t, d"),
         (lambda: of_csv(COMMAS, separator=";"), "'time' holds '0,5', not a number: is decimal=','"),
