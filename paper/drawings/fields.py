@@ -72,7 +72,7 @@ LOOKS: tuple[Style, ...] = (
     {"color": "#D55E00", "marker": "s"},
     {"color": "#CC79A7", "marker": "^"},
 )
-OFFSETS = (-8, -12), (-2, -21), (5, -10)
+OFFSETS = (-8, -12), (-2, -29), (5, -10)
 NAMES = {"double_wishbone": "suspension", "independent_suspension_vehicle": "14-DOF"}
 NAMES |= {"high_fidelity_vehicle": "high-fidelity"}
 
