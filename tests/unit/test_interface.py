@@ -28,6 +28,7 @@ def test_a_full_model_and_a_reduced_one_are_run_and_compared(car, pod):
     full = car.simulate(turn)
     np.testing.assert_array_equal(full.dataset()["outputs"].sel(output="yaw"), full["yaw"])
     run = pod.simulate(turn, outputs=["lateral_position", "yaw"])
+    assert run.names == ("lateral_position", "yaw")
     errors = vm.errors(run, full)
     difference = run["yaw"] - full["yaw"]
     expected = np.sqrt(np.mean(difference**2)), abs(difference).max()

@@ -217,7 +217,8 @@ def test_reduced_lateral_dynamics_answer_slow_steering_as_all_modes_do(car):
 def test_a_car_is_judged_by_its_error_not_by_the_states_of_training():
     reduced = vm.reduce(CAR, "operator_inference", training="lane_change", rank=4, form="linear")
     wider = vm.maneuver("lane_change", amplitude=1.3)
-    assert reduced.simulate(wider).message.startswith("the estimated error of longitudinal_")
+    message = reduced.simulate(wider).message
+    assert message.startswith("the estimated error of longitudinal_position is ")
     assert reduced.simulate(wider, bounds={"yaw": 10.0}).status == "ok"
 
 
