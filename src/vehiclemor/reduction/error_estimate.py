@@ -218,7 +218,7 @@ def _looked(
     """Estimate for a vehicle's run by the first look that is fine enough, none if there is none."""
     (maneuver, start), estimate, error = given, None, math.nan
     apart = maneuver.duration / (maneuver.samples - 1)
-    rises = maneuver.jumps.lengths
+    rises = checked_maneuver(maneuver, run.model.definition).jumps.lengths
     # Half a steep change, so that a look sees it; one at once is seen by none.
     coarsest = max(0.5 * rises.min(where=rises > 0.0, initial=math.inf), LOOKS[-1][0])
     for spacing, passes in LOOKS:
