@@ -74,6 +74,13 @@ def c_files(system: ExportedSystem, settings: CSettings) -> dict[str, str]:
     } | shipped
 
 
+def write_folder(texts: Mapping[str, str], folder: Path) -> None:
+    """Write files into a new folder."""
+    folder.mkdir()
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
 def written(template: str, **values: object) -> str:
     """Text of a file by its template."""
     environment = Environment(  # noqa: S701  (what is written is no HTML)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from vehiclemor.arguments import file_path, flag, number, quoted, within
 from vehiclemor.exceptions import InputError
-from vehiclemor.files import begins_with, make_folder, replaceable, write_whole
+from vehiclemor.files import begins_with, replaceable, write_whole
 from vehiclemor.inputs.columns import listed
 from vehiclemor.registry import choice
 
@@ -135,9 +135,10 @@ def _checked_step(to: str, step: Any, integrator: str, precision: str) -> float:
 def _exported(system: ExportedSystem, to: str, path: Any, settings: CSettings) -> Any:
     """What is written to a path, or the object."""
     if to == "c":
-        from vehiclemor.exporting.c import c_files
+        from vehiclemor.exporting.c import c_files, write_folder
 
-        return _write_folder(path, c_files(system, settings))
+        texts = c_files(system, settings)
+        return write_whole(path, lambda temporary: write_folder(texts, temporary))
     if to == "fmu":
         from vehiclemor.exporting.fmu import fmu_files, write_archive
 
@@ -200,14 +201,3 @@ def system_of(model: Model | ReducedOrderModel) -> ExportedSystem:
     if not isinstance(model, Model):
         raise InputError(f"model: {quoted(model)} is neither a name nor a full or reduced model")
     return exported_system(model, name_of(model.name, None))
-
-
-def _write_folder(path: Path, files: dict[str, str]) -> Path:
-    """Write a folder; it replaces an older one when it is complete."""
-
-    def write(temporary: Path) -> None:
-        make_folder(temporary)
-        for name, text in files.items():
-            (temporary / name).write_text(text, encoding="utf-8")
-
-    return write_whole(path, write)

@@ -58,7 +58,7 @@ class CSettings(NamedTuple):
     precision: str = "double"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ExportedSystem(ShortRepr):
     """A system x' = f(x, u, c(p)), y = g(x, u, c(p))."""
 
@@ -67,18 +67,18 @@ class ExportedSystem(ShortRepr):
     # Of the model, or of the model and the method; one line.
     name: str
     summary: str
-    # Quantities in order; of a reduced model nothing is a parameter, its numbers are in the code.
-    states: tuple[Quantity, ...]
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
-    parameters: tuple[Quantity, ...]
-    values: np.ndarray  # Of the parameters.
-    starts: Mapping[str, np.ndarray]  # Name -> state; the default first.
     # `constants` of the array `p`, `derivative` and `outputs` of the arrays `x`, `u` and `c`.
     functions: Mapping[str, StraightLine]
     # Gives the derivatives of these functions, by the same names, see `TANGENTS`.
     tangents: Callable[[], Mapping[str, StraightLine]]
-    # Numbers that `entry(row, offset)` reads, at row + offset; may be empty.
+    starts: Mapping[str, np.ndarray]  # Name -> state; the default first.
+    states: tuple[Quantity, ...] = ()
+    # Of a reduced model nothing is a parameter, its numbers are in the code.
+    parameters: tuple[Quantity, ...] = ()
+    values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # Of the parameters.
+    # Numbers that `entry(row, offset)` reads, at row + offset.
     table: np.ndarray = field(default_factory=lambda: np.zeros(0))
     # Has the Jacobian of an implicit step; none without states.
     dynamics: System | None = None
@@ -155,17 +155,18 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
             changes[function] = lines.derivative(sources[function], arrays, seeds)
         return lines.functions(changes)
 
+    functions = {function: lines.include(sources[function], arrays) for function in SIGNATURES}
     return ExportedSystem(
-        name,
-        model.summary,
-        definition.state_quantities,
-        definition.inputs,
-        definition.outputs,
-        parameter_quantities(model),
-        model.parameter_values,
-        model.initial,
-        lines.functions({name: lines.include(sources[name], arrays) for name in SIGNATURES}),
-        tangents,
+        name=name,
+        summary=model.summary,
+        states=definition.state_quantities,
+        inputs=definition.inputs,
+        outputs=definition.outputs,
+        parameters=parameter_quantities(model),
+        values=model.parameter_values,
+        starts=model.initial,
+        functions=lines.functions(functions),
+        tangents=tangents,
         dynamics=model.system,
     )
 
@@ -192,22 +193,18 @@ def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
         correction = lines.numbers([0.0])
         return lines.functions({"constants": constants, "outputs": [*outputs, *correction]})
 
+    constants = lines.include(sources["constants"], arrays)
+    outputs.append(lines.largest(correction))
     return ExportedSystem(
-        name,
-        model.summary,
-        (),
-        definition.inputs,
-        (*definition.outputs, CORRECTION),
-        parameter_quantities(model),
-        model.parameter_values,
-        {model.starts[0]: np.zeros(0)},
-        lines.functions(
-            {
-                "constants": lines.include(sources["constants"], arrays),
-                "outputs": [*outputs, lines.largest(correction)],
-            }
-        ),
-        tangents,
+        name=name,
+        summary=model.summary,
+        inputs=definition.inputs,
+        outputs=(*definition.outputs, CORRECTION),
+        parameters=parameter_quantities(model),
+        values=model.parameter_values,
+        starts={model.starts[0]: np.zeros(0)},
+        functions=lines.functions({"constants": constants, "outputs": outputs}),
+        tangents=tangents,
     )
 
 
@@ -284,16 +281,14 @@ def reduced_system(
     states = [of_model.get(n, Quantity(n, "1", "reduced coordinate")) for n in reduced.states]
     at_rest = np.zeros(system.inputs)
     return ExportedSystem(
-        name,
-        f"reduced model of: {model.summary}",
-        tuple(states),
-        definition.inputs,
-        quantities,
-        (),
-        np.zeros(0),
-        {key: reduced.begin(key, at_rest) for key in model.starts},
-        lines.functions({"derivative": derivative, "outputs": outputs}),
-        tangents,
+        name=name,
+        summary=f"reduced model of: {model.summary}",
+        states=tuple(states),
+        inputs=definition.inputs,
+        outputs=quantities,
+        starts={key: reduced.begin(key, at_rest) for key in model.starts},
+        functions=lines.functions({"derivative": derivative, "outputs": outputs}),
+        tangents=tangents,
         dynamics=system,
     )
 
@@ -302,13 +297,12 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
     """Outputs as polynomials in cells of the inputs; a table has their coefficients."""
     definition, coefficients = reduced.model.definition, reduced.cells.coefficients
     columns = reduced.columns[len(definition.coordinates) :]
-    exported = sorted(set(columns))
+    exported, table_columns = np.unique(columns, return_inverse=True)
     table = np.zeros((*coefficients.shape[:2], padded(len(exported))))
     table[:, :, : len(exported)] = coefficients[:, :, exported]
     lines, size, n = Lines(), table[0].size, len(definition.inputs)
     in_cell, row, in_box = _cell(lines, reduced, size)
-    table_columns = tuple(exported.index(column) for column in columns)
-    kernel = map_kernel(reduced.moving, reduced.degree, table_columns)
+    kernel = map_kernel(reduced.moving, reduced.degree, tuple(table_columns.tolist()))
     arrays = {
         "_x": in_cell,
         "_coefficients": [lines.new("table", row, detail=offset) for offset in range(size)],
@@ -325,17 +319,14 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
         return lines.functions({"outputs": output_changes})
 
     return ExportedSystem(
-        name,
-        f"reduced model of: {reduced.model.summary}",
-        (),
-        definition.inputs,
-        (*definition.outputs, TRUST),
-        (),
-        np.zeros(0),
-        {reduced.model.starts[0]: np.zeros(0)},
-        lines.functions({"outputs": [*outputs, lines.largest(in_box)]}),
-        tangents,
-        table.ravel(),
+        name=name,
+        summary=f"reduced model of: {reduced.model.summary}",
+        inputs=definition.inputs,
+        outputs=(*definition.outputs, TRUST),
+        starts={reduced.model.starts[0]: np.zeros(0)},
+        functions=lines.functions({"outputs": [*outputs, lines.largest(in_box)]}),
+        tangents=tangents,
+        table=table.ravel(),
     )
 
 
