@@ -13,14 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.operations import Kernel, Value, padded
+from vehiclemor.codegen.operations import Value, padded
 from vehiclemor.exceptions import InputError
 from vehiclemor.exporting.straight_line import Lines, StraightLine
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.reduction.fallback import FallbackModel
 from vehiclemor.reduction.methods.full_order import FullOrder
 from vehiclemor.reduction.methods.path_map import PathMapModel, map_kernel
-from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
@@ -135,10 +134,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
         case PathMapModel():
             return map_system(what, name)
         case ReducedVehicle():
-            return reduced_system(what, name, what.decoder.kernel)
-        case ReducedSystem() if what.spaces.formulation == "full":
-            if what.states == what.model.definition.states:
-                return reduced_system(what, name, None)
+            return reduced_system(what, name)
     raise InputError(f"{name} can't be exported: its equations are no straight-line program")
 
 
@@ -233,13 +229,10 @@ def parameter_quantities(model: Model) -> tuple[Quantity, ...]:
     return tuple(quantities)
 
 
-def reduced_system(
-    reduced: ReducedSystem, name: str, decoder: tuple[Kernel, np.ndarray] | None
-) -> ExportedSystem:
-    """A reduced system: its states are decoded, then the model's outputs follow from them.
+def reduced_system(reduced: ReducedVehicle, name: str) -> ExportedSystem:
+    """A reduced vehicle: its states are decoded, then the model's outputs follow from them.
 
-    The decoder is the kernel that gives full states, and after them trust indicators, with its
-    constants; none where the states are the model's.
+    The decoder gives full states, and after them trust indicators.
     """
     model, system = reduced.model, reduced.system
     definition, full = model.definition, len(model.definition.states)
@@ -250,10 +243,9 @@ def reduced_system(
     }
     rates, source = system.kernels.sources["derivative"], model.kernels.sources["outputs"]
     rate_arrays = arrays | {"_constants": lines.numbers(system.constants)}
-    decoded, decoder_arrays = arrays["_x"], arrays
-    if decoder is not None:
-        decoder_arrays = arrays | {"_constants": lines.numbers(decoder[1])}
-        decoded = lines.include(decoder[0], decoder_arrays)
+    decoder, decoder_constants = reduced.decoder.kernel
+    decoder_arrays = arrays | {"_constants": lines.numbers(decoder_constants)}
+    decoded = lines.include(decoder, decoder_arrays)
     output_arrays = {
         "_x": decoded,
         "_u": arrays["_u"],
@@ -263,9 +255,7 @@ def reduced_system(
 
     def tangents() -> dict[str, StraightLine]:
         seeds = seeds_of(lines, arrays)
-        state_changes = seeds["_x"]
-        if decoder is not None:
-            state_changes = lines.derivative(decoder[0], decoder_arrays, seeds)
+        state_changes = lines.derivative(decoder, decoder_arrays, seeds)
         changes = lines.derivative(source, output_arrays, seeds | {"_x": state_changes})
         if trust:
             changes.append(lines.largest_derivative(trust, state_changes[full:]))

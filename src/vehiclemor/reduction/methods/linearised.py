@@ -53,7 +53,7 @@ from vehiclemor.reduction.projection.structural import (
     MASSLESS,
     ReducedStructure,
     StructuralSettings,
-    free_modes,
+    modes_below,
     port_rates,
     reduced,
 )
@@ -69,7 +69,7 @@ from vehiclemor.reduction.vehicle.linear_modes import (
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
-from vehiclemor.simulation.structures.model import StructuralModel
+from vehiclemor.simulation.structures.system import factored
 
 # Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
 CORNERING = 4.0
@@ -257,20 +257,20 @@ def modal(model: Any, training: Training, settings: Any) -> ReducedVehicle | Red
     if model.kind != "structural":
         return linear_vehicle(model, settings, truncated)
     began = time.process_time()
-    return reduced(model, free_modes(model, settings.highest), settings, began)
+    structure: Any = model.system.structure
+    # On its springs and tires at the static state; dampers are left out.
+    held = structure.with_port_springs(port_rates(model)[0])
+    # Shifted, so that motion that hardly anything holds does no harm.
+    shift = 1.0
+    solve = factored(held + shift * structure.mass, "MMD_AT_PLUS_A").solve
+    modes = modes_below(held, structure.mass, solve, -shift, settings.highest)
+    return reduced(model, modes, settings, began)
 
 
 def balanced(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
     """Balance and truncate; `InputError` if pyMOR is missing."""
     if model.kind != "structural":
         return linear_vehicle(model, settings, balanced_modes)
-    return balanced_structure(model, settings)
-
-
-def balanced_structure(
-    model: StructuralModel, settings: BalancedStructureSettings
-) -> ReducedStructure:
-    """The structure in its balanced basis; `InputError` if pyMOR is missing."""
     with installed("pyMOR"):
         from pymor.core.logger import log_levels
         from pymor.models.iosys import SecondOrderModel

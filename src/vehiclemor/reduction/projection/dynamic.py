@@ -236,7 +236,6 @@ def _weight(
     if settings.inner_product == "range":
         ranges = np.ptp(states, axis=0)
         return np.diag(1.0 / np.maximum(ranges, SMALLEST_RANGE * ranges.max()) ** 2)
-    assert settings.inner_product == "energy", settings.inner_product
     mass = model.mass_matrix(model.start())
     if not of_states:
         return mass

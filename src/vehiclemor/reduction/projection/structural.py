@@ -30,7 +30,7 @@ from vehiclemor.simulation.structures.model import (
     USUAL,
     StructuralModel,
 )
-from vehiclemor.simulation.structures.system import StructuralSystem, factored
+from vehiclemor.simulation.structures.system import StructuralSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Modes that are looked for at first.
@@ -256,20 +256,6 @@ def port_rates(model: StructuralModel) -> tuple[np.ndarray, np.ndarray]:
     rest = np.zeros(law.static.shape[1])
     _, stiffness, damping = -law.at(rest, rest, np.zeros(len(model.inputs))).T
     return stiffness, damping
-
-
-def free_modes(model: StructuralModel, highest: float) -> np.ndarray:
-    """Modes (n, k) up to so many Hz of the structure on its springs and tires.
-
-    It is linearised at the static state; dampers are left out.
-    """
-    structure: Any = model.system.structure
-    stiffness, _ = port_rates(model)
-    held = structure.with_port_springs(stiffness)
-    # Shifted, so that motion that hardly anything holds does no harm.
-    shift = 1.0
-    solve = factored(held + shift * structure.mass, "MMD_AT_PLUS_A").solve
-    return modes_below(held, structure.mass, solve, -shift, highest)
 
 
 def modes_below(stiffness: Any, mass: Any, solve: Any, shift: float, highest: float) -> np.ndarray:
