@@ -12,8 +12,8 @@ from jinja2 import Environment, FileSystemLoader
 
 from vehiclemor.codegen.operations import COMPARISONS, uses
 from vehiclemor.exporting.ros2 import solve_function
-from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
-from vehiclemor.exporting.systems import SIGNATURES, TANGENTS, TOOL, CSettings, ExportedSystem
+from vehiclemor.exporting.straight_line import FUNCTIONS, SIGNATURES, StraightLine
+from vehiclemor.exporting.systems import TANGENTS, TOOL, CSettings, ExportedSystem
 
 SOURCES = Path(__file__).parent / "c_sources"
 SELECT = """\

@@ -15,7 +15,7 @@ import numpy as np
 
 from vehiclemor.codegen.operations import Value, padded
 from vehiclemor.exceptions import InputError
-from vehiclemor.exporting.straight_line import Lines, StraightLine
+from vehiclemor.exporting.straight_line import SIGNATURES, Lines, StraightLine
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.reduction.fallback import FallbackModel
 from vehiclemor.reduction.methods.full_order import FullOrder
@@ -29,12 +29,6 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.system import System
 
 TOOL = f"vehiclemor {version('vehiclemor')}"
-# Function -> names of its arguments, in order, and of its result.
-SIGNATURES = {
-    "constants": ("p", "c"),
-    "derivative": ("x", "u", "c", "dx"),
-    "outputs": ("x", "u", "c", "y"),
-}
 # Derivatives along seeds of the arguments: what the results change by.
 SEED = "_seed"
 TANGENTS = {}
@@ -186,8 +180,8 @@ def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
         q_changes = [-change for change in step_changes]
         outputs = lines.derivative(sources["outputs"], solved, seeds | {"_q": q_changes})
         constants = lines.derivative(sources["constants"], arrays, seeds)
-        correction = lines.numbers([0.0])
-        return lines.functions({"constants": constants, "outputs": [*outputs, *correction]})
+        outputs.append(lines.number(0.0))
+        return lines.functions({"constants": constants, "outputs": outputs})
 
     constants = lines.include(sources["constants"], arrays)
     outputs.append(lines.largest(correction))
