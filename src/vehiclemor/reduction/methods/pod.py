@@ -57,10 +57,16 @@ def check(model: Model, settings: Any) -> None:
 
 
 def fit(model: Model, training: Training, settings: Any) -> FittedModel:
-    """One POD subspace for each control period of the training runs, or for the whole of them."""
+    """One POD subspace for each control period of the training runs, or for the whole of them.
+
+    `InputError` if these differ in duration.
+    """
     if model.kind == "structural":
         return structural.fit_basis(model, training, settings)  # type: ignore[arg-type]
-    duration = training[0].maneuver.duration
+    duration, *others = sorted({run.maneuver.duration for run in training})
+    if others:
+        lengths = ", ".join(f"{length:g}" for length in (duration, *others))
+        raise InputError(f"windows in time need training runs of one duration, not {lengths} s")
     edges = window_edges(duration, getattr(settings, "control_period", duration))
     return PROJECTIONS[model.kind].fit_windows(model, training, edges, settings)
 

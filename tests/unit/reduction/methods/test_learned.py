@@ -45,8 +45,7 @@ def learned(name, model, runs, **settings):
     """What a method fits to runs, and what it has seen."""
     method = component("method", name)
     chosen = method.settings[model.kind](**settings)
-    data = TrainingData.of(model, runs, chosen)
-    return method.fit(model, runs, chosen), data
+    return method.fit(model, runs, chosen), TrainingData.of(model, runs, chosen)
 
 
 @pytest.fixture(scope="module")
