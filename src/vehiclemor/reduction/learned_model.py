@@ -96,7 +96,7 @@ def stepped(step: Step) -> Path:
     return path
 
 
-def in_step(
+def paths_in_step(
     path: Path, starts: Sequence[np.ndarray], inputs: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
     """Coordinates (steps + 1, r) of some runs, from starts (r,) and inputs (steps, 2 inputs).
@@ -284,8 +284,8 @@ class LearnedModel(ShortRepr):
             _, z, u = self.for_model(model)._begun(checked, model.start(start))
             starts.append(z)
             inputs.append(u)
-        keys = map(_key, starts, inputs)
-        return replace(self, known=dict(zip(keys, in_step(self.path, starts, inputs), strict=True)))
+        paths = paths_in_step(self.path, starts, inputs)
+        return replace(self, known=dict(zip(map(_key, starts, inputs), paths, strict=True)))
 
     def best_approximation(self, states: np.ndarray) -> None:
         """States are no linear function of the coordinates: there is no subspace."""
@@ -327,7 +327,7 @@ class LearnedModel(ShortRepr):
         times, z, inputs = self._begun(maneuver, state)
         path = self.known.get(_key(z, inputs))
         if path is None:
-            (path,) = in_step(self.path, [z], [inputs])
+            (path,) = paths_in_step(self.path, [z], [inputs])
         with np.errstate(invalid="ignore"):
             sound = (np.abs(path) < LARGEST).all(axis=1)
         return times, path[: len(path) if sound.all() else max(int(np.argmin(sound)), 1)]

@@ -25,7 +25,7 @@ from vehiclemor.reduction.learned_model import (
     LearnedModel,
     LearnedSettings,
     TrainingData,
-    in_step,
+    paths_in_step,
     predicted,
     stepped,
 )
@@ -96,7 +96,7 @@ def operators(data: TrainingData, settings: OperatorInferenceSettings) -> Learne
         def refit(self) -> Any:
             super().refit()
             path = stepped(lambda z, u: self.rhs(z.T, u.T).T)
-            self.runs = dict(zip(keys, in_step(path, starts, data.inputs), strict=True))
+            self.runs = dict(zip(keys, paths_in_step(path, starts, data.inputs), strict=True))
             return self
 
         def predict(self, state0: np.ndarray, niters: int, inputs: Any = None) -> np.ndarray:
