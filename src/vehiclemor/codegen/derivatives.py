@@ -43,6 +43,8 @@ from vehiclemor.short_repr import ShortRepr
 DIRECTIONS = 16
 # Up to this number, directions are computed one by one: code for many takes longer to compile.
 FEW = 4
+# So are all directions of a result of more floats: a mass matrix would take half a minute.
+LARGE = 100
 # Depth of the longest expression without a named value inside.
 SHALLOW = 12
 # Function -> its derivative at the argument x, where the function has the value v.
@@ -267,7 +269,7 @@ class JacobianProduct(ShortRepr):
 
     def _products(self, arrays: Sequence[np.ndarray], seeds: np.ndarray) -> np.ndarray:
         rows = len(seeds)
-        lanes = 1 if rows <= FEW else DIRECTIONS
+        lanes = 1 if rows <= FEW or self.size > LARGE else DIRECTIONS
         result = np.empty((rows, self.size))
         arguments = [*arrays, seeds[0], result[0]]
         for array, size in zip(arguments, self.kernel.sizes, strict=True):
