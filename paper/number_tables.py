@@ -19,8 +19,7 @@ from mesh_sizes import size_rows
 import vehiclemor as vm
 from vehiclemor.registry import names
 from vehiclemor.report.frames import frame
-from vehiclemor.report.printed_numbers import number_rows
-from vehiclemor.report.published import load_published, rms_numbers
+from vehiclemor.report.published import load_published, number_rows, rms_numbers
 from vehiclemor.report.unseen import count_rows, protocol_rows
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"

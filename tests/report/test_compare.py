@@ -11,8 +11,7 @@ from vehiclemor.cli import main
 from vehiclemor.report import comparison
 from vehiclemor.report.comparison import at_published_start, cost_table, paper_comparison, timing_of
 from vehiclemor.report.findings import LARGEST_SPREAD, judged
-from vehiclemor.report.printed_numbers import TIMING, time_saved
-from vehiclemor.report.published import load_published
+from vehiclemor.report.published import TIMING, load_published, time_saved
 from vehiclemor.study.run import run_studies
 
 

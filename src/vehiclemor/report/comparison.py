@@ -18,7 +18,7 @@ from vehiclemor.registry import component, names, unknown
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.frames import frame, grid_rows
 from vehiclemor.report.labels import of_kind, timing_cases
-from vehiclemor.report.printed_numbers import TIMING, number_rows, printed_errors_and_savings
+from vehiclemor.report.published import TIMING, number_rows, printed_errors_and_savings
 from vehiclemor.report.result_selection import result_kind
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.simulation.build import build
@@ -64,7 +64,7 @@ def compare(
     pandas.DataFrame
         Of `paper` a row for each published number and variant of the method (`default`, `literal`:
         the paper's words): its id, model, item, the published number, a `verdict` (`met`, `missed`,
-        `not_comparable`), the columns of `printed_numbers.Finding`, and `replay`, the same number
+        `not_comparable`), the columns of `published.Finding`, and `replay`, the same number
         of the training-trajectory baseline.  The others are described at `model_comparison` and
         `study_comparison` in `vehiclemor.report.comparison`.
     """

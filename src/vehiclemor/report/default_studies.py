@@ -18,7 +18,7 @@ from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import default_settings
-from vehiclemor.study.plans.loading import load_studies, write_study
+from vehiclemor.study.plans.loading import write_study
 from vehiclemor.study.plans.protocol import PREFIX, protocol_names
 from vehiclemor.study.plans.study_file import schema_of
 
@@ -39,12 +39,6 @@ POINTS = {
     "test": [[0.9, 1.0], [1.3, 1.0], [1.0, 0.5], [1.0, -1.0], [1.0, 0.0]],
     "outside": [[1.0, 1.2], [1.6, 1.0]],
 }
-
-
-def of_paper(name: str) -> str:
-    """Study of the paper's nominal run of a model, the first of its collection; else empty."""
-    studies = load_studies("paper").items()
-    return next((study for study, definition in studies if definition.model == name), "")
 
 
 def nominal(name: str, results: Path) -> str:

@@ -13,7 +13,7 @@ from scipy.stats import binom
 import vehiclemor as vm
 from tests.models import MODELS
 from vehiclemor.registry import component, names
-from vehiclemor.report.default_studies import of_paper, smaller_rank
+from vehiclemor.report.default_studies import smaller_rank
 from vehiclemor.report.labels import (
     Column,
     column,
@@ -25,7 +25,7 @@ from vehiclemor.report.labels import (
     timing_cases,
 )
 from vehiclemor.report.printing import Table, simulation_text, width
-from vehiclemor.report.published import load_published
+from vehiclemor.report.published import load_published, of_paper
 from vehiclemor.report.unseen import at_error, upper_bound
 from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings
