@@ -22,7 +22,7 @@ from .reduction.reduced_model import load as load
 from .reduction.reduced_model import rom as rom
 from .report.comparison import compare as compare
 from .report.figures.animation import animate as animate
-from .report.figures.catalogue import figures as figures
+from .report.figures.result_plot import figures as figures
 from .report.frames import convert as convert
 from .report.page import write_report as write_report
 from .simulation.batches import simulate_many as simulate_many

@@ -1,21 +1,27 @@
-"""The picture of any result: histories, paths or errors of one run, or of a study."""
+"""The pictures of any result: histories, paths or errors of one run, or of a study."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import xarray as xr
 from matplotlib.figure import Figure
 
+from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
 from vehiclemor.exceptions import InputError
+from vehiclemor.failure import attempt_apart
+from vehiclemor.files import make_folder
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import component
+from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.errors import figure_errors, figure_pareto
 from vehiclemor.report.figures.runs import PATH, figure_histories, figure_paths
-from vehiclemor.report.figures.theme import save_figure, styled, tell_empty
 from vehiclemor.report.labels import main_outputs, tabled_outputs
 from vehiclemor.report.result_selection import KINDS, result_kind, select_point
+from vehiclemor.study.plans.loading import refuse_doubles
+from vehiclemor.study.run import run_studies
 
 # At most so many outputs have panels.
 PANELS = 3
@@ -69,10 +75,10 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
     the methods are left; errors are drawn over the axes of the grid too.  A picture is written to a
     `path` (PDF, SVG or PNG), if there is one.
     """
-    with styled():
+    with theme.styled():
         figure = figure_of(dataset, kind)
         if path is not None:
-            save_figure(figure, path)
+            theme.save_figure(figure, path)
     return figure
 
 
@@ -88,7 +94,7 @@ def figure_of(dataset: xr.Dataset, kind: str) -> Figure:
     figure = PICTURES[kind].draw(dataset)
     lines = filter(None, (_title(dataset), figure.get_suptitle()))
     figure.suptitle("\n".join(lines), fontsize="medium", wrap=True)
-    tell_empty(figure)
+    theme.tell_empty(figure)
     return figure
 
 
@@ -144,3 +150,70 @@ def _definition(dataset: xr.Dataset) -> ModelDefinition | None:
         return component("model", model_name(dataset))
     except InputError:
         return None
+
+
+def figures(
+    only: str | Path | Sequence[str | Path] = (),
+    out: str | Path | None = None,
+    results: str | Path = "results",
+    jobs: int = 1,
+    *,
+    failed: dict[str, str] | None = None,
+) -> list[Path]:
+    """Draw the figures of any study; studies that are missing are run first.
+
+    Parameters
+    ----------
+    only
+        Studies, collections and protocols by name or TOML file, of which is drawn what they vary.
+        By default the studies of the paper.
+    out
+        Folder of the figures; `figures` in the results folder by default.
+    results
+        Results folder.
+    jobs
+        Number of processes for missing studies.
+    failed
+        Is given the figures that can't be drawn, and why: they raise no error then.
+
+    Returns
+    -------
+    list of Path
+        Files written.
+
+    Raises
+    ------
+    VehiclemorError
+        If a name or file is wrong; at last if a figure can't be drawn, when all others are written.
+    """
+    folder = file_path("results", results)
+    target = folder / "figures" if out is None else file_path("out", out)
+    only = study_names("only", only)
+    jobs = count("jobs", jobs, most=MOST_JOBS)
+    wanted = only or ["paper"]
+    # What is wrong is named before anything is computed.
+    refuse_doubles(wanted)
+    make_folder(target)
+    drawings: dict[str, Callable[[], Figure]] = {}
+    for name in wanted:
+        for study, dataset in run_studies(name, folder, jobs).items():
+            for kind in pictures_of(dataset):
+                drawings[f"{study}-{kind}"] = partial(draw, dataset, kind)
+    written: list[Path] = []
+    wrong: dict[str, str] = {}
+    for name, drawing in drawings.items():
+        stem = name if name.startswith("figure") else f"figure-{name}"
+        files = [target / f"{stem}.{suffix}" for suffix in theme.FORMATS]
+        with theme.styled():
+            save = partial(_save, drawing, files)
+            written += [file for group in attempt_apart(name, wrong, save) for file in group]
+    if failed is not None:
+        failed.update(wrong)
+    elif wrong:
+        raise InputError("; ".join(f"figure {name}: {why}" for name, why in wrong.items()))
+    return written
+
+
+def _save(drawing: Callable[[], Figure], files: list[Path]) -> list[Path]:
+    figure = drawing()
+    return [theme.save_figure(figure, path) for path in files]
