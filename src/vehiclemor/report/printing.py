@@ -26,13 +26,9 @@ WIDTH, WIDEST = 80, 120
 NARROWEST = 12
 # Indent of a note.
 NOTE = 4
-# Column that is printed of each output of a simulation -> variable.
-ERRORS = {
-    "rms_error": "rms_error",
-    "floor": "floor_rms_error",
-    "max_error": "max_error",
-    "signal_range": "signal_range",
-}
+# Variable of a simulation -> column that is printed for each output.
+ERRORS = {"rms_error": "rms_error", "floor_rms_error": "floor", "max_error": "max_error"}
+ERRORS |= {"signal_range": "signal_range", "output_unit": "unit"}
 
 
 @dataclass(frozen=True)
@@ -69,9 +65,6 @@ class Table:
         meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds.values() if kind.meaning]
         return kinds, f"({'; '.join(meanings)}.)" if meanings and self.explain else ""
 
-    def _texts(self, row: Mapping[str, Any], kinds: Mapping[str, Column]) -> list[str]:
-        return [format_value(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
-
     def __html__(self) -> str:
         records = self._records()
         kinds, meanings = self._kinds(records)
@@ -93,7 +86,10 @@ class Table:
     def __str__(self) -> str:
         records = self._records()
         kinds, meanings = self._kinds(records)
-        cells = [self._texts(row, kinds) for row in records]
+        cells = [
+            [format_value(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
+            for row in records
+        ]
         numbers = [_are_numbers(row.get(name) for row in records) for name in kinds]
         heads = [kind.heading for kind in kinds.values()]
         widths, last = _widths(heads, cells, numbers), None
@@ -175,19 +171,13 @@ def simulation_text(dataset: xr.Dataset, shown: Sequence[str], counts: Iterable[
     """Status, a table of the errors of some outputs, solver counts and seconds of a simulation."""
     note = f" ({TRAINED})" if trained_runs(dataset) else ""
     ended = f"{dataset['status'].item()} {dataset['message'].item()}"
-    rows = []
-    for output in shown:
-        errors = dataset.sel(output=output)
-        row: dict[str, object] = {"output": str(output)}
-        for column_name, name in ERRORS.items():
-            row[column_name] = errors[name].item()
-        rows.append(row | {"unit": str(errors["output_unit"].item())})
+    errors = dataset.sel(output=[*shown]).reset_coords()[[*ERRORS]].rename(ERRORS)
     further = dataset.sizes["output"] - len(shown)
     seconds, clock = float(dataset["seconds"]), dataset["seconds"].attrs["clock"]
     parts = [
         wrapped(f"{dataset.attrs['title']}{note}: {ended}"),
         wrapped(str(dataset["remark"].item())),
-        str(Table(rows)),
+        str(Table(errors.to_dataframe().reset_index())),
         f"{further} more outputs: --all-outputs" if further else "",
         wrapped(", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in counts)),
         f"seconds in the compiled loop {seconds:.3e} ({clock})",
@@ -200,14 +190,8 @@ def json_text(rows: pd.DataFrame) -> str:
 
     (`DataFrame.to_json` rounds to ten places behind the point: errors would lose their digits.)
     """
-
-    def finite(value: object) -> object:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    def plain(row: Mapping[Any, Any]) -> dict[str, object]:
-        return {key: finite(value) for key, value in row.items()}
-
-    return json.dumps([plain(row) for row in rows.to_dict("records")], indent=2)
+    unknown = rows.isna() | rows.isin([math.inf, -math.inf])
+    return json.dumps(rows.astype(object).mask(unknown, None).to_dict("records"), indent=2)
 
 
 def ends_text(statuses: Iterable[str], warned: int = 0) -> str:

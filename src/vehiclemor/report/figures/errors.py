@@ -61,7 +61,7 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
     reduced = {m: text for m, text in methods.items() if not m.startswith("full_order")}
     varied = _varied(dataset)
     if not varied:
-        return _of_a_point(dataset, reduced)
+        return _of_a_point(dataset)
     methods = reduced or methods
     saturated = saturated_ranks(dataset)
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
@@ -190,16 +190,17 @@ def _count_marked(axis: Axes, mark: Style) -> int:
     return sum(line.get_marker() == mark["marker"] for line in axis.lines)
 
 
-def _of_a_point(dataset: xr.Dataset, methods: Mapping[str, str]) -> Figure:
+def _of_a_point(dataset: xr.Dataset) -> Figure:
     """RMS errors of all outputs as shares of their ranges, a mark for each method."""
-    if not methods:
+    texts = legend_of(dataset)
+    if not texts:
         raise InputError("full order alone: no errors to draw")
     names = [str(output) for output in dataset["output"].values]
     figure, grid = theme.panels(1, 1, (6.7, 1.6 + 0.19 * len(names)))
     axis, heights = grid[0, 0], np.arange(len(names))
     drawn = theme.methods_of(dataset)
-    looks, marks = theme.styles(methods, drawn), theme.marks(methods, drawn)
-    for label, text in legend_of(dataset, methods).items():
+    looks, marks = theme.styles(texts, drawn), theme.marks(texts, drawn)
+    for label, text in texts.items():
         run = at_point(dataset, label)
         share = 100.0 * (run["rms_error"] / run["signal_range"])
         share = share.where(np.isfinite(share) & (share > 0.0))

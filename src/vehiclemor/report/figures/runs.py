@@ -54,25 +54,25 @@ class Runs(NamedTuple):
         return bool(self.curves) and bool(self.full["reference_outputs"].notnull().any())
 
 
-def legend_of(dataset: xr.Dataset, methods: Mapping[str, str] | None = None) -> dict[str, str]:
+def legend_of(dataset: xr.Dataset) -> dict[str, str]:
     """Text of each reduced model by its label: trained on the run, and not ended well, if so.
 
-    `methods` are labels with their texts, those that the study lacks left out; by default all, or
-    full order where nothing was compared with it.
+    Full order has one too where nothing was compared with it.
     """
-    known = [str(label) for label in dataset["label"].values]
-    if methods is None:
-        alone = "reference_outputs" not in dataset and "rms_error" not in dataset
-        reduced = [label for label in known if alone or not label.startswith("full_order")]
-        methods = {label: labels.method_text(label) for label in reduced}
+    alone = "reference_outputs" not in dataset and "rms_error" not in dataset
     texts: dict[str, str] = {}
-    for label in [label for label in methods if label in known]:
+    for label in map(str, dataset["label"].values):
+        if label.startswith("full_order") and not alone:
+            continue
         run = at_point(dataset, label)
         ends = run["status"].to_series() if run["status"].ndim else {"": run["status"].item()}
         bad = {at: end for at, end in ends.items() if end != "ok"}
         failed = "; ".join(f"{end}, {at} start" if at else end for at, end in bad.items())
-        mark = labels.MARK * bool(labels.trained_runs(run).all())
-        texts[label] = methods[label] + mark + (f" ({failed})" if failed else "")
+        texts[label] = labels.method_text(label)
+        if labels.trained_runs(run).all():
+            texts[label] += labels.MARK
+        if failed:
+            texts[label] += f" ({failed})"
     return texts
 
 
