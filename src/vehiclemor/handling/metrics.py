@@ -12,7 +12,7 @@ from vehiclemor.arguments import quoted, real_array
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import data_folder
 from vehiclemor.handling import open_loop_tests
-from vehiclemor.handling.motion import Motion
+from vehiclemor.handling.open_loop_tests import Motion
 from vehiclemor.registry import choice
 from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.toml_files import FileSchema, Line, read_toml

@@ -27,7 +27,6 @@ from vehiclemor.parameters import (
     load_parameters,
     overridden,
     parameter_path,
-    with_entries,
 )
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
@@ -99,7 +98,7 @@ def _with_definition(
     model: Model, definition: ModelDefinition, overrides: Mapping[str, object] | None = None
 ) -> Model:
     """A model with the same parameters, but for what another choice of inputs adds or drops."""
-    parameters = with_entries(model.parameters, definition.parameters, overrides or {})
+    parameters = overridden(model.parameters, definition.parameters, overrides or {})
     with first_use(model.name):
         return _made(definition, parameters)
 
