@@ -11,8 +11,6 @@ from typing import Any
 
 # Names of which all are listed where none is near, and characters of their list.
 MANY, MOST_LISTED = 40, 450
-# Likeness of near names, how many are offered, and letters of a text that is looked for in others.
-NEAR, NEAREST, SHORTEST = 0.7, 3, 3
 # What of the system's errors is the machine's doing, whoever has asked for it.
 MACHINE_ERRORS = {
     getattr(errno, name)
@@ -160,10 +158,10 @@ class blamed:  # noqa: N801
 def did_you_mean(name: object, known: Iterable[str]) -> str:
     """What is meant: near names, or such as contain it; else all known ones, or how to see them."""
     name, known = name if isinstance(name, str) else "", sorted(set(known))
-    near = difflib.get_close_matches(name, known, n=NEAREST, cutoff=NEAR)
-    if not near and len(name) >= SHORTEST:
+    near = difflib.get_close_matches(name, known, cutoff=0.7)
+    if not near and len(name) > 2:
         longer = [other for other in known if name in other]
-        near = difflib.get_close_matches(name, longer, n=NEAREST, cutoff=0.0)
+        near = difflib.get_close_matches(name, longer, cutoff=0.0)
     if near:
         return f"did you mean {' or '.join(near)}?"
     if len(known) > MANY:

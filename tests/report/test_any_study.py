@@ -87,7 +87,7 @@ def test_a_study_is_compared_by_method_start_and_output(place, said):
     assert "start dropped: tire force, N" in text
     status, text = said("compare", place / "mine.toml", "--json")
     rows = {(r["label"], r["start"], r["output"]): r for r in json.loads(text)}
-    data = read_dataset(place / "results" / "studies" / "mine.nc", "study", "mine")
+    data = read_dataset(place / "results" / "studies" / "mine.nc")
     assert len(rows) == 3 * 2 * data.sizes["output"]
     for (method, start, output), row in rows.items():
         errors = data["rms_error"].sel({"label": method, "start": start, "output": output})
@@ -104,7 +104,7 @@ def test_a_study_is_compared_by_method_start_and_output(place, said):
 
 def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     said("compare", place / "mine.toml")
-    data = read_dataset(place / "results" / "studies" / "mine.nc", "study", "mine")
+    data = read_dataset(place / "results" / "studies" / "mine.nc")
     data["status"] = data["status"].astype(object)
     there = {"label": "mine", "start": "dropped", "frequency_factor": 1.3, "fastest": 20.0}
     before = {(r["label"], r["start"], r["output"]): r for r in grid_rows(data)}
@@ -200,7 +200,7 @@ def test_a_model_is_compared_by_every_method_and_output(tmp_path, capsys, monkey
     assert scores[1] < scores[0]
     known = {"nominal": ["errors", "histories"], "perturbed": ["errors"]}
     for name, kinds in known.items():
-        data = read_dataset(tmp_path / "studies" / f"{CAR}-{name}.nc", "study", f"{CAR}-{name}")
+        data = read_dataset(tmp_path / "studies" / f"{CAR}-{name}.nc")
         assert pictures_of(data) == kinds
 
 

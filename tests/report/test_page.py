@@ -63,7 +63,7 @@ def read(made):
 
 
 def dataset_of(folder, name):
-    return read_dataset(folder / "studies" / f"{name}.nc", "source", "vehiclemor")
+    return read_dataset(folder / "studies" / f"{name}.nc")
 
 
 def test_the_file_is_whole_and_loads_nothing(read):

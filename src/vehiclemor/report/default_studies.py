@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component, names
 from vehiclemor.report.findings import INDISTINGUISHABLE
-from vehiclemor.report.labels import default_rank, tabled_outputs
+from vehiclemor.report.labels import REDUCED, default_rank, tabled_outputs
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
@@ -26,10 +26,8 @@ FACTORS = (0.8, 0.9, 1.0, 1.1, 1.2)
 TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)
 # Method and preset: full order under both of its presets, the paper's methods, and what is measured
 # against them.
-FIRST = (
-    *(("full_order", "recommended"), ("full_order", "strongest"), ("replay", "recommended")),
-    *(("pod", "recommended"), ("pod", "literal"), ("fixed_basis", "recommended")),
-)
+FULL_ORDER = ("full_order", "recommended"), ("full_order", "strongest")
+FIRST = (*FULL_ORDER, ("replay", "recommended"), *REDUCED)
 # Of a protocol; every other method is a contender.
 ROLES = {"full_order": "full order", "replay": "baseline"}
 # Points [frequency factor, amplitude factor] of the sets of a protocol.

@@ -32,8 +32,6 @@ EXPONENT = re.compile(r"\^(-?\d+(?:\.\d+)?)")
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
 # Format of errors: an exact zero is 0, since orders of magnitude are compared.
 ERROR = ".1e"
-MOST_PRINTED = 3
-LARGEST_DEFAULT_RANK = 3
 # Method and preset of the reduced models that are timed where none are listed.
 REDUCED = (("pod", "recommended"), ("pod", "literal"), ("fixed_basis", "recommended"))
 
@@ -198,7 +196,7 @@ def of_kind(kind: str) -> OfKind:
 
 def default_rank(coordinates: int) -> int:
     """Rank of the reduced models in the default rows: 3, but less than the coordinates."""
-    return max(1, min(LARGEST_DEFAULT_RANK, coordinates - 1))
+    return max(1, min(3, coordinates - 1))
 
 
 def timing_cases(definition: ModelDefinition) -> list[Case]:
@@ -220,4 +218,4 @@ def tabled_outputs(definition: ModelDefinition) -> tuple[str, ...]:
 
 def main_outputs(definition: ModelDefinition) -> tuple[str, ...]:
     """Outputs that are printed and drawn: those that the model declares, or the first three."""
-    return definition.main_outputs or tabled_outputs(definition)[:MOST_PRINTED]
+    return definition.main_outputs or tabled_outputs(definition)[:3]

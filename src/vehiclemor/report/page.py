@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
+from vehiclemor.arguments import file_path, study_names
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import begins_with, replaceable, write_text
@@ -82,11 +82,7 @@ def write_report(
     studies = study_names("studies", studies)
     left_out: dict[str, str] = {}
     sections: list[Section] = []
-    if studies:
-        jobs = count("jobs", jobs, most=MOST_JOBS)
-        datasets = _run_studies(studies, folder, jobs)
-    else:
-        datasets = _stored(folder, left_out)
+    datasets = _run_studies(studies, folder, jobs) if studies else _stored(folder, left_out)
     if "paper" in studies:
         draw = partial(_paper, folder, jobs)
         sections += attempt_apart("comparison with the paper", left_out, draw)
@@ -123,7 +119,7 @@ def _stored(folder: Path, left_out: dict[str, str]) -> dict[str, xr.Dataset]:
     datasets: dict[str, xr.Dataset] = {}
     for path in sorted((folder / "studies").glob("*.nc")):
         try:
-            dataset = read_dataset(path, "source", "vehiclemor", stored=True)
+            dataset = read_dataset(path, stored=True)
         except FileError as error:
             left_out[str(path)] = str(error).removeprefix(f"{path}: ")
             continue

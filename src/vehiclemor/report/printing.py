@@ -24,8 +24,6 @@ Rows = Sequence[Mapping[str, Any]]
 WIDTH, WIDEST = 80, 120
 # A column of texts is never narrower, where its texts are longer.
 NARROWEST = 12
-# Indent of a note.
-NOTE = 4
 # Variable of a simulation -> column that is printed for each output.
 ERRORS = {"rms_error": "rms_error", "floor_rms_error": "floor", "max_error": "max_error"}
 ERRORS |= {"signal_range": "signal_range", "output_unit": "unit"}
@@ -101,7 +99,7 @@ class Table:
                 lines.append(wrapped(str(last), 0, 2))
             lines += _in_columns(line, widths, numbers)
             if self.note and row[self.note]:
-                lines.append(wrapped(str(row[self.note]), NOTE, NOTE))
+                lines.append(wrapped(str(row[self.note]), 4, 4))
         lines += [wrapped(text, 0, 1) for text in (meanings, self.below)]
         return "\n".join(filter(None, lines))
 

@@ -13,7 +13,7 @@ from vehiclemor.arguments import file_path, quoted
 from vehiclemor.error_measures import errors
 from vehiclemor.exceptions import InputError
 from vehiclemor.netcdf_file import read_dataset
-from vehiclemor.registry import unknown
+from vehiclemor.registry import choice
 from vehiclemor.report.labels import Kind
 from vehiclemor.study.plans.loading import content_hash, is_study, load_studies
 from vehiclemor.study.plans.study_runs import FACTORS
@@ -51,7 +51,7 @@ def stored_result(name: str, results: Path) -> xr.Dataset:
                 path = combined_path(results, study)
                 raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
             path = stored_path
-    return read_dataset(path, "source", "vehiclemor", stored)
+    return read_dataset(path, stored)
 
 
 def select_point(
@@ -82,16 +82,12 @@ def select_point(
 
 def check_point(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> list[str]:
     """Dimensions of a grid of methods, if this kind can be drawn where it is `chosen`."""
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise unknown("kind of plot", kind, KINDS)
+    choice("kind of plot", kind, KINDS)
     if "status" not in dataset:
         raise InputError("neither a run nor a study that can be drawn")
     dimensions = [str(name) for name in dataset["status"].dims]
     for key in chosen:
-        if not dimensions:
-            raise InputError(f"a single run has no dimension to choose, such as {quoted(key)}")
-        if key not in dimensions:
-            raise unknown("dimension of the result", key, dimensions)
+        choice("dimension of the result", key, dimensions)
     # What has no methods, such as a timing, is refused where it is drawn.
     return dimensions if "label" in dimensions else []
 

@@ -180,13 +180,14 @@ def _grid_parts(rows: list[Row]) -> list[Part]:
     lines: list[Row] = []
     runs: list[Row] = []
     for start, group in _groups(rows, "start").items():
+        by_output = _groups(group, "output")
         for output in outputs:
-            for row in (row for row in group if row["output"] == output):
+            for row in by_output[output]:
                 of = f"start {start}: {output.replace('_', ' ')}, {row['unit']}"
                 lines.append(row | {"of": of})
-                if output == outputs[0]:
-                    ends = {"failures": row["failures"] or "0", "seconds_in_loop": row["seconds"]}
-                    runs.append(row | ends | {"of": f"start {start}"})
+        for row in by_output[outputs[0]]:
+            ends = {"failures": row["failures"] or "0", "seconds_in_loop": row["seconds"]}
+            runs.append(row | ends | {"of": f"start {start}"})
     title = wrapped(f"{first['study']}: {first['title']}") + "\n"
     errors = ("label", "median", "largest", "floor", "failed", "largest_at")
     costs = ["label", "runs", "failures", "warned", "trained", "evaluations", "seconds_in_loop"]

@@ -28,8 +28,6 @@ Row = dict[str, Any]
 OUTSIDE = ("outside", "drawn_outside")
 # Column of seconds -> its ratio to the full order at equal error.
 CLOCKS = {"seconds": "ratio_equal", "loop_seconds": "ratio_equal_loop"}
-# Of the bounds of rates.
-CONFIDENCE = 0.95
 # SI unit of a bounded output -> the unit in which errors are printed, and its factor.
 PRINTED_UNITS = {"m": ("m", 1.0), "rad": ("deg", 180.0 / math.pi)}
 # A work-precision curve is continued to this part of the error of its last row.
@@ -163,7 +161,6 @@ def _failure(part: xr.Dataset) -> str:
 
 
 def _ratios_to_full_order(row: Row, full: list[Row], curves: list[list[Row]]) -> Row:
-    """Ratios of a row to the full order."""
     within = (other for other in full if other["misses"] == 0)
     best = min(within, key=lambda other: other["seconds"], default=None)
     equal = {clock: at_error(curves, row["score"], clock) for clock in CLOCKS}
@@ -212,14 +209,11 @@ def _on_curve(curve: Sequence[Row], error: float, clock: str) -> Equal:
     # A row that has failed has the error NaN, and is nowhere on a curve.
     if not curve or math.isnan(error):
         return Equal(math.nan)
-    loosest, tightest = curve[0], curve[-1]
-    if error >= loosest["score"]:
-        return Equal(loosest[clock], (loosest["label"],))
-    if error < tightest["score"]:
-        can_continue = len(curve) > 1 and error >= CONTINUED * tightest["score"]
-        return _interpolated(curve[-2], tightest, error, clock) if can_continue else Equal(math.nan)
+    if error >= curve[0]["score"]:
+        return Equal(curve[0][clock], (curve[0]["label"],))
     for loose, tight in pairwise(curve):
-        if error >= tight["score"]:
+        reach = CONTINUED if tight is curve[-1] else 1.0
+        if error >= reach * tight["score"]:
             return _interpolated(loose, tight, error, clock)
     return Equal(math.nan)
 
@@ -243,7 +237,7 @@ def upper_bound(misses: int, runs: int) -> float:
     if runs == 0:
         return 1.0
     test = binomtest(misses, runs, alternative="less")
-    return float(test.proportion_ci(CONFIDENCE, method="exact").high)
+    return float(test.proportion_ci(0.95, method="exact").high)
 
 
 def bound_rows(protocol: ProtocolFile, winner: Row) -> Iterator[Row]:

@@ -35,8 +35,6 @@ CAR = {"front_axle_distance": 1.2, "rear_axle_distance": 1.4, "front_track": 1.5
 CAR |= {"tire_radius": 0.32, "tire_stiffness": 2e5}
 SECTION = ((-0.8, 0.3), (0.8, 0.3), (0.8, 0.8), (0.6, 1.4), (-0.6, 1.4), (-0.8, 0.8), (-0.8, 0.3))
 OVERHANG, RIM = 0.8, 0.1
-# Factor on roll, pitch and bounce.
-MAGNIFY = 3.0
 
 
 def line(*points: Sequence[Any] | np.ndarray) -> np.ndarray:
@@ -100,7 +98,7 @@ def animate(
     *beside: Trajectory | xr.Dataset,
     labels: Sequence[str] = (),
     duration: float = 8.0,
-    magnify: float = MAGNIFY,
+    magnify: float = 3.0,
     out: str | Path = "car.gif",
 ) -> Path:
     """Write a film of runs of a car with the same input, together in colours.
@@ -116,7 +114,7 @@ def animate(
     duration
         Of the film in s; the run is shown faster or slower.
     magnify
-        Factor on roll, pitch and bounce, which the title names; 3 by default.
+        Factor on roll, pitch and bounce, which the title names.
     out
         GIF file.
 

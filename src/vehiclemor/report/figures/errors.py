@@ -32,8 +32,6 @@ from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
 # Lines of a panel.
 LINES = 8
-# Letters of an axis' label in a line.
-LETTERS = 38
 # Between marks of two lines above the axes, as a share of their height.
 SHIFT = 0.025
 # What a logarithmic axis can't show: mark, height as a share of the axes, text, which errors.
@@ -41,8 +39,6 @@ OFF: tuple[tuple[Style, float, str, Callable[[np.ndarray], np.ndarray]], ...] = 
     (theme.CROSS, 1.0, "a run has failed", lambda errors: ~np.isfinite(errors)),
     (theme.ZERO, 0.0, "error 0, off the log axis", lambda errors: errors == 0.0),
 )
-# Letters of a title in a line.
-TITLE = 60
 # Full-order integrators: of twelve no two look alike.
 GREYS: list[Style] = [
     {"color": color, "linestyle": line, "marker": marker, "markersize": 4, "linewidth": 0.8}
@@ -71,33 +67,22 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
         largest = errors.max(varied[1:])
         lines = {label: (text, largest.sel(label=label)) for label, text in methods.items()}
         notes.append(f"the largest error over {_listed(varied[1:])}")
-    figure = _panels(dataset, varied[0], outputs, lines)
-    _mark_saturation(figure, [f"{methods[m]} saturates at {r}" for m, r in saturated.items()])
+    ticks = ticks_of(dataset, varied[0])
+    if saturated and varied[0] == "rank":
+        texts = [f"{methods[label]} saturates at {rank}" for label, rank in saturated.items()]
+        ticks = ticks._replace(label=textwrap.fill(f"rank; {', '.join(texts)}", width=38))
+    size = 6.7 if len(outputs) < 3 else 8.5, 3.3
+    figure, grid = theme.panels(1, len(outputs), size)
+    for number, (panel, output) in enumerate(zip(grid.flat, outputs, strict=True)):
+        panel.set_title(theme.letter(number))
+        _draw_panel(panel, dataset, output, varied[0], ticks, lines)
+        ticks.scale(panel)
     trained = labels.trained_runs(dataset).sel(label=list(methods))
     if number := int(trained.sum()):
         notes.append(f"{number} of {trained.size} runs were in their own training")
     if notes:
         figure.suptitle("\n".join(notes), fontsize="medium")
     theme.legend_below(figure, figure.axes)
-    return figure
-
-
-def _mark_saturation(figure: Figure, texts: Sequence[str]) -> None:
-    """Say beside axes of ranks which methods reach their largest rank."""
-    for panel in figure.axes if texts else ():
-        if panel.get_xlabel() == "rank":
-            panel.set_xlabel(textwrap.fill(f"rank; {', '.join(texts)}", LETTERS))
-
-
-def _panels(dataset: xr.Dataset, axis: str, outputs: Sequence[str], lines: Lines) -> Figure:
-    """A panel for each output."""
-    ticks = ticks_of(dataset, axis)
-    size = 6.7 if len(outputs) < 3 else 8.5, 3.3
-    figure, grid = theme.panels(1, len(outputs), size)
-    for number, (panel, output) in enumerate(zip(grid.flat, outputs, strict=True)):
-        panel.set_title(theme.letter(number))
-        _draw_panel(panel, dataset, output, axis, ticks, lines)
-        ticks.scale(panel)
     return figure
 
 
@@ -165,7 +150,11 @@ def _draw_panel(
         axis.plot(ticks.at, np.where(visible, values, np.nan), label=text, **look)
         for mark, height, _, is_off in OFF:
             off = np.compress(is_off(values), ticks.at)
-            _draw_off(axis, off, mark, height, look["color"])
+            if len(off):
+                # Above those of other lines.
+                heights = np.full(len(off), height + SHIFT * _count_marked(axis, mark))
+                edge: Style = {"transform": axis.get_xaxis_transform(), "clip_on": False, **mark}
+                axis.plot(off, heights, color=look["color"], **edge)
     published = rms_numbers(str(dataset.attrs["model"])).get(output)
     if published and dimension in FACTORS:
         axis.axhline(published.value, label="published, nominal", **theme.THIN)
@@ -176,14 +165,6 @@ def _draw_panel(
         if _count_marked(axis, mark):
             axis.plot([], [], color="black", label=text, **mark)
     axis.set_ylabel(labels.error_label(dataset, "RMS error", output))
-
-
-def _draw_off(axis: Axes, at: np.ndarray, mark: Style, height: float, color: str) -> None:
-    """Marks at the edge of the axes, above those of other lines."""
-    if len(at):
-        heights = np.full(len(at), height + SHIFT * _count_marked(axis, mark))
-        transform = axis.get_xaxis_transform()
-        axis.plot(at, heights, color=color, transform=transform, clip_on=False, **mark)
 
 
 def _count_marked(axis: Axes, mark: Style) -> int:
@@ -259,5 +240,5 @@ def figure_pareto(dataset: xr.Dataset) -> Figure:
     # Of what is chosen the mark is larger than a line of the legend.
     figure.legend(loc="outside right upper", fontsize=7, markerscale=0.7)
     # The legend stands beside the axes, whose title can't be wrapped by itself.
-    axis.set_title(textwrap.fill(str(dataset.attrs["title"]), TITLE))
+    axis.set_title(textwrap.fill(str(dataset.attrs["title"]), width=60))
     return figure

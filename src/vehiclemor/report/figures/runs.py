@@ -22,15 +22,12 @@ from vehiclemor.simulation.trajectory import FINISHED
 INPUTS = ("-", *theme.DASHES)
 # Outputs that make a path in the plane.
 PATH = ("longitudinal_position", "lateral_position")
-DISTANCE = "distance from full order at the same time"
 RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
 # How far around the full-order signal the others are shown, as a multiple of its range; share of
 # the largest value below which the full order stands still.
 REACH, STILL = 0.6, 1e-4
-# Height of a panel in inches; letters of a label beside it in one line.
-HISTORY, ERROR, LINE = 2.5, 1.8, 26
-# Letters in a line of an input's meaning.
-MEANING = 20
+# Letters in one line of a label beside a panel of errors.
+LINE = 26
 
 
 class Curve(NamedTuple):
@@ -104,7 +101,7 @@ def figure_histories(
     rows: list[Callable[[Axes, Runs, str], object]] = [draw_history]
     if runs.compared:
         rows.append(draw_largest_errors if len(texts) > 1 else draw_errors)
-    heights = [HISTORY, ERROR][: len(rows)]
+    heights = [2.5, 1.8][: len(rows)]
     columns = len(outputs) + ("inputs" in runs.full)
     size = (6.7 if columns < 3 else 9.5, sum(heights) + 1.2)
     ratios = {"height_ratios": heights}
@@ -141,7 +138,7 @@ def draw_inputs(axis: Axes, run: xr.Dataset, meanings: Mapping[str, str]) -> Non
         axis.plot(run["time"], inputs[k], label=label, **look)
     text = meanings.get(names[shown[0]], names[shown[0]]) if len(shown) == 1 else "inputs"
     unit = labels.raised(units[shown[0]])
-    axis.set_ylabel(textwrap.fill(f"{text} ({unit})", MEANING))
+    axis.set_ylabel(textwrap.fill(f"{text} ({unit})", width=20))
 
 
 def draw_history(axis: Axes, runs: Runs, output: str) -> str:
@@ -263,7 +260,7 @@ def figure_paths(dataset: xr.Dataset) -> Figure:
     if missing:
         raise InputError(f"{dataset.attrs.get('model')} has no path: no output {missing}")
     runs = runs_of(dataset, legend_of(dataset))
-    titles = ["", DISTANCE][: 1 + runs.compared]
+    titles = ["", "distance from full order at the same time"][: 1 + runs.compared]
     figure, axes = theme.panels(len(titles), 1, (6.7, 1.4 + 1.5 * len(titles)), sharex=True)
     for number, (axis, title) in enumerate(zip(axes.flat, titles, strict=True)):
         axis.set_title(theme.letter(number, title))

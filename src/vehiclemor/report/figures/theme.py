@@ -34,9 +34,8 @@ METADATA: dict[str, dict[str, None]] = {
     "svg": {"Date": None, "Creator": None},
     "png": {"Software": None},
 }
-# Colour-blind safe (M. Okabe, K. Ito); and the colours of more lines than these.
+# Colour-blind safe (M. Okabe, K. Ito).
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-RAMP = "viridis"
 FULL: Style = {"color": "black", "linewidth": 2.6, "alpha": 0.45}
 # Lines differ where they are printed in grey too.
 DASHES = ("--", (0, (8, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2, 2, 2)))
@@ -79,7 +78,9 @@ def styles(labels: Iterable[str], methods: Mapping[str, str]) -> dict[str, Style
     taken = {style["color"] for style in known.values()}
     colors = [color for color in COLORS if color not in taken]
     if len(rest) > len(colors):
-        colors = [to_hex(color) for color in colormaps[RAMP](np.linspace(0.0, 0.95, len(rest)))]
+        colors = [
+            to_hex(color) for color in colormaps["viridis"](np.linspace(0.0, 0.95, len(rest)))
+        ]
     for label, color, dashes in zip(rest, colors, cycle(DASHES), strict=False):
         known[label] = {"color": color, "linestyle": dashes}
     return known
@@ -127,23 +128,19 @@ class Ticks(NamedTuple):
     label: str
     names: Sequence[str] = ()
 
-    def tick(self, axis: Axis) -> None:
-        """Label an axis."""
-        axis.set_label_text(self.label)
-        if self.names:
-            room = max(1, LETTERS // max(map(len, self.names)))
-            step = ceil(len(self.names) / min(12, room))
-            axis.set_ticks(self.at[::step], list(self.names)[::step])
-        elif self.at.dtype.kind == "i":
-            axis.set_major_locator(MaxNLocator(nbins=8, integer=True))
-
     def scale(self, panel: Axes) -> None:
         """Label the lower axis of a panel, logarithmic where the numbers ask for it."""
+        panel.set_xlabel(self.label)
         if self.names:
             panel.set_xlim(-0.5, len(self.names) - 0.5)
-        elif 0.0 < WIDE * self.at.min() <= self.at.max():
+            room = max(1, LETTERS // max(map(len, self.names)))
+            step = ceil(len(self.names) / min(12, room))
+            panel.set_xticks(self.at[::step], list(self.names)[::step])
+            return
+        if 0.0 < WIDE * self.at.min() <= self.at.max():
             panel.set_xscale("log")
-        self.tick(panel.xaxis)
+        if self.at.dtype.kind == "i":
+            panel.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
 
 
 def ticks_of(dataset: xr.Dataset, name: str) -> Ticks:
@@ -222,5 +219,4 @@ def save_figure(figure: Figure, path: Path) -> Path:
     """Write a complete figure; its format is the file's suffix."""
     suffix = picture_path(path).suffix.removeprefix(".").lower()
     metadata = METADATA[suffix]
-    write_whole(path, lambda part: figure.savefig(part, format=suffix, metadata=metadata))
-    return path
+    return write_whole(path, lambda part: figure.savefig(part, format=suffix, metadata=metadata))
