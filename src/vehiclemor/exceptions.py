@@ -1,7 +1,6 @@
 """Errors that a user can mend: each carries one clear line."""
 
 import difflib
-import dis
 import errno
 from collections.abc import Iterable
 from contextlib import suppress
@@ -51,10 +50,7 @@ class FileError(VehiclemorError):
 class CorruptError(FileError):
     """A stored result is damaged, or another than expected: it is computed again.
 
-    Attributes
-    ----------
-    reason
-        Without the path.
+    `reason` is the message without the path.
     """
 
     def __init__(self, reason: str, path: object = "", mend: str = "") -> None:
@@ -80,10 +76,7 @@ class UnreachableError(VehiclemorError):
 class ConvergenceError(VehiclemorError):
     """An iteration did not converge, or met a value that is not finite.
 
-    Attributes
-    ----------
-    trajectory
-        The run as far as it went, with its counts; None if there is none.
+    `trajectory` is the run as far as it went, with its counts; None if there is none.
     """
 
     def __init__(self, message: str, trajectory: Any = None) -> None:
@@ -111,14 +104,11 @@ def one_line(error: BaseException) -> str:
 def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
     """What to raise for an error of a plug-in's code: one line with file and line.
 
-    Parameters
-    ----------
-    code
-        The function, class or object that was used, or the name of a module.
+    `code` is the function, class or object that was used, or the name of a module.
     """
     of = code if isinstance(code, str) else getattr(code, "__module__", type(code).__module__)
     package = of.partition(".")[0]
-    if isinstance(error, KeyboardInterrupt) and not _is_raised(error, package):
+    if isinstance(error, KeyboardInterrupt):
         raise error
     lines = [
         f" ({frame.f_code.co_filename}:{line})"
@@ -129,13 +119,6 @@ def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
     if reason := machine_reason(error):
         return MachineError(f"{whose}: {reason}{where}")
     return PlugInError(f"{whose}: {one_line(error)}{where}")
-
-
-def _is_raised(error: BaseException, package: str) -> bool:
-    """Whether a `raise` of a package raises an error; Ctrl-C strikes at other instructions."""
-    *_, (frame, _) = walk_tb(error.__traceback__)
-    module, instruction = frame.f_globals.get("__name__", ""), frame.f_code.co_code[frame.f_lasti]
-    return module.partition(".")[0] == package and instruction == dis.opmap["RAISE_VARARGS"]
 
 
 class blamed:  # noqa: N801

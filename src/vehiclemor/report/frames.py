@@ -3,7 +3,6 @@
 import itertools
 import os
 from collections import Counter
-from collections.abc import Iterable
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -29,20 +28,17 @@ MEDIANS = ("seconds", "offline_seconds", "evaluations")
 ENGINES = {"zarr": "zarr", "parquet": "pyarrow"}
 
 
-def frame(dataset: xr.Dataset, variables: Iterable[str] = ()) -> pd.DataFrame:
+def frame(dataset: xr.Dataset) -> pd.DataFrame:
     """A row for each run, in the order of the grid; histories are left out.
 
     Columns are what varies (factors, parameters, start, label and its method, scenario), then the
-    wanted variables, all by default; one with further dimensions has a column for each of their
-    values: `rms_error.toe`.
+    variables; one with further dimensions has a column for each of their values: `rms_error.toe`.
     """
-    like, wanted = dataset["status"], set(variables)
+    like = dataset["status"]
     columns: dict[str, np.ndarray] = {}
     dimensions = _further_dimensions(dataset)
     coordinates = [name for name in dimensions if name in dataset.coords]
     variables = [name for name in dimensions if name not in dataset.coords]
-    if wanted:
-        variables = [name for name in variables if name in wanted]
     for name in (*coordinates, *variables):
         further = dimensions[name]
         complete, _ = xr.broadcast(dataset[name], like)
@@ -97,8 +93,8 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     head = {"kind": ERRORS, **attributes, "grid": _grid_text(dataset)}
     count = EVALUATIONS[component("model", head["model"]).kind]
     extended = dataset.assign(trained=trained_runs(dataset), evaluations=dataset[count])
-    wanted = ["rms_error", "floor_rms_error", "cell_key", "status", "message"]
-    runs: Any = frame(extended, [*wanted, *MEDIANS, "effective_rank", "warned", "trained"])
+    wanted = ["rms_error", "floor_rms_error", "cell_key", "status", "message", *MEDIANS]
+    runs: Any = frame(extended[[*wanted, "effective_rank", "warned", "trained"]])
     # Points of the grid that a method does not depend on are one run.
     runs = runs.drop_duplicates(["start", "label", "cell_key"])
     saturated = saturated_ranks(dataset)
@@ -121,7 +117,7 @@ def saturated_ranks(dataset: xr.Dataset) -> dict[str, int]:
     if not {"rank", *wanted} <= set(dataset.variables) or "rank" not in dataset["status"].dims:
         return {}
     # A method that has no rank is one run at all ranks.
-    runs: Any = frame(dataset, wanted).drop_duplicates(["label", "cell_key"])
+    runs: Any = frame(dataset[wanted]).drop_duplicates(["label", "cell_key"])
     runs = runs[runs["status"].isin(FINISHED)]
     ranks = runs.groupby("label", sort=False)["rank"].agg(["min", "max"])
     reached = runs.groupby("label", sort=False)["effective_rank"].max()
@@ -181,9 +177,10 @@ def _grid_text(dataset: xr.Dataset) -> str:
 def counted_ends(dataset: xr.Dataset) -> str:
     """How the runs of a study have ended; a run that stands at several points counts once."""
     extended = dataset.assign(trained=trained_runs(dataset))
-    runs: Any = frame(extended, ["status", "cell_key", "warned", "trained"])
+    wanted = {"status", "cell_key", "warned", "trained"} & set(extended)
+    runs: Any = frame(extended[[*wanted]])
     # Runs of a protocol have no such files.
-    if "cell_key" in runs:
+    if "cell_key" in wanted:
         runs = runs.drop_duplicates("cell_key")
     trained, warned = int(runs["trained"].sum()), runs["warned"] & (runs["status"] == "ok")
     note = f"; {trained} trained on the tested run" if trained else ""

@@ -1,6 +1,6 @@
 """What tables and figures show and how they call it: outputs, columns, cases of the cost table.
 
-The three models of the paper have rows of their own in `data/figures/tables.toml`; every other one
+The three models of the paper have rows of their own in `data/figures/labels.toml`; every other one
 gets rows by its kind of equations.
 """
 
@@ -62,12 +62,43 @@ class Column(NamedTuple):
     scale: float = 1.0
 
 
+class Case(MethodEntry):
+    """A row of a cost table; identifier and label of a reduced model follow from its settings."""
+
+    id: str = ""
+
+    def named(self) -> Case:
+        """With identifier and label: what differs from the recommended settings."""
+        label = self.label
+        if not label:
+            parts = [self.method.replace("_", " ")]
+            parts += [self.preset] if self.preset != "recommended" else []
+            rest = dict(self.settings)
+            rank, tolerance = rest.pop("rank"), rest.pop("tolerance", None)
+            label = " ".join([*parts, *map(str, rest.values()), f"r={rank}"])
+            label += "" if tolerance is None else f", {tolerance:.0e}".replace("e-0", "e-")
+        name = self.id or label.replace(",", "").replace("=", "").replace(" ", "_")
+        return self.model_copy(update={"id": name, "label": label})
+
+
+class OfKind(FileSchema):
+    """What tables show of all models of a kind."""
+
+    against: list[Line] = Field(min_length=2, max_length=2)
+    cases: list[Case]
+    counts: dict[str, Line]
+
+
 class LabelFile(FileSchema):
     """Schema of `data/figures/labels.toml`."""
 
     outputs: dict[str, Label]
     methods: dict[str, MethodLook]
     columns: dict[str, Column]
+    algebraic: OfKind
+    dynamic: OfKind
+    structural: OfKind
+    reduced: dict[str, list[Case]]
 
 
 @cache
@@ -146,51 +177,9 @@ def error_label(dataset: xr.Dataset, kind: str, output: str, unit: str = "") -> 
 # What is shown of a model.
 
 
-class Case(MethodEntry):
-    """A row of a cost table; identifier and label of a reduced model follow from its settings."""
-
-    id: str = ""
-
-    def named(self) -> Case:
-        """With identifier and label: what differs from the recommended settings."""
-        label = self.label
-        if not label:
-            parts = [self.method.replace("_", " ")]
-            parts += [self.preset] if self.preset != "recommended" else []
-            rest = dict(self.settings)
-            rank, tolerance = rest.pop("rank"), rest.pop("tolerance", None)
-            label = " ".join([*parts, *map(str, rest.values()), f"r={rank}"])
-            label += "" if tolerance is None else f", {tolerance:.0e}".replace("e-0", "e-")
-        name = self.id or label.replace(",", "").replace("=", "").replace(" ", "_")
-        return self.model_copy(update={"id": name, "label": label})
-
-
-class OfKind(FileSchema):
-    """What tables show of all models of a kind, see `data/figures/tables.toml`."""
-
-    against: list[Line] = Field(min_length=2, max_length=2)
-    cases: list[Case]
-    counts: dict[str, Line]
-
-
-class TablesFile(FileSchema):
-    """Schema of `data/figures/tables.toml`."""
-
-    algebraic: OfKind
-    dynamic: OfKind
-    structural: OfKind
-    reduced: dict[str, list[Case]]
-
-
-@cache
-def tables_file() -> TablesFile:
-    """The package's own file."""
-    return read_toml(data_folder() / "figures" / "tables.toml", TablesFile)
-
-
 def of_kind(kind: str) -> OfKind:
     """What tables show of all models of a kind, one of `KINDS`."""
-    file = tables_file()
+    file = declared()
     return {"ae": file.algebraic, "structural": file.structural}.get(kind, file.dynamic)
 
 
@@ -202,7 +191,7 @@ def default_rank(coordinates: int) -> int:
 def timing_cases(definition: ModelDefinition) -> list[Case]:
     """Rows of a model's cost table: full-order solvers, replay, reduced models."""
     settings: Settings = {"rank": default_rank(len(definition.coordinates))}
-    reduced = tables_file().reduced.get(definition.name) or [
+    reduced = declared().reduced.get(definition.name) or [
         Case.model_validate({"method": method, "preset": preset, "settings": settings})
         for method, preset in REDUCED
         # Those of structures stand among their cases.

@@ -22,9 +22,8 @@ NOMINAL_ERROR = "nominal-only: trained on the run that it is tested on, where re
 SAVED = "share of the time of {} that is saved; the paper names neither its {} nor its machine"
 OF_INTEGRATION = SAVED.format("the same integrator's full run at equal tolerance", "integrator")
 OF_ITERATION = SAVED.format("Newton with fresh Jacobians and generated elimination", "solver")
-# Label of a method in the paper's studies -> what its rows are called, preset.
+# Label of a method in the paper's studies -> what its rows are called.
 VARIANTS = {"pod": "default", "pod_literal": "literal"}
-PRESETS = {"pod": "recommended", "pod_literal": "literal"}
 # Of the timing of a model, beside those of studies.
 TIMING = {model: f"timing-{model}" for model in get_args(Model)}
 # Studies and timings by name.
@@ -212,7 +211,8 @@ def time_saved(number: Number, results: Results, label: str) -> Finding:
 
 def case_of(number: Number, label: str) -> str:
     """Timing case of control-period POD with the number's states and nothing else set; or none."""
-    wanted = "pod", PRESETS[label], {"rank": number.states or 3}
+    preset = "recommended" if label == "pod" else "literal"
+    wanted = "pod", preset, {"rank": number.states or 3}
     for case in timing_cases(component("model", number.model)):
         if (case.method, case.preset, case.settings) == wanted:
             return case.id

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -42,10 +41,10 @@ def comparison_text(what: str, rows: pd.DataFrame, folder: Path, show_all: bool 
 
 def _groups(rows: Iterable[Row], key: str) -> dict[Any, list[Row]]:
     """Rows by the value of a column, in the order of the first of each."""
-    table = list(rows)
-    order = list(dict.fromkeys(row[key] for row in table))
-    table.sort(key=lambda row: order.index(row[key]))
-    return {value: list(group) for value, group in groupby(table, itemgetter(key))}
+    groups: dict[Any, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(row[key], []).append(row)
+    return groups
 
 
 # The paper.

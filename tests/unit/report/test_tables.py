@@ -21,7 +21,6 @@ from vehiclemor.report.labels import (
     method_text,
     of_kind,
     readable_unit,
-    tables_file,
     timing_cases,
 )
 from vehiclemor.report.printing import Table, simulation_text, width
@@ -144,7 +143,7 @@ def test_rows_of_costs_are_named_once_and_their_methods_take_the_settings(name):
 @pytest.mark.parametrize(("name", "nominal"), [*zip(MODELS, NOMINAL, strict=True)])
 def test_settings_of_the_paper_are_the_defaults_of_pod(name, nominal):
     assert of_paper(name) == nominal
-    assert set(tables_file().reduced) == set(MODELS)
+    assert set(declared().reduced) == set(MODELS)
     printed = [n for n in load_published().numbers.values() if n.model == name]
     model = build(name)
     assert smaller_rank(model, "pod") == {}

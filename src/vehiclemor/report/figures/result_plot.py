@@ -64,7 +64,7 @@ def draw(dataset: xr.Dataset, kind: str) -> Figure:
     """A picture of a study: at its nominal or first point, or of the study as it is."""
     if kind in KINDS:
         point, _ = select_point(dataset, kind, {})
-        return figure_of(point, kind)
+        return plot_result(point, None, kind)
     return PICTURES[kind].draw(dataset)
 
 
@@ -75,15 +75,6 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
     the methods are left; errors are drawn over the axes of the grid too.  A picture is written to a
     `path` (PDF, SVG or PNG), if there is one.
     """
-    with theme.styled():
-        figure = figure_of(dataset, kind)
-        if path is not None:
-            theme.save_figure(figure, path)
-    return figure
-
-
-def figure_of(dataset: xr.Dataset, kind: str) -> Figure:
-    """The picture that `plot_result` draws, in the style that holds."""
     match result_kind(dataset):
         case "protocol":
             text = "a protocol has no grid to draw over; vehiclemor figures --only draws it"
@@ -91,10 +82,13 @@ def figure_of(dataset: xr.Dataset, kind: str) -> Figure:
         case "other":
             raise InputError("neither a run nor a study of runs: nothing to draw over time or grid")
     dataset = by_method(dataset)
-    figure = PICTURES[kind].draw(dataset)
-    lines = filter(None, (_title(dataset), figure.get_suptitle()))
-    figure.suptitle("\n".join(lines), fontsize="medium", wrap=True)
-    theme.tell_empty(figure)
+    with theme.styled():
+        figure = PICTURES[kind].draw(dataset)
+        lines = filter(None, (_title(dataset), figure.get_suptitle()))
+        figure.suptitle("\n".join(lines), fontsize="medium", wrap=True)
+        theme.tell_empty(figure)
+        if path is not None:
+            theme.save_figure(figure, path)
     return figure
 
 
