@@ -106,13 +106,19 @@ def cost_text(model: str, folder: Path, brief: bool = False) -> str:
     rows: Any = cost_table(model, folder)
     definition = component("model", model)
     kind = of_kind(definition.kind)
-    rows["spread"] = 50.0 * rows["quartile_spread"]
     rows["from"] = "start " + rows["start"]
     ended = rows["status"].where(rows["status"] != "ok", "")
     rows["label"] += ended.map(lambda status: f" ({status})" if status else "")
     if brief:
         rows = rows[rows["start"] == rows["start"].iloc[0]]
-    times = ["label", "us_per_run", "spread", "speed_up", "speed_up_strongest", "offline_us"]
+    times = [
+        "label",
+        "us_per_run",
+        "quartile_spread",
+        "speed_up",
+        "speed_up_strongest",
+        "offline_us",
+    ]
     times += ["break_even", "break_even_strongest"]
     title = f"Cost on {data.attrs['title'].removeprefix('timing of ')} ({data.attrs['machine']})"
     against = f"same: against {kind.against[0]}; best: against {kind.against[1]}; -: never, or none"

@@ -20,8 +20,7 @@ from vehiclemor.report.figures.theme import FULL, Style, panels, styled, styles
 from vehiclemor.report.labels import method_text
 from vehiclemor.simulation.trajectory import Trajectory
 
-FULL_ORDER = "full order"
-FRAMES_PER_SECOND, DOTS, DURATIONS, FACTORS = 12, 100, (0.5, 60.0), (0.01, 1000.0)
+FRAMES_PER_SECOND, DURATIONS, FACTORS = 12, (0.5, 60.0), (0.01, 1000.0)
 # Half of what is seen of the road from above; and least and most of it from behind (m).
 ALONG, ACROSS, NARROWEST, WIDEST = 16.0, 7.0, 3.0, 6.5
 PLACE = ("longitudinal_position", "lateral_position", "yaw")
@@ -136,7 +135,7 @@ def animate(
             runs.append(quantities)
     texts = list(labels) or [method_text(name) for name in methods]
     if not labels and beside:
-        texts[-1] = FULL_ORDER
+        texts[-1] = "full order"
     if len(texts) != len(runs):
         raise InputError(f"labels: {len(runs)} runs are drawn, not {len(texts)}")
     followed = runs[-1]
@@ -156,7 +155,7 @@ def animate(
         frames = [{name: h[name][rows] for name in h} for h in runs]
         film = _film(frames, texts, looks, _parameters(run), factor)
         writer = PillowWriter(fps=FRAMES_PER_SECOND)
-        return write_whole(path, lambda part: film.save(part, writer=writer, dpi=DOTS))
+        return write_whole(path, lambda part: film.save(part, writer=writer, dpi=100))
 
 
 def _styles(methods: Sequence[str]) -> list[Style]:
@@ -226,7 +225,7 @@ def _histories(run: Any) -> list[tuple[str, dict[str, np.ndarray]]]:
     dataset = run.dataset() if isinstance(run, Trajectory) else run
     if not isinstance(dataset, xr.Dataset) or "outputs" not in dataset:
         raise InputError(f"{quoted(run)} is neither a run nor a dataset with histories")
-    dataset = by_method(dataset, "reduced")
+    dataset = by_method(dataset)
     known = [str(label) for label in dataset["label"].values]
     reduced = [label for label in known if not label.startswith("full_order")] or known[:1]
     histories = [(name, _quantities(dataset.sel(label=name), "outputs")) for name in reduced]

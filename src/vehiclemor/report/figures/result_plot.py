@@ -102,10 +102,10 @@ def model_name(dataset: xr.Dataset) -> str:
     return str(dataset.attrs.get("model") or configuration(dataset).get("model", "it"))
 
 
-def by_method(dataset: xr.Dataset, unnamed: str = "run") -> xr.Dataset:
+def by_method(dataset: xr.Dataset) -> xr.Dataset:
     """A result on the dimension `label`, which that of one run does not have."""
     if "label" not in dataset.coords:
-        method = dataset.attrs.get("method") or configuration(dataset).get("method", unnamed)
+        method = dataset.attrs.get("method") or configuration(dataset).get("method", "run")
         dataset = dataset.assign_coords(label=method)
     return dataset if "label" in dataset.dims else dataset.expand_dims("label")
 

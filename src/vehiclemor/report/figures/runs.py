@@ -33,7 +33,6 @@ LINE = 26
 class Curve(NamedTuple):
     """One run, with the text of its legend and its style."""
 
-    label: str
     text: str
     style: Style
     run: xr.Dataset
@@ -85,7 +84,7 @@ def runs_of(dataset: xr.Dataset, texts: Mapping[str, str]) -> Runs:
         raise InputError(f"choose a point of the grid first: {', '.join(several)}")
     with_full = (p for p in points.values() if bool(p["reference_outputs"].notnull().any()))
     looks = theme.styles(texts, theme.methods_of(dataset))
-    curves = [Curve(label, text, looks[label], points[label]) for label, text in texts.items()]
+    curves = [Curve(text, looks[label], points[label]) for label, text in texts.items()]
     return Runs(next(with_full, next(iter(points.values()))), curves)
 
 

@@ -78,9 +78,8 @@ def styles(labels: Iterable[str], methods: Mapping[str, str]) -> dict[str, Style
     taken = {style["color"] for style in known.values()}
     colors = [color for color in COLORS if color not in taken]
     if len(rest) > len(colors):
-        colors = [
-            to_hex(color) for color in colormaps["viridis"](np.linspace(0.0, 0.95, len(rest)))
-        ]
+        ramp = colormaps["viridis"](np.linspace(0.0, 0.95, len(rest)))
+        colors = list(map(to_hex, ramp))
     for label, color, dashes in zip(rest, colors, cycle(DASHES), strict=False):
         known[label] = {"color": color, "linestyle": dashes}
     return known
@@ -114,8 +113,7 @@ def panels(
 
 def letter(number: int, title: str = "") -> str:
     """Title of a panel, counted from 0."""
-    name = string.ascii_lowercase[number % 26] * (number // 26 + 1)
-    return f"({name}) {title}".rstrip()
+    return f"({string.ascii_lowercase[number]}) {title}".rstrip()
 
 
 class Ticks(NamedTuple):
