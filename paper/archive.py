@@ -12,7 +12,7 @@ from pathlib import Path
 
 import vehiclemor
 from vehiclemor.netcdf_file import read_dataset, write_dataset
-from vehiclemor.report.frames import frame
+from vehiclemor.report.results import frame
 
 README = """vehiclemor {version}: stored results of all studies
 

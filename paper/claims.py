@@ -26,23 +26,26 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.comparison import PAPER, at_published_start
-from vehiclemor.report.findings import INDISTINGUISHABLE, VERDICTS, at_point, judged
 from vehiclemor.report.labels import Column
 from vehiclemor.report.printing import Table
 from vehiclemor.report.published import (
+    INDISTINGUISHABLE,
     TIMING,
     VARIANTS,
+    VERDICTS,
     Finding,
     Model,
     Printed,
     Results,
     case_of,
     judge_rms_error,
+    judged,
     load_published,
     printed_errors_and_savings,
     time_saved,
     timing_scatter,
 )
+from vehiclemor.report.results import at_point
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 from vehiclemor.study.plans.loading import load_studies

@@ -18,8 +18,8 @@ from mesh_sizes import size_rows
 
 import vehiclemor as vm
 from vehiclemor.registry import names
-from vehiclemor.report.frames import frame
 from vehiclemor.report.published import load_published, number_rows, rms_numbers
+from vehiclemor.report.results import frame
 from vehiclemor.report.unseen import count_rows, protocol_rows
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"

@@ -19,8 +19,8 @@ from vehiclemor.report.comparison import study_comparison
 from vehiclemor.report.default_studies import nominal, unseen
 from vehiclemor.report.figures.result_plot import draw, pictures_of, plot_result
 from vehiclemor.report.figures.theme import styled
-from vehiclemor.report.frames import ERRORS, grid_rows
 from vehiclemor.report.labels import tabled_outputs
+from vehiclemor.report.results import ERRORS, grid_rows
 from vehiclemor.study.run import run_studies
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from claims import CRITERIA, claim_rows, stored_results
 
+import vehiclemor as vm
 from tests.models import MODELS, VEHICLES
 from vehiclemor.cli import main
-from vehiclemor.report import comparison
 from vehiclemor.report.comparison import at_published_start, cost_table, paper_comparison, timing_of
-from vehiclemor.report.findings import LARGEST_SPREAD, judged
-from vehiclemor.report.published import TIMING, load_published, time_saved
+from vehiclemor.report.published import LARGEST_SPREAD, TIMING, judged, load_published, time_saved
 from vehiclemor.study.run import run_studies
 
 
@@ -138,7 +137,7 @@ def test_break_even_is_the_training_over_what_a_run_saves(results_folder, model)
 @pytest.fixture
 def said(results_folder, capsys, monkeypatch, rows):
     """Run `compare` on the stored rows: exit status and what it prints."""
-    monkeypatch.setattr(comparison, "compare", lambda *_: rows)
+    monkeypatch.setattr(vm, "compare", lambda *_: rows)
     monkeypatch.setenv("COLUMNS", "80")
 
     def run(*arguments):

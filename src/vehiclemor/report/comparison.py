@@ -16,10 +16,9 @@ from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction.reduced_model import ReducedOrderModel
 from vehiclemor.registry import component, names, unknown
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.frames import frame, grid_rows
 from vehiclemor.report.labels import of_kind, timing_cases
 from vehiclemor.report.published import TIMING, number_rows, printed_errors_and_savings
-from vehiclemor.report.result_selection import result_kind
+from vehiclemor.report.results import frame, grid_rows, result_kind
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.trajectory import Trajectory
@@ -116,8 +115,8 @@ def study_comparison(
     """A study, all members of a collection, or a protocol; what is missing is run first.
 
     `kind` tells what a row is.  `errors`: an output of one method from one start over a study's
-    grid, see `frames.grid_rows`.  `method`, `target`, `bound`: a method of a protocol, and what the
-    one that validation has chosen must and does reach, see `unseen`.  Errors are in SI units.
+    grid, see `results.grid_rows`.  `method`, `target`, `bound`: a method of a protocol, and what
+    the one that validation has chosen must and does reach, see `unseen`.  Errors are in SI units.
     """
     results = run_studies(study, folder, jobs, seed=seed).values()
     return pd.DataFrame([row for dataset in results for row in result_rows(dataset)])

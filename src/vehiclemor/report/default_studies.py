@@ -12,9 +12,8 @@ import numpy as np
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.registry import component, names
-from vehiclemor.report.findings import INDISTINGUISHABLE
 from vehiclemor.report.labels import REDUCED, default_rank, tabled_outputs
-from vehiclemor.report.published import rms_numbers
+from vehiclemor.report.published import INDISTINGUISHABLE, rms_numbers
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.experiment import default_settings

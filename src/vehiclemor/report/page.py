@@ -22,8 +22,7 @@ from vehiclemor.report.comparison import paper_comparison, result_rows
 from vehiclemor.report.default_studies import nominal, perturbed, unseen
 from vehiclemor.report.figures.result_plot import PICTURES, pictures_of, plot_result
 from vehiclemor.report.figures.theme import METADATA, styled
-from vehiclemor.report.frames import counted_ends
-from vehiclemor.report.result_selection import KINDS, select_point
+from vehiclemor.report.results import KINDS, counted_ends, select_point
 from vehiclemor.report.screens import Part, paper_parts, study_parts
 from vehiclemor.study.plans.loading import refuse_doubles
 from vehiclemor.study.run import run_studies

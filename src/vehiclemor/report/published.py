@@ -1,7 +1,8 @@
-"""What the paper prints: its numbers, each with its page, and ours beside them; how to cite."""
+"""What the paper prints: its numbers, each with its page; verdicts on ours; how to cite."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib.metadata import version
 from typing import Any, Literal, NamedTuple, get_args
@@ -11,8 +12,8 @@ import xarray as xr
 
 from vehiclemor.files import data_folder
 from vehiclemor.registry import component, names
-from vehiclemor.report.findings import at_point, judged, scatter
 from vehiclemor.report.labels import timing_cases
+from vehiclemor.report.results import at_point
 from vehiclemor.study.plans.loading import load_studies
 from vehiclemor.toml_files import FileSchema, Line, read_toml
 
@@ -22,6 +23,14 @@ NOMINAL_ERROR = "nominal-only: trained on the run that it is tested on, where re
 SAVED = "share of the time of {} that is saved; the paper names neither its {} nor its machine"
 OF_INTEGRATION = SAVED.format("the same integrator's full run at equal tolerance", "integrator")
 OF_ITERATION = SAVED.format("Newton with fresh Jacobians and generated elimination", "solver")
+MET, MISSED, NOT_COMPARABLE = "met", "missed", "not_comparable"
+VERDICTS = {MET: "met", MISSED: "missed", NOT_COMPARABLE: "not comparable"}
+# Interquartile range of the rounds of a timing over their median, above which a time decides
+# nothing: half of the runs lie up to a fifth apart.
+LARGEST_SPREAD = 0.2
+# Curves that agree within this share of the range lie on top of each other: 0.4 mm on a curve that
+# is 40 mm high.
+INDISTINGUISHABLE = 0.01
 # Label of a method in the paper's studies -> what its rows are called.
 VARIANTS = {"pod": "default", "pod_literal": "literal"}
 # Of the timing of a model, beside those of studies.
@@ -102,6 +111,28 @@ def citations() -> str:
 
 
 # Ours beside the paper's.
+
+
+def judged(within: bool | None) -> str:
+    """Verdict on a number that is within its bound or not, or can't be compared."""
+    return {True: MET, False: MISSED, None: NOT_COMPARABLE}[within]
+
+
+def scatter(spreads: Mapping[str, float]) -> str:
+    """Why times can't be compared, by the spreads of their rounds; empty if they can."""
+    wide = [f"{name} {100 * s:.0f} %" for name, s in spreads.items() if not s <= LARGEST_SPREAD]
+    if not wide:
+        return ""
+    return (
+        f"the rounds scatter by more than {100 * LARGEST_SPREAD:.0f} % (interquartile range over "
+        f"median): {', '.join(wide)}; run again on an idle machine"
+    )
+
+
+def counted(verdicts: Iterable[str]) -> str:
+    """How many rows there are of each verdict, as text."""
+    number = Counter(verdicts)
+    return ", ".join(f"{number[v]} {text}" for v, text in VERDICTS.items() if v in number)
 
 
 def of_paper(name: str) -> str:

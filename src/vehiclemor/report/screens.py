@@ -10,10 +10,10 @@ import pandas as pd
 
 from vehiclemor.registry import component, names
 from vehiclemor.report.comparison import PAPER, cost_table, timing_of
-from vehiclemor.report.findings import VERDICTS, counted
-from vehiclemor.report.frames import ERRORS
 from vehiclemor.report.labels import ERROR, Column, column, main_outputs, of_kind
 from vehiclemor.report.printing import Table, format_value, wrapped
+from vehiclemor.report.published import VERDICTS, counted
+from vehiclemor.report.results import ERRORS
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 Row = dict[str, Any]
@@ -111,15 +111,8 @@ def cost_text(model: str, folder: Path, brief: bool = False) -> str:
     rows["label"] += ended.map(lambda status: f" ({status})" if status else "")
     if brief:
         rows = rows[rows["start"] == rows["start"].iloc[0]]
-    times = [
-        "label",
-        "us_per_run",
-        "quartile_spread",
-        "speed_up",
-        "speed_up_strongest",
-        "offline_us",
-    ]
-    times += ["break_even", "break_even_strongest"]
+    times = ["label", "us_per_run", "quartile_spread", "speed_up", "speed_up_strongest"]
+    times += ["offline_us", "break_even", "break_even_strongest"]
     title = f"Cost on {data.attrs['title'].removeprefix('timing of ')} ({data.attrs['machine']})"
     against = f"same: against {kind.against[0]}; best: against {kind.against[1]}; -: never, or none"
     below = wrapped(against)

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from vehiclemor.report.findings import NOT_COMPARABLE, judged, scatter
 from vehiclemor.report.labels import unit_of
+from vehiclemor.report.published import NOT_COMPARABLE, judged, scatter
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import errors_by, outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER

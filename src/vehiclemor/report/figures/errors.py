@@ -22,9 +22,8 @@ from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.runs import legend_of
 from vehiclemor.report.figures.theme import Style, Ticks, tick_decades, ticks_of
-from vehiclemor.report.findings import at_point
-from vehiclemor.report.frames import saturated_ranks
 from vehiclemor.report.published import rms_numbers
+from vehiclemor.report.results import at_point, saturated_ranks
 from vehiclemor.report.unseen import method_rows, protocol_of
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.protocol import FULL_ORDER

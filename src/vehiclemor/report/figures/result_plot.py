@@ -19,7 +19,7 @@ from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.errors import figure_errors, figure_pareto
 from vehiclemor.report.figures.runs import PATH, figure_histories, figure_paths
 from vehiclemor.report.labels import main_outputs, tabled_outputs
-from vehiclemor.report.result_selection import KINDS, result_kind, select_point
+from vehiclemor.report.results import KINDS, result_kind, select_point
 from vehiclemor.study.plans.loading import refuse_doubles
 from vehiclemor.study.run import run_studies
 

@@ -14,8 +14,8 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.theme import CROSS, FULL, Style, hide_rounding, tick_decades
-from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
+from vehiclemor.report.results import at_point
 from vehiclemor.simulation.trajectory import FINISHED
 
 # Lines of inputs.
