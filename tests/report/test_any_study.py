@@ -14,9 +14,8 @@ from tests.report.figure_texts import checked
 from vehiclemor.cli import main
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import component, names
-from vehiclemor.report import default_studies
-from vehiclemor.report.comparison import study_comparison
-from vehiclemor.report.default_studies import nominal, unseen
+from vehiclemor.report import comparison
+from vehiclemor.report.comparison import nominal, study_comparison, unseen
 from vehiclemor.report.figures.result_plot import draw, pictures_of, plot_result
 from vehiclemor.report.figures.theme import styled
 from vehiclemor.report.labels import tabled_outputs
@@ -170,12 +169,13 @@ FEW = ("fixed_basis", "full_order", "mine", "path_map", "pod", "quarter_car_mode
 
 @pytest.fixture(autouse=True)
 def few_methods(monkeypatch):
-    monkeypatch.setattr(default_studies, "names", lambda k: [n for n in names(k) if n in FEW])
+    few = [name for name in names("method") if name in FEW]
+    monkeypatch.setattr(comparison, "names", lambda kind: few if kind == "method" else names(kind))
 
 
 def test_a_model_is_compared_by_every_method_and_output(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(default_studies, "FACTORS", (0.8, 1.0, 1.2))
-    monkeypatch.setitem(default_studies.POINTS, "test", [[0.9, 1.0], [1.3, 1.0]])
+    monkeypatch.setattr(comparison, "FACTORS", (0.8, 1.0, 1.2))
+    monkeypatch.setitem(comparison.POINTS, "test", [[0.9, 1.0], [1.3, 1.0]])
     assert main(["compare", CAR, "--results", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert main(["compare", CAR, "--json", "--results", str(tmp_path)]) == 0

@@ -199,7 +199,7 @@ def metrics(
     """
     import pandas as pd
 
-    from vehiclemor.report.comparison import handling_rows
+    from vehiclemor.handling.metrics import handling_rows
     from vehiclemor.report.labels import Column
     from vehiclemor.report.printing import Table, json_text
 

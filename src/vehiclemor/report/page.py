@@ -18,8 +18,7 @@ from vehiclemor.failure import attempt_apart
 from vehiclemor.files import begins_with, replaceable, write_text
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
-from vehiclemor.report.comparison import paper_comparison, result_rows
-from vehiclemor.report.default_studies import nominal, perturbed, unseen
+from vehiclemor.report.comparison import nominal, paper_comparison, perturbed, result_rows, unseen
 from vehiclemor.report.figures.result_plot import PICTURES, pictures_of, plot_result
 from vehiclemor.report.figures.theme import METADATA, styled
 from vehiclemor.report.results import KINDS, counted_ends, select_point

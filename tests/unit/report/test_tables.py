@@ -13,7 +13,7 @@ from scipy.stats import binom
 import vehiclemor as vm
 from tests.models import MODELS
 from vehiclemor.registry import component, names
-from vehiclemor.report.default_studies import smaller_rank
+from vehiclemor.report.comparison import smaller_rank
 from vehiclemor.report.labels import (
     Column,
     column,
