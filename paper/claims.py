@@ -448,7 +448,7 @@ def precisely_followed(results: Results, label: str) -> Finding:
 def six_slower(results: Results, label: str) -> Finding:
     """Figure 14: six states take more time than three, but less than the full model."""
     timing = results[TIMING["double_wishbone"]]
-    numbers = load_published().numbers
+    numbers = load_published()
     few, many = (case_of(numbers[f"dw_time_reduction_{n}"], label) for n in (3, 6))
     row = timing.sel(case=many)
     slower = float(row["seconds"] / timing["seconds"].sel(case=few))

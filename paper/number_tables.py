@@ -217,7 +217,7 @@ def comparison(results: Path) -> Iterator[Entry]:
 
 def published() -> Iterator[Entry]:
     """What the paper prints."""
-    for key, number in load_published().numbers.items():
+    for key, number in load_published().items():
         yield slug("published", key), number.value, number.unit
 
 

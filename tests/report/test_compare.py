@@ -21,7 +21,7 @@ def rows(results_folder):
 
 def test_every_published_number_has_a_row(rows):
     published = load_published()
-    compared = {n.id for n in published.number if n.kind in ("rms_error", "time_reduction")}
+    compared = {n.id for n in published.values() if n.kind in ("rms_error", "time_reduction")}
     assert set(rows["id"]) == compared
     assert set(rows["model"]) == {*MODELS}
 
@@ -63,7 +63,7 @@ def saving(timings, **changes):
     data = timings[name].copy(deep=True)
     for variable, (value, place) in changes.items():
         data[variable].loc[place] = value
-    return time_saved(load_published().numbers["hfv_time_reduction"], {name: data}, "pod")
+    return time_saved(load_published()["hfv_time_reduction"], {name: data}, "pod")
 
 
 def verdict_of(timings, **changes):

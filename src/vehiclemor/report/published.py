@@ -15,7 +15,7 @@ from vehiclemor.registry import component, names
 from vehiclemor.report.labels import timing_cases
 from vehiclemor.report.results import at_point
 from vehiclemor.study.plans.loading import load_studies
-from vehiclemor.toml_files import FileSchema, Line, read_toml
+from vehiclemor.toml_files import FileSchema, Line, read_toml, toml_content
 
 # Models of the paper: it says nothing about others in the registry.
 Model = Literal["independent_suspension_vehicle", "double_wishbone", "high_fidelity_vehicle"]
@@ -72,33 +72,23 @@ class Published(FileSchema):
 
     number: list[Number]
 
-    @property
-    def numbers(self) -> dict[str, Number]:
-        """Id -> number, in the order of the file."""
-        return {number.id: number for number in self.number}
-
-
-class FixedSets(FileSchema):
-    """Schema of `data/published/test_sets.toml`: name of a test set -> its digest."""
-
-    test_sets: dict[str, str]
-
 
 @cache
-def load_published() -> Published:
-    """What the paper prints, from the file of the package."""
-    return read_toml(data_folder() / "published" / "masoudi2015.toml", Published)
+def load_published() -> dict[str, Number]:
+    """What the paper prints by id, in the order of the file."""
+    file = read_toml(data_folder() / "published" / "masoudi2015.toml", Published)
+    return {number.id: number for number in file.number}
 
 
 def rms_numbers(model: str) -> dict[str, Number]:
     """Published RMS errors of a model by the output that they are about; none for a plug-in's."""
-    numbers = load_published().number
+    numbers = load_published().values()
     return {n.quantity: n for n in numbers if n.model == model and n.kind == "rms_error"}
 
 
 def fixed_test_sets() -> dict[str, str]:
     """Digests of the fixed test sets by their names."""
-    return read_toml(data_folder() / "published" / "test_sets.toml", FixedSets).test_sets
+    return toml_content(data_folder() / "published" / "test_sets.toml")["test_sets"]
 
 
 def citations() -> str:
@@ -163,7 +153,7 @@ class Finding(NamedTuple):
 
 def printed_errors_and_savings() -> list[Number]:
     """Printed errors, then savings of time."""
-    numbers = load_published().numbers.values()
+    numbers = load_published().values()
     compared = [n for n in numbers if n.kind in ("rms_error", "time_reduction")]
     return sorted(compared, key=lambda number: number.kind)
 

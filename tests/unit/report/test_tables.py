@@ -144,7 +144,7 @@ def test_rows_of_costs_are_named_once_and_their_methods_take_the_settings(name):
 def test_settings_of_the_paper_are_the_defaults_of_pod(name, nominal):
     assert of_paper(name) == nominal
     assert set(declared().reduced) == set(MODELS)
-    printed = [n for n in load_published().numbers.values() if n.model == name]
+    printed = [n for n in load_published().values() if n.model == name]
     model = build(name)
     assert smaller_rank(model, "pod") == {}
     settings = complete_settings(model, "pod")
