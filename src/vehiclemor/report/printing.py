@@ -47,13 +47,10 @@ class Table:
     below: str = ""
 
     def _records(self) -> Rows:
-        """Rows, those of a group together."""
-        rows = self.rows
-        records: Rows = rows if isinstance(rows, Sequence) else rows.to_dict("records")  # type: ignore[assignment]
-        if not self.group:
-            return records
-        groups = list(dict.fromkeys(row[self.group] for row in records))
-        return sorted(records, key=lambda row: groups.index(row[self.group]))
+        return self.rows if isinstance(self.rows, Sequence) else self.rows.to_dict("records")  # type: ignore[return-value]
+
+    def _groups(self, records: Rows) -> Mapping[str, Rows]:
+        return grouped(records, self.group) if self.group else {"": records}
 
     def _kinds(self, records: Rows) -> tuple[Mapping[str, Column], str]:
         """How each column is printed, and what the columns mean."""
@@ -66,17 +63,17 @@ class Table:
     def __html__(self) -> str:
         records = self._records()
         kinds, meanings = self._kinds(records)
-        wide, last = f'<tr><td colspan="{len(kinds)}"><div>%s</div></td></tr>', None
+        wide = f'<tr><td colspan="{len(kinds)}"><div>%s</div></td></tr>'
         heads = "".join(f"<th>{escape(kind.heading)}</th>" for kind in kinds.values())
         lines = [f"<tr>{heads}</tr>"]
-        for row in records:
-            if self.group and row[self.group] != last:
-                last = row[self.group]
-                lines.append(wide % f"<b>{escape(str(last))}</b>")
-            cells = (f"<td>{_cell(row.get(name), kind)}</td>" for name, kind in kinds.items())
-            lines.append(f"<tr>{''.join(cells)}</tr>")
-            if self.note and row[self.note]:
-                lines.append(wide % escape(str(row[self.note])))
+        for group, rows in self._groups(records).items():
+            if group:
+                lines.append(wide % f"<b>{escape(group)}</b>")
+            for row in rows:
+                cells = (f"<td>{_cell(row.get(name), kind)}</td>" for name, kind in kinds.items())
+                lines.append(f"<tr>{''.join(cells)}</tr>")
+                if self.note and row[self.note]:
+                    lines.append(wide % escape(row[self.note]))
         caption = f"<h3>{escape(self.title)}</h3>" if self.title else ""
         texts = (f"<p>{escape(text)}</p>" for text in (meanings, self.below) if text)
         return "".join([caption, "<table>", *lines, "</table>", *texts])
@@ -84,24 +81,32 @@ class Table:
     def __str__(self) -> str:
         records = self._records()
         kinds, meanings = self._kinds(records)
-        cells = [
-            [format_value(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
-            for row in records
-        ]
+        cells = [_texts(row, kinds) for row in records]
         numbers = [_are_numbers(row.get(name) for row in records) for name in kinds]
         heads = [kind.heading for kind in kinds.values()]
-        widths, last = _widths(heads, cells, numbers), None
+        widths = _widths(heads, cells, numbers)
         # Headings stand at the bottom of their lines.
         lines = [wrapped(self.title), *_in_columns(heads, widths, numbers, -1)]
-        for row, line in zip(records, cells, strict=True):
-            if self.group and row[self.group] != last:
-                last = row[self.group]
-                lines.append(wrapped(str(last), 0, 2))
-            lines += _in_columns(line, widths, numbers)
-            if self.note and row[self.note]:
-                lines.append(wrapped(str(row[self.note]), 4, 4))
+        for group, rows in self._groups(records).items():
+            lines.append(wrapped(group, 0, 2))
+            for row in rows:
+                lines += _in_columns(_texts(row, kinds), widths, numbers)
+                if self.note:
+                    lines.append(wrapped(row[self.note], 4, 4))
         lines += [wrapped(text, 0, 1) for text in (meanings, self.below)]
         return "\n".join(filter(None, lines))
+
+
+def grouped(rows: Rows, key: str) -> dict[Any, list[Any]]:
+    """Rows by the value of a column, in the order of the first of each."""
+    groups: dict[Any, list[Any]] = {}
+    for row in rows:
+        groups.setdefault(row[key], []).append(row)
+    return groups
+
+
+def _texts(row: Mapping[str, Any], kinds: Mapping[str, Column]) -> list[str]:
+    return [format_value(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
 
 
 def _are_numbers(values: Iterable[object]) -> bool:
