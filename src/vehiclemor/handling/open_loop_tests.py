@@ -237,25 +237,19 @@ def _at_zero(steering: np.ndarray, response: np.ndarray) -> float:
     return float(crossed.mean()) if len(k) else np.nan
 
 
-def steering_interval(motion: Motion) -> tuple[float, float]:
-    """Times in s at which a sine of steering begins and ends: at `BEGUN` of its largest value."""
-    times, size = motion.times, abs(motion.steering)
-    begin, back = (
-        first_time(t, s, BEGUN * size.max()) for t, s in ((times, size), (-times[::-1], size[::-1]))
-    )
-    return begin, -back
-
-
 def sine_with_dwell(motion: Motion) -> dict[str, float]:
     """Ratios of the yaw rate after the steering, displacement after its beginning."""
-    begin, end = steering_interval(motion)
-    parts = motion.steering / (abs(motion.steering).max() or 1.0)
+    times, size = motion.times, abs(motion.steering)
+    level = BEGUN * size.max()
+    begin = first_time(times, size, level)
+    end = -first_time(-times[::-1], size[::-1], level)
+    parts = motion.steering / (size.max() or 1.0)
     sides = np.sign(parts[abs(parts) > BEGUN])
     once = np.count_nonzero(np.diff(sides)) == 1 and abs(parts[-1]) <= BEGUN
     _require(once, "the steering does not change its side once, and end", "sine with dwell")
     side = np.sign(motion.at("wheel_angle", begin))
     reversed_steering = motion.steering * np.sign(motion.at("steering", begin)) < 0.0
-    turned_back = reversed_steering & (motion.times <= end)
+    turned_back = reversed_steering & (times <= end)
     peak = np.max(-side * motion["yaw_rate"], where=turned_back, initial=0.0) or np.nan
     numbers = {
         name: -side * motion.at("yaw_rate", end + after) / peak

@@ -26,8 +26,6 @@ Kind = Literal["histories", "paths", "errors"]
 Format = Literal["zarr", "parquet", "csv"]
 # What is said of a run that was in its own training, and the mark of it in a legend.
 TRAINED, MARK = "trained on this run", "*"
-# Letters of an axis' label that leave no room for more beside them; of one beside a low panel.
-LONG, LONGEST = 16, 26
 EXPONENT = re.compile(r"\^(-?\d+(?:\.\d+)?)")
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
 # Format of errors: an exact zero is 0, since orders of magnitude are compared.
@@ -161,7 +159,7 @@ def readable_unit(largest: float, unit: str) -> tuple[float, str]:
 
 def axis_label(dataset: xr.Dataset, output: str, unit: str = "") -> str:
     """Name, symbol and unit (the output's own by default) of an output."""
-    text = full_label(output, "\n" if len(label_of(output).name) > LONG else " ")
+    text = full_label(output, "\n" if len(label_of(output).name) > 16 else " ")
     return f"{text} ({raised(unit or unit_of(dataset, output))})"
 
 
@@ -170,7 +168,7 @@ def error_label(dataset: xr.Dataset, kind: str, output: str, unit: str = "") -> 
     unit = unit or unit_of(dataset, output)
     symbol = label_of(output).symbol
     letters = len(f"{kind} of {symbol} ({unit})".replace("$", ""))
-    between = " " if letters <= LONGEST else "\n"
+    between = " " if letters <= 26 else "\n"
     return f"{kind} of{between}{symbol} ({raised(unit)})"
 
 

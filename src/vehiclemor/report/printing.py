@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Rows = Sequence[Mapping[str, Any]]
-# Columns of a line where there is no terminal, and the most that a wide one is given.
-WIDTH, WIDEST = 80, 120
-# A column of texts is never narrower, where its texts are longer.
-NARROWEST = 12
 # Variable of a simulation -> column that is printed for each output.
 ERRORS = {"rms_error": "rms_error", "floor_rms_error": "floor", "max_error": "max_error"}
 ERRORS |= {"signal_range": "signal_range", "output_unit": "unit"}
@@ -162,7 +158,7 @@ def _widths(heads: list[str], cells: list[list[str]], numbers: list[bool]) -> li
     texts = [index for index, number in enumerate(numbers) if not number]
     while sum(widths) + len(widths) > width() and texts:
         widest = max(texts, key=lambda index: widths[index])
-        if widths[widest] <= NARROWEST:
+        if widths[widest] <= 12:
             break
         widths[widest] -= 1
     # A heading in one line where there is room for all.
@@ -205,7 +201,7 @@ def ends_text(statuses: Iterable[str], warned: int = 0) -> str:
 
 def width() -> int:
     """Columns of a printed line: the terminal's, but neither below 80 nor too wide to read."""
-    return min(max(shutil.get_terminal_size((WIDTH, 24)).columns, WIDTH), WIDEST)
+    return min(max(shutil.get_terminal_size((80, 24)).columns, 80), 120)
 
 
 def wrapped(text: str, first: int = 0, rest: int = 0) -> str:

@@ -29,10 +29,6 @@ from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
-# Lines of a panel.
-LINES = 8
-# Between marks of two lines above the axes, as a share of their height.
-SHIFT = 0.025
 # What a logarithmic axis can't show: mark, height as a share of the axes, text, which errors.
 OFF: tuple[tuple[Style, float, str, Callable[[np.ndarray], np.ndarray]], ...] = (
     (theme.CROSS, 1.0, "a run has failed", lambda errors: ~np.isfinite(errors)),
@@ -62,7 +58,8 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
     lines = _lines(errors, methods, varied[1:], saturated)
     notes: list[str] = []
-    if len(lines) > max(LINES, len(methods)):
+    # More lines than can be told from each other.
+    if len(lines) > max(8, len(methods)):
         largest = errors.max(varied[1:])
         lines = {label: (text, largest.sel(label=label)) for label, text in methods.items()}
         notes.append(f"the largest error over {_listed(varied[1:])}")
@@ -151,7 +148,7 @@ def _draw_panel(
             off = np.compress(is_off(values), ticks.at)
             if len(off):
                 # Above those of other lines.
-                heights = np.full(len(off), height + SHIFT * _count_marked(axis, mark))
+                heights = np.full(len(off), height + 0.025 * _count_marked(axis, mark))
                 edge: Style = {"transform": axis.get_xaxis_transform(), "clip_on": False, **mark}
                 axis.plot(off, heights, color=look["color"], **edge)
     published = rms_numbers(str(dataset.attrs["model"])).get(output)

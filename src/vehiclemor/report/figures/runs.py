@@ -26,8 +26,6 @@ RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
 # How far around the full-order signal the others are shown, as a multiple of its range; share of
 # the largest value below which the full order stands still.
 REACH, STILL = 0.6, 1e-4
-# Letters in one line of a label beside a panel of errors.
-LINE = 26
 
 
 class Curve(NamedTuple):
@@ -248,7 +246,7 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> None:
     axis.set_ylim(bottom=min([axis.get_ylim()[0], *(0.5 * rms for rms in marked)]))
     tick_decades(axis.yaxis, *axis.get_ylim())
     label = f"largest error of {labels.label_of(output).symbol}"
-    label = label if len(label) <= LINE else label.replace(" of ", "\nof ", 1)
+    label = label if len(label) <= 26 else label.replace(" of ", "\nof ", 1)
     unit = labels.raised(labels.unit_of(runs.full, output))
     axis.set_ylabel(f"{label}\nin each {period:.2g} s ({unit})")
 

@@ -44,13 +44,7 @@ MARKERS = "os^D<>phP*d"
 CROSS: Style = {"marker": "x", "markersize": 6, "markeredgewidth": 1.6, "linestyle": "none"}
 ZERO: Style = {"marker": 7, "markersize": 6, "linestyle": "none"}
 THIN: Style = {"color": "black", "linewidth": 0.8}
-# Of a legend in inches: what stands beside a text, and a letter of it.
-HANDLE, LETTER = 0.55, 0.068
 UNITS = {"control_period": "s"}
-# Ratio of the largest to the smallest number from which on an axis is logarithmic; letters of the
-# names that there is room for on an axis; decades up to which one has 1, 2 and 5; what is below is
-# written with a power of ten.
-WIDE, LETTERS, FEW_DECADES, SMALL = 30.0, 60, 2.5, 1e-4
 
 
 def look_of(label: str, methods: Mapping[str, str]) -> MethodLook | None:
@@ -131,11 +125,12 @@ class Ticks(NamedTuple):
         panel.set_xlabel(self.label)
         if self.names:
             panel.set_xlim(-0.5, len(self.names) - 0.5)
-            room = max(1, LETTERS // max(map(len, self.names)))
+            # As many names as there is room for, by their letters.
+            room = max(1, 60 // max(map(len, self.names)))
             step = ceil(len(self.names) / min(12, room))
             panel.set_xticks(self.at[::step], list(self.names)[::step])
             return
-        if 0.0 < WIDE * self.at.min() <= self.at.max():
+        if 0.0 < 30.0 * self.at.min() <= self.at.max():
             panel.set_xscale("log")
         if self.at.dtype.kind == "i":
             panel.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
@@ -154,10 +149,10 @@ def ticks_of(dataset: xr.Dataset, name: str) -> Ticks:
 
 def tick_decades(axis: Axis, low: float, high: float) -> None:
     """Ticks of a logarithmic axis: some of each decade where there are few decades."""
-    if np.log10(high / low) < FEW_DECADES:
+    if np.log10(high / low) < 2.5:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         powers = LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
-        axis.set_major_formatter("{x:g}" if low >= SMALL else powers)
+        axis.set_major_formatter("{x:g}" if low >= 1e-4 else powers)
         axis.set_minor_formatter(NullFormatter())
 
 
@@ -175,8 +170,8 @@ def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
     lengths = [len(text.replace("$", "")) for text in shown]
 
     def width(columns: int) -> float:
-        parts = np.array_split(lengths, columns)
-        return sum(HANDLE + LETTER * max(part) for part in parts)
+        # In inches: the line beside a text, and its letters.
+        return sum(0.55 + 0.068 * max(part) for part in np.array_split(lengths, columns))
 
     fitting = (n for n in range(len(shown), 1, -1) if width(n) <= figure.get_figwidth())
     # As few columns as the rows need, so that none stands almost empty.
