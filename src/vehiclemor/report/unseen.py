@@ -37,7 +37,7 @@ CONTINUED = 0.5
 def protocol_rows(dataset: xr.Dataset) -> list[Row]:
     """Rows of one protocol, by `kind`: `method`, then `target` and `bound` of what was chosen."""
     protocol = protocol_of(dataset)
-    methods = method_rows(dataset, protocol)
+    methods = method_rows(dataset)
     rows = methods + target_rows(dataset, protocol, methods)
     rows += [row for method in methods if method["winner"] for row in bound_rows(protocol, method)]
     head = {"study": str(dataset.attrs["study"]), "model": protocol.model}
@@ -49,7 +49,7 @@ def protocol_of(dataset: xr.Dataset) -> ProtocolFile:
     return ProtocolFile.model_validate_json(dataset.attrs["configuration"])
 
 
-def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
+def method_rows(dataset: xr.Dataset) -> list[Row]:
     """One row for each method, full-order integrators as measures.
 
     `runs` of the `test_set` are judged, `apart` ones more are not: the full order is sensitive
@@ -65,7 +65,7 @@ def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
     score on the rows `equal_rows`, `ratio_within` against `within`, the fastest full-order row
     within the bounds.
     """
-    part = judged_part(dataset)
+    part, protocol = judged_part(dataset), protocol_of(dataset)
     rows = [_method_row(dataset, part, str(label), protocol) for label in part["label"].values]
     full = [row for row in rows if row["role"] == FULL_ORDER and math.isfinite(row["score"])]
     curves = [list(group) for _, group in groupby(full, key=lambda row: row["series"])]

@@ -15,7 +15,8 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.files import begins_with, replaceable, write_whole
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component
-from vehiclemor.report.figures.result_plot import by_method, configuration, model_name
+from vehiclemor.report.figures.result_plot import by_method
+from vehiclemor.report.figures.runs import configuration, model_name
 from vehiclemor.report.figures.theme import FULL, Style, panels, styled, styles
 from vehiclemor.report.labels import method_text
 from vehiclemor.simulation.trajectory import Trajectory

@@ -20,11 +20,11 @@ from matplotlib.figure import Figure
 from vehiclemor.exceptions import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
-from vehiclemor.report.figures.runs import legend_of
+from vehiclemor.report.figures.runs import legend_of, shown_outputs
 from vehiclemor.report.figures.theme import Style, Ticks, tick_decades, ticks_of
 from vehiclemor.report.published import rms_numbers
 from vehiclemor.report.results import at_point, saturated_ranks
-from vehiclemor.report.unseen import method_rows, protocol_of
+from vehiclemor.report.unseen import method_rows
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
@@ -44,7 +44,7 @@ GREYS: list[Style] = [
 Lines = Mapping[str, tuple[str, xr.DataArray]]
 
 
-def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
+def figure_errors(dataset: xr.Dataset) -> Figure:
     """RMS errors of a study over all that it varies; of full order where there is nothing else."""
     if not {"rms_error", "signal_range"} <= set(dataset):
         raise InputError("no errors in this result: it was not compared with full order")
@@ -67,6 +67,7 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
     if saturated and varied[0] == "rank":
         texts = [f"{methods[label]} saturates at {rank}" for label, rank in saturated.items()]
         ticks = ticks._replace(label=textwrap.fill(f"rank; {', '.join(texts)}", width=38))
+    outputs = shown_outputs(dataset)
     size = 6.7 if len(outputs) < 3 else 8.5, 3.3
     figure, grid = theme.panels(1, len(outputs), size)
     for number, (panel, output) in enumerate(zip(grid.flat, outputs, strict=True)):
@@ -198,7 +199,7 @@ def figure_pareto(dataset: xr.Dataset) -> Figure:
     Each full-order integrator is a line through its tolerances; a cross below the upper edge is a
     reduced model of which a run has failed.  Bars: between the quartiles of the rounds.
     """
-    rows: Any = pd.DataFrame(method_rows(dataset, protocol_of(dataset)))
+    rows: Any = pd.DataFrame(method_rows(dataset))
     rows["time"] = 1e6 * rows["seconds"]
     rows["bar"] = 0.5 * rows["spread"] * rows["time"]
     rows["tolerance"] = [json.loads(text).get("tolerance", 0.0) for text in rows["settings"]]

@@ -1,10 +1,9 @@
 """The pictures of any result: histories, paths or errors of one run, or of a study."""
 
-import json
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import xarray as xr
 from matplotlib.figure import Figure
@@ -13,18 +12,11 @@ from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
 from vehiclemor.exceptions import InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import make_folder
-from vehiclemor.multibody.definition import ModelDefinition
-from vehiclemor.registry import component
-from vehiclemor.report.figures import theme
+from vehiclemor.report.figures import runs, theme
 from vehiclemor.report.figures.errors import figure_errors, figure_pareto
-from vehiclemor.report.figures.runs import PATH, figure_histories, figure_paths
-from vehiclemor.report.labels import main_outputs, tabled_outputs
 from vehiclemor.report.results import KINDS, result_kind, select_point
 from vehiclemor.study.plans.loading import refuse_doubles
 from vehiclemor.study.run import run_studies
-
-# At most so many outputs have panels.
-PANELS = 3
 
 
 class Picture(NamedTuple):
@@ -37,13 +29,10 @@ class Picture(NamedTuple):
 # Those of `labels.Kind` are of a run or a point of a grid, the others of a study as it is.
 PICTURES = {
     "histories": Picture(
-        "Outputs over the time, differences from full order below",
-        lambda data: figure_histories(
-            data, outputs=shown_outputs(data), inputs=_input_meanings(data)
-        ),
+        "Outputs over the time, differences from full order below", runs.figure_histories
     ),
-    "paths": Picture("Paths in the plane, distances from full order below", figure_paths),
-    "errors": Picture("RMS errors", lambda data: figure_errors(data, outputs=shown_outputs(data))),
+    "paths": Picture("Paths in the plane, distances from full order below", runs.figure_paths),
+    "errors": Picture("RMS errors", figure_errors),
     "pareto": Picture("Worst error over bound, over time", figure_pareto),
 }
 
@@ -55,7 +44,7 @@ def pictures_of(dataset: xr.Dataset) -> list[str]:
     kinds = ["errors"]
     if dataset.sizes.get("time"):
         kinds.append("histories")
-        if set(PATH) <= set(dataset["output"].values):
+        if set(runs.PATH) <= set(dataset["output"].values):
             kinds.append("paths")
     return kinds
 
@@ -92,58 +81,22 @@ def plot_result(dataset: xr.Dataset, path: Path | None = None, kind: str = "hist
     return figure
 
 
-def configuration(dataset: xr.Dataset) -> dict[str, Any]:
-    """What determines the result; a run that is no experiment has none."""
-    return json.loads(dataset.attrs.get("configuration", "{}"))
-
-
-def model_name(dataset: xr.Dataset) -> str:
-    """The model that a result is of."""
-    return str(dataset.attrs.get("model") or configuration(dataset).get("model", "it"))
-
-
 def by_method(dataset: xr.Dataset) -> xr.Dataset:
     """A result on the dimension `label`, which that of one run does not have."""
     if "label" not in dataset.coords:
-        method = dataset.attrs.get("method") or configuration(dataset).get("method", "run")
+        method = dataset.attrs.get("method") or runs.configuration(dataset).get("method", "run")
         dataset = dataset.assign_coords(label=method)
     return dataset if "label" in dataset.dims else dataset.expand_dims("label")
 
 
 def _title(dataset: xr.Dataset) -> str:
     """Title of the result; of one run with its input."""
-    title = str(dataset.attrs.get("title", model_name(dataset)))
-    for test in configuration(dataset).get("test") or []:
+    title = str(dataset.attrs.get("title", runs.model_name(dataset)))
+    for test in runs.configuration(dataset).get("test") or []:
         changed = [k for k in ("frequency", "amplitude") if test[k] != 1.0]
         factors = "".join(f", {key} {test[key]:g}" for key in changed)
         return f"{title}: {test['maneuver']}{factors}, from {test['start']}"
     return title
-
-
-def shown_outputs(dataset: xr.Dataset) -> list[str]:
-    """Outputs that the model shows; of a model that is not installed here, the first."""
-    known = [str(output) for output in dataset["output"].values]
-    shown: list[str] = []
-    if definition := _definition(dataset):
-        main = main_outputs(definition)
-        shown = list(dict.fromkeys((*main, *tabled_outputs(definition))))[: max(2, len(main))]
-    # Of outputs that a user has chosen none may be among them.
-    return ([output for output in shown if output in known] or known)[:PANELS]
-
-
-def _input_meanings(dataset: xr.Dataset) -> dict[str, str]:
-    """Meaning of each input, without its remarks."""
-    definition = _definition(dataset)
-    inputs = definition.inputs if definition else ()
-    return {quantity.name: quantity.long_name.partition(",")[0] for quantity in inputs}
-
-
-def _definition(dataset: xr.Dataset) -> ModelDefinition | None:
-    """The model of a result, if it is installed here."""
-    try:
-        return component("model", model_name(dataset))
-    except InputError:
-        return None
 
 
 def figures(

@@ -1,9 +1,10 @@
 """Runs of any model: histories and paths of full order and reduced models, and their errors."""
 
 import itertools
+import json
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -11,6 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vehiclemor.exceptions import InputError
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.registry import component
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.theme import CROSS, FULL, Style, hide_rounding, tick_decades
@@ -46,6 +49,44 @@ class Runs(NamedTuple):
     def compared(self) -> bool:
         """Whether there are errors."""
         return bool(self.curves) and bool(self.full["reference_outputs"].notnull().any())
+
+
+def configuration(dataset: xr.Dataset) -> dict[str, Any]:
+    """What determines the result; a run that is no experiment has none."""
+    return json.loads(dataset.attrs.get("configuration", "{}"))
+
+
+def model_name(dataset: xr.Dataset) -> str:
+    """The model that a result is of."""
+    return str(dataset.attrs.get("model") or configuration(dataset).get("model", "it"))
+
+
+def shown_outputs(dataset: xr.Dataset) -> list[str]:
+    """Outputs that the model shows, three at most; of one that is not installed, the first."""
+    known = [str(output) for output in dataset["output"].values]
+    shown: list[str] = []
+    if definition := _definition(dataset):
+        main = labels.main_outputs(definition)
+        shown = list(dict.fromkeys((*main, *labels.tabled_outputs(definition))))[
+            : max(2, len(main))
+        ]
+    # Of outputs that a user has chosen none may be among them.
+    return ([output for output in shown if output in known] or known)[:3]
+
+
+def _input_meanings(dataset: xr.Dataset) -> dict[str, str]:
+    """Meaning of each input, without its remarks."""
+    definition = _definition(dataset)
+    inputs = definition.inputs if definition else ()
+    return {quantity.name: quantity.long_name.partition(",")[0] for quantity in inputs}
+
+
+def _definition(dataset: xr.Dataset) -> ModelDefinition | None:
+    """The model of a result, if it is installed here."""
+    try:
+        return component("model", model_name(dataset))
+    except InputError:
+        return None
 
 
 def legend_of(dataset: xr.Dataset) -> dict[str, str]:
@@ -86,14 +127,12 @@ def runs_of(dataset: xr.Dataset, texts: Mapping[str, str]) -> Runs:
     return Runs(next(with_full, next(iter(points.values()))), curves)
 
 
-def figure_histories(
-    dataset: xr.Dataset, *, outputs: Sequence[str], inputs: Mapping[str, str]
-) -> Figure:
+def figure_histories(dataset: xr.Dataset) -> Figure:
     """Outputs over the time, side by side, at a point of a study; their errors below.
 
-    The inputs, with their meanings by name, stand at the right, if the result has them.
+    The inputs stand at the right, if the result has them.
     """
-    texts = legend_of(dataset)
+    texts, outputs = legend_of(dataset), shown_outputs(dataset)
     runs = runs_of(dataset, texts)
     rows: list[Callable[[Axes, Runs, str], object]] = [draw_history]
     if runs.compared:
@@ -107,7 +146,7 @@ def figure_histories(
     if "inputs" in runs.full:
         for axis in axes[1:, -1]:
             axis.remove()
-        draw_inputs(axes[0, -1], runs.full, inputs)
+        draw_inputs(axes[0, -1], runs.full, _input_meanings(dataset))
         axes[0, -1].tick_params(labelbottom=True)
         lowest.append(axes[0, -1])
     for number, axis in enumerate(figure.axes):
