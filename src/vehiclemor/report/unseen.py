@@ -1,10 +1,9 @@
 """Methods on inputs that they were not trained on: errors, times beside full order, targets.
 
-Times of the full order at the error of a method are interpolated on ladders: a ladder is one
-integrator at several tolerances.  Its useful rows form a curve of time over error; between two of
-them it is taken as a power law, which is what an integrator of fixed order gives.  A ladder that
-ends just above the error is continued by the law of its last two rows: else a slower integrator
-would stand in for it.
+Times of the full order at the error of a method are interpolated on work-precision curves, each of
+one integrator at several tolerances.  Between two useful rows a curve is a power law, which is what
+an integrator of fixed order gives.  One that ends just above the error is continued by the law of
+its last two rows: else a slower integrator would stand in for it.
 """
 
 import json

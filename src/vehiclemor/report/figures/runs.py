@@ -67,9 +67,8 @@ def shown_outputs(dataset: xr.Dataset) -> list[str]:
     shown: list[str] = []
     if definition := _definition(dataset):
         main = labels.main_outputs(definition)
-        shown = list(dict.fromkeys((*main, *labels.tabled_outputs(definition))))[
-            : max(2, len(main))
-        ]
+        every = dict.fromkeys((*main, *labels.tabled_outputs(definition)))
+        shown = list(every)[: max(2, len(main))]
     # Of outputs that a user has chosen none may be among them.
     return ([output for output in shown if output in known] or known)[:3]
 
