@@ -17,7 +17,7 @@ from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction.reduced_model import ReducedOrderModel
 from vehiclemor.registry import choice, names
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.toml_files import FileSchema, Line, read_toml
+from vehiclemor.toml_files import toml_content
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,17 +46,10 @@ TESTS: dict[str, Callable[[Motion], Mapping[str, Any]]] = {
 }
 
 
-class MetricsFile(FileSchema):
-    """Schema of `data/handling/metrics.toml`: standard, and number -> [unit, definition]."""
-
-    standards: dict[str, Line]
-    numbers: dict[str, dict[str, list[Line]]]
-
-
 @cache
-def declared() -> MetricsFile:
-    """Standards and definitions."""
-    return read_toml(data_folder() / "handling" / "metrics.toml", MetricsFile)
+def declared() -> dict[str, dict[str, Any]]:
+    """Standards of the maneuvers, and of their numbers [unit, definition]."""
+    return toml_content(data_folder() / "handling" / "metrics.toml")
 
 
 def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
@@ -95,11 +88,11 @@ def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
     if not isinstance(run, Trajectory):
         raise InputError(f"run is {quoted(run)}, not a run as `simulate` gives it")
     test = test_of(run.maneuver if maneuver is None else maneuver)
-    motion, standard = motion_of(run), declared().standards[test]
+    motion, standard = motion_of(run), declared()["standards"][test]
     variables: dict[str, tuple] = {}
     coordinates: dict[str, tuple] = {}
     for name, value in TESTS[test](motion).items():
-        unit, definition = declared().numbers[test][name]
+        unit, definition = declared()["numbers"][test][name]
         attributes = {"units": unit, "long_name": definition, "standard": standard}
         variables[name] = ("frequency" if np.ndim(value) else (), value, attributes)
         if np.ndim(value):
@@ -211,7 +204,7 @@ def handling_rows(
     first, *reduced = models.values()
     start, speed = first.model.start(), first.parameters.get("initial_speed", np.nan)
     chosen = list(maneuvers) or maneuvers_of(first, reduced)
-    standards = {name: declared().standards[test_of(name)] for name in chosen}
+    standards = {name: declared()["standards"][test_of(name)] for name in chosen}
     rows: list[dict[str, Any]] = []
     for name, standard in standards.items():
         maneuver = registered(name).perturbed(amplitude=amplitude)
