@@ -13,14 +13,14 @@ size of the lane change.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from vehiclemor.arguments import count
 from vehiclemor.inputs.driving import FRONT_SHARE, MASS, RADIUS
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver, family
 from vehiclemor.inputs.steering import DURATION, LANE_CHANGE_AMPLITUDE, RACK_AMPLITUDE, RATE, ramp
 from vehiclemor.multibody.quantities import WHEELS
 
@@ -169,14 +169,6 @@ def corners_of(changes: tuple[Change, ...], frequency: float = 1.0) -> tuple[flo
     return tuple(sorted(time / frequency for time in ends if time / frequency < DURATION))
 
 
-@lru_cache(maxsize=4096)
-def _member(family: Maneuver, seed: int) -> Maneuver:
-    of_family: Any = family.signal
-    signal = replace(of_family, seed=seed)
-    name = f"{family.name}:{seed}"
-    return replace(family, name=name, signal=signal, corners=signal.corners, member=None)
-
-
 def _family(signal: RandomSteering, name: str, summary: str) -> Maneuver:
     inputs: tuple[str, ...] = ("delta",)
     if signal.rack:
@@ -186,9 +178,8 @@ def _family(signal: RandomSteering, name: str, summary: str) -> Maneuver:
         inputs += (*DRIVE_TORQUES, *BRAKE_TORQUES, *FRICTIONS)
     summary = f"{summary}, 10 s; {name}:SEED is another one"
     samples = round(DURATION * RATE) + 1
-    family = Maneuver(name, summary, signal, inputs, DURATION, samples, signal.corners)
-    family = replace(family, linear_in_amplitude=not driven)
-    return replace(family, member=partial(_member, family))
+    first = Maneuver(name, summary, signal, inputs, DURATION, samples, signal.corners)
+    return family(replace(first, linear_in_amplitude=not driven))
 
 
 STEERING = "corrections of the steering to random angles, with pauses"
