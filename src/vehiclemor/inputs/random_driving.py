@@ -11,7 +11,6 @@ The factors are those of the steering alone.  At an amplitude factor of 1 its an
 size of the lane change.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -110,20 +109,18 @@ class RandomDriving(RandomSteering):
 @lru_cache(maxsize=4096)
 def corrections(seed: int) -> tuple[Change, ...]:
     """Corrections of unit steering."""
-    return tuple(_corrections(_random(seed, 0, CORRECTIONS)))
-
-
-def _corrections(random: np.ndarray) -> Iterator[Change]:
-    time, angle = 0.5 * random[0, 0], 0.0
+    random = _random(seed, 0, CORRECTIONS)
+    changes, time, angle = [], 0.5 * random[0, 0], 0.0
     for quick, pause, wait, side in random[:, 1:].tolist():
-        target = (
-            0.0 if side < STRAIGHT else _within((-1.0, 1.0), (side - STRAIGHT) / (1 - STRAIGHT))
-        )
+        target = 0.0
+        if side >= STRAIGHT:
+            target = _within((-1.0, 1.0), (side - STRAIGHT) / (1 - STRAIGHT))
         drawn = LENGTHS[0] * (LENGTHS[1] / LENGTHS[0]) ** quick
         length = max(drawn, QUICKEST * abs(target - angle))
-        yield Change(time, length, target - angle)
+        changes.append(Change(time, length, target - angle))
         angle = target
         time += length + _within(PAUSES, wait) if pause < PAUSED else _within(GAPS, wait)
+    return tuple(changes)
 
 
 @lru_cache(maxsize=4096)
