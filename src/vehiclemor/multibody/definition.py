@@ -336,8 +336,7 @@ def driving(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinitio
     named = {*names}
     driven = {*definition.choice.driven, *named}
     driven |= {q.name for q in definition.optional_inputs if integral_of(q.name) in named}
-    constant = {*definition.choice.constant} - driven
-    return _chosen(definition, _ordered(definition, driven), _ordered(definition, constant))
+    return _with_choice(definition, driven, {*definition.choice.constant} - driven)
 
 
 def with_overrides(definition: ModelDefinition, overrides: Mapping[str, object]) -> ModelDefinition:
@@ -356,21 +355,20 @@ def with_constants(definition: ModelDefinition, names: Iterable[str]) -> ModelDe
             hint = did_you_mean(name, optional)
             raise InputError(f"{name!r} is not an optional input of {definition.name}; {hint}")
     constant = {*definition.choice.constant, *names}
-    driven = (name for name in definition.choice.driven if name not in constant)
-    return _chosen(definition, _ordered(definition, driven), _ordered(definition, constant))
+    return _with_choice(definition, {*definition.choice.driven} - constant, constant)
 
 
-def _ordered(definition: ModelDefinition, names: Iterable[str]) -> tuple[str, ...]:
-    chosen = {*names}
-    return tuple(q.name for q in definition.optional_inputs if q.name in chosen)
+def _with_choice(
+    definition: ModelDefinition, driven: set[str], constant: set[str]
+) -> ModelDefinition:
+    names = [quantity.name for quantity in definition.optional_inputs]
+    ordered = (tuple(n for n in names if n in chosen) for chosen in (driven, constant))
+    return _chosen(definition, InputChoice(*ordered))
 
 
 @lru_cache(maxsize=64)
-def _chosen(
-    definition: ModelDefinition, driven: tuple[str, ...], constant: tuple[str, ...]
-) -> ModelDefinition:
+def _chosen(definition: ModelDefinition, choice: InputChoice) -> ModelDefinition:
     """The declaration of a choice; the same object for the same arguments, as caches need it."""
-    choice = InputChoice(driven, constant)
     if choice == definition.choice:
         return definition
     optional = {quantity.name: quantity for quantity in definition.optional_inputs}
@@ -378,7 +376,7 @@ def _chosen(
     parameters = {
         name: declared for name, declared in definition.parameters.items() if name not in optional
     }
-    for name in constant:
+    for name in choice.constant:
         low, high = definition.validity.get(name, (None, None))
         quantity = optional[name]
         parameters[name] = Declared(
@@ -386,7 +384,7 @@ def _chosen(
         )
     return replace(
         definition,
-        inputs=(*every_run, *(optional[name] for name in driven)),
+        inputs=(*every_run, *(optional[name] for name in choice.driven)),
         parameters=parameters,
         choice=choice,
     )

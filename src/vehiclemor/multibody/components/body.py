@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, InputChoice, Quantity
+from vehiclemor.multibody.quantities import AT_WHEEL, OPTIONAL_INPUTS, InputChoice, Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
@@ -17,8 +17,6 @@ from vehiclemor.symbolic.tape import Tape
 
 # Spin in rad/s below which a brake fades, so that its torque changes sign smoothly.
 BRAKE_SPEED = sp.Integer(1)
-# Inputs at a wheel in the order of `WheelInputs`.
-AT_WHEEL = "drive_torque_{}", "brake_torque_{}", "friction_{}", "road_{}", "road_{}_dot"
 
 
 def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
@@ -28,7 +26,7 @@ def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
 
 @dataclass(frozen=True)
 class WheelInputs:
-    """Symbols, or defaults of inputs that are neither driven nor parameters.
+    """Symbols of `AT_WHEEL`, or defaults of inputs that are neither driven nor parameters.
 
     Attributes
     ----------
@@ -71,7 +69,7 @@ class Inputs:
 
     def at(self, wheel: str) -> WheelInputs:
         """Inputs at one wheel."""
-        return WheelInputs(*(self.values[name.format(wheel)] for name in AT_WHEEL))
+        return WheelInputs(*(self.values[name.format(wheel)] for name, *_ in AT_WHEEL))
 
 
 def inputs(every_run: Sequence[Quantity], choice: InputChoice) -> Inputs:

@@ -8,11 +8,13 @@ from itertools import chain
 import sympy as sp
 
 from vehiclemor.multibody.components import body
-from vehiclemor.multibody.components.slip import SlipLaw, relaxed_slip, static_slip
 from vehiclemor.multibody.components.tires import (
     Corner,
+    SlipLaw,
     WheelMotion,
     kane_with_corners,
+    relaxed_slip,
+    static_slip,
     tire_outputs,
     upright_wheel,
 )
