@@ -157,7 +157,7 @@ def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
         from vehiclemor.codegen.compiler import compiled_module
         from vehiclemor.codegen.llvm_kernels import kernel_module
 
-        return compiled_module(kernel_module([kernel], lanes))
+        return compiled_module(kernel_module(kernel, lanes))
 
     code = MachineCode(from_cache(f"kernels/{kernel.name}-{digest_of(parts)}.o", make))
     address = code.address(kernel.name)

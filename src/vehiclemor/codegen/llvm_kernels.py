@@ -6,7 +6,7 @@ which they receive at run time: loops are compiled once for all models.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from llvmlite import ir
 
@@ -33,46 +33,45 @@ from vehiclemor.codegen.operations import (
 POINTER = DOUBLE.as_pointer()
 
 
-def kernel_module(kernels: Sequence[Kernel], lanes: int = 1) -> ir.Module:
-    """LLVM module of kernels, each a C function of pointers to floats by the kernel's name.
+def kernel_module(kernel: Kernel, lanes: int = 1) -> ir.Module:
+    """LLVM module of a kernel: a C function of pointers to floats by the kernel's name.
 
     With several lanes it computes so many samples at once: the arguments in `Kernel.by_row` are
     matrices with a row for each, and further arguments are the distances of their rows in floats.
     Values that don't depend on the row are computed once.
     """
     module = ir.Module("kernels")
-    for kernel in kernels:
-        strided = kernel.by_row if lanes > 1 else []
-        kinds = [POINTER] * len(kernel.arguments) + [ir.IntType(64)] * len(strided)
-        function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), kernel.name)
-        function.attributes.add("nounwind")
-        if any(name.startswith(SEED) for name in kernel.arguments):
-            # Keeps LLVM from a long search for statements to pack (SLP), which gains nothing here.
-            function.attributes.add("noimplicitfloat")
-        builder = ir.IRBuilder(function.append_basic_block())
-        pointers = dict(zip(kernel.arguments, function.args, strict=False))
-        strides = dict(zip(strided, function.args[len(pointers) :], strict=True))
-        rows = {name: Rows(pointers[name], strides.get(name)) for name in pointers}
-        writer = _Writer(kernel, builder, rows, lanes)
-        for number in kernel.named:
-            writer.value(number)
-        builder.ret_void()
+    strided = kernel.by_row if lanes > 1 else []
+    kinds = [POINTER] * len(kernel.arguments) + [ir.IntType(64)] * len(strided)
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), kernel.name)
+    function.attributes.add("nounwind")
+    if any(name.startswith(SEED) for name in kernel.arguments):
+        # Keeps LLVM from a long search for statements to pack (SLP), which gains nothing here.
+        function.attributes.add("noimplicitfloat")
+    builder = ir.IRBuilder(function.append_basic_block())
+    pointers = dict(zip(kernel.arguments, function.args, strict=False))
+    strides = dict(zip(strided, function.args[len(pointers) :], strict=True))
+    writer = _Writer(kernel, builder, pointers, strides, lanes)
+    for number in kernel.named:
+        writer.value(number)
+    builder.ret_void()
     return module
-
-
-class Rows(NamedTuple):
-    """Address of an argument: its first float, and the distance of its rows in floats."""
-
-    first: Any
-    stride: Any = None
 
 
 class _Writer:
     """Writes the operations of a kernel, each when a named one first needs it."""
 
-    def __init__(self, kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int) -> None:
+    def __init__(
+        self,
+        kernel: Kernel,
+        builder: Any,
+        # Of the arguments: addresses of their first floats, and distances of their rows in floats.
+        pointers: Mapping[str, Any],
+        strides: Mapping[str, Any],
+        lanes: int,
+    ) -> None:
         self._operations, self._builder = kernel.operations, builder
-        self._rows, self._lanes = rows, lanes
+        self._pointers, self._strides, self._lanes = pointers, strides, lanes
         self._values: dict[int, Any] = {}
         # Entries without a name are loaded again for each use: registers are few.
         entries = {n for n, op in enumerate(kernel.operations) if op.kind == "entry"}
@@ -168,8 +167,8 @@ class _Writer:
         offset = ir.Constant(ir.IntType(64), index)
         if lane:
             stride = ir.Constant(ir.IntType(64), lane)
-            offset = self._builder.add(self._builder.mul(self._rows[name].stride, stride), offset)
-        return self._builder.gep(self._rows[name].first, [offset])
+            offset = self._builder.add(self._builder.mul(self._strides[name], stride), offset)
+        return self._builder.gep(self._pointers[name], [offset])
 
     def _batch(self, name: str, arguments: Sequence[Any]) -> list[Any]:
         """Results of an elementary function for a batch of arguments, one function first."""

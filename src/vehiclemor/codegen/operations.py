@@ -50,6 +50,7 @@ KINDS = {
 }
 # Operations to which NumPy gives other names.
 OPERATORS = {"negative": "negate", "absolute": "abs"}
+OPERATORS |= {"greater": ">", "greater_equal": ">=", "less": "<", "not_equal": "!="}
 VECTOR_STATEMENTS = ("combine", "product", "execute")
 # No value depends on these; they are always named.
 EFFECTS = ("store", *VECTOR_STATEMENTS)
@@ -73,7 +74,7 @@ class Value(NDArrayOperatorsMixin):
     number: int
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *arguments: Value | float) -> Value:
-        """Arithmetic with operators, also of numbers of NumPy."""
+        """Arithmetic with operators and functions of NumPy, also of its numbers."""
         del method
         return self.listing.new(OPERATORS.get(ufunc.__name__, ufunc.__name__), *arguments)
 
@@ -148,11 +149,6 @@ def _reaches(kind: str, factors: int, detail: Any) -> list[tuple[str, int]]:
     if kind in VECTOR_STATEMENTS:
         return [(part[0], part[1] + 1) for part in detail if is_entry(part)]
     return []
-
-
-def function(kind: str, *values: Value) -> Value:
-    """A function of values, as `function("floor", x)`."""
-    return values[0].listing.new(kind, *values)
 
 
 @dataclass(frozen=True)
