@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import quoted, real_array
-from vehiclemor.codegen.kernels import Derivation, derivation, is_derived
+from vehiclemor.codegen.kernels import Kernels, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.exceptions import GeometryError, InputError, VehiclemorError, blamed
 from vehiclemor.multibody.definition import (
@@ -106,7 +106,7 @@ def _with_definition(
 def _made(
     definition: ModelDefinition,
     parameters: ParameterSet,
-    derived: tuple[Derivation, str] | None = None,
+    derived: tuple[Kernels, str] | None = None,
 ) -> Model:
     """A model of equations that may have been derived already, see `compiled`."""
     name, flat = definition.name, parameters.flat()
@@ -228,7 +228,7 @@ def build_derived(name: str) -> Model | None:
     return build(name) if is_derived(name, *_derivation(definition)) else None
 
 
-def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
+def check_equations(definition: ModelDefinition, equations: Kernels) -> None:
     """Raise `InputError` if functions that were derived are missing or of another shape."""
     n, outputs = len(definition.coordinates), len(definition.outputs)
     constraints = len(definition.constraints)
@@ -268,7 +268,7 @@ def _check_states(definition: ModelDefinition, initial: Mapping[str, np.ndarray]
 
 def compiled(
     definition: ModelDefinition, loops: Sequence[str] = LOOP_SOURCES
-) -> tuple[Derivation, str]:
+) -> tuple[Kernels, str]:
     """Derivation of a model, and the hash of its source and of the loops that run it."""
     name, derive = definition.name, definition.derive
     with blamed(f"model {name!r}: its equations can't be derived", derive):

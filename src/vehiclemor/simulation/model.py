@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
+from vehiclemor.codegen.kernels import BareKernel, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.columns import listed
 from vehiclemor.inputs.excitation import Excitation
@@ -69,7 +69,7 @@ class Model(ShortRepr):
     repr_fields = ("name", "kind", "coordinates", "inputs", "outputs", "starts")
 
     definition: ModelDefinition
-    equations: Derivation
+    equations: Kernels
     parameters: ParameterSet
     kernel_hash: str
     constants: np.ndarray
@@ -158,7 +158,7 @@ class Model(ShortRepr):
     @property
     def kernels(self) -> Kernels:
         """Kernels of the equations, each compiled when it is first used."""
-        return self.equations.kernels
+        return self.equations
 
     @cached_property
     def _undriven(self) -> frozenset[str]:
