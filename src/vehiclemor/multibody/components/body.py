@@ -26,21 +26,13 @@ def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
 
 @dataclass(frozen=True)
 class WheelInputs:
-    """Symbols of `AT_WHEEL`, or defaults of inputs that are neither driven nor parameters.
+    """Symbols of `AT_WHEEL`, or defaults of inputs that are neither driven nor parameters."""
 
-    Attributes
-    ----------
-    drive, brake
-        Torques in N m: forwards on the wheel; against its spin, not negative.
-    friction
-        Factor on the friction of the tire.
-    road, road_rate
-        Height of the road under the wheel in m, upwards, and its rate in m/s.
-    """
-
+    # Torques in N m: forwards on the wheel; against its spin, not negative.
     drive: sp.Expr
     brake: sp.Expr
-    friction: sp.Expr
+    friction: sp.Expr  # Factor on the friction of the tire.
+    # Height of the road under the wheel in m, upwards, and its rate in m/s.
     road: sp.Expr
     road_rate: sp.Expr
 
@@ -53,19 +45,12 @@ class WheelInputs:
 
 @dataclass(frozen=True)
 class Inputs:
-    """Inputs in the equations.
+    """Inputs in the equations."""
 
-    Attributes
-    ----------
-    values
-        Name -> symbol; the default of an optional input that is neither driven nor a parameter.
-    driven, constant
-        Symbols of the argument `u`, and of parameters behind those that the model declares.
-    """
-
+    # Name -> symbol; the default of an optional input that is neither driven nor a parameter.
     values: dict[str, sp.Expr]
-    driven: list[sp.Symbol]
-    constant: list[sp.Symbol]
+    driven: list[sp.Symbol]  # Symbols of the argument `u`.
+    constant: list[sp.Symbol]  # Symbols of parameters behind those that the model declares.
 
     def at(self, wheel: str) -> WheelInputs:
         """Inputs at one wheel."""
