@@ -27,6 +27,7 @@ from vehiclemor.multibody.quantities import integral_of
 from vehiclemor.registry import component
 
 MOST_CORNERS = 10_000
+MOST_SEED = 999_999
 # Maneuvers with cached results: more than the sampled runs of a protocol, over which all rows go.
 CACHED = 512
 
@@ -205,6 +206,7 @@ def family(first: Maneuver) -> Maneuver:
 
 @lru_cache(maxsize=4096)
 def _member(first: Maneuver, seed: int) -> Maneuver:
+    count(f"seed of {first.name}", seed, least=0, most=MOST_SEED)
     of_first: Any = first.signal
     signal = replace(of_first, seed=seed)
     corners = getattr(signal, "corners", first.corners)

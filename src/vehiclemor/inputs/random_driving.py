@@ -17,13 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.arguments import count
 from vehiclemor.inputs.driving import FRONT_SHARE, MASS, RADIUS
 from vehiclemor.inputs.maneuver import Maneuver, family
 from vehiclemor.inputs.steering import DURATION, LANE_CHANGE_AMPLITUDE, RACK_AMPLITUDE, RATE, ramp
 from vehiclemor.multibody.quantities import WHEELS
 
-MOST_SEED = 999_999
 # More than begin in a run of four times the frequency.
 CORRECTIONS, DEMANDS = 96, 12
 # s: shortest and longest correction, shortest one of unit size, time to the next one, and pause
@@ -66,9 +64,6 @@ class RandomSteering:
 
     seed: int
     rack: bool = False
-
-    def __post_init__(self) -> None:
-        count("seed of random steering", self.seed, least=0, most=MOST_SEED)
 
     def __call__(self, times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         """Inputs (n, 1) or (n, 3) at the times (n,) in s."""

@@ -23,7 +23,7 @@ from functools import lru_cache
 import numpy as np
 
 from vehiclemor.arguments import count, number, within
-from vehiclemor.inputs.maneuver import Maneuver, family, smooth
+from vehiclemor.inputs.maneuver import MOST_SEED, Maneuver, family, smooth
 from vehiclemor.inputs.steering import ramp
 from vehiclemor.registry import choice, component
 
@@ -39,7 +39,6 @@ SPEED, SPEEDS = 20.0, (1.0, 40.0)
 TRACK, WHEELBASE = 2.07, 4.5
 # Length (s) of the ramp at which the road sets in.
 ONSET = 0.5
-MOST_SEED = 999_999
 # Cells of a Taylor series each, and its order: exact to 1e-15 of the shortest wave's height.
 CELLS, ORDER = 4096, 17
 
@@ -53,9 +52,6 @@ class Road:
 
     seed: int
     travel: bool = False
-
-    def __post_init__(self) -> None:
-        count("seed of a road", self.seed, least=0, most=MOST_SEED)
 
     def __call__(self, times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         """Inputs (n, 8) or (n, 2) at the times (n,) in s."""
@@ -144,4 +140,5 @@ def road(road_class: str = "C", seed: int = 1, speed: float = SPEED) -> Maneuver
     """
     amplitude = CLASSES[choice("road class", road_class, CLASSES)]
     frequency = within("speed", number("speed", speed), SPEEDS, " m/s") / SPEED
-    return component("maneuver", f"road:{Road(seed).seed}").perturbed(frequency, amplitude)
+    seed = count("seed of road", seed, least=0, most=MOST_SEED)
+    return component("maneuver", f"road:{seed}").perturbed(frequency, amplitude)
