@@ -64,7 +64,7 @@ def derive_with(
     rates = [*body.rates(tape, attitude, nu), *nu[6:]]
     n = len(q)
     # Of all wheels the first deflection, then the second.
-    slip_rates = chain(*zip(*(corner.wheel.slip_rates for corner in wheels), strict=True))
+    slip_rates = chain(*zip(*(corner.wheel.slip.rates for corner in wheels), strict=True))
     derivative = [*rates, *(solved[k] for k in range(n)), *slip_rates]
     outputs = [*body.outputs(q, nu), *tire_outputs(tape, wheels)]
     functions = {
