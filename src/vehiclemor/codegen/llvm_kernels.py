@@ -10,16 +10,9 @@ from typing import Any
 
 from llvmlite import ir
 
-from vehiclemor.codegen import llvm_vectors
+from vehiclemor.codegen import instructions
 from vehiclemor.codegen.elementary import ELEMENTARY
-from vehiclemor.codegen.llvm_arithmetic import (
-    DOUBLE,
-    LANE,
-    VECTOR,
-    arithmetic,
-    constant,
-    elementary,
-)
+from vehiclemor.codegen.instructions import DOUBLE, LANE, POINTER, VECTOR
 from vehiclemor.codegen.operations import (
     LANES,
     SEED,
@@ -29,8 +22,6 @@ from vehiclemor.codegen.operations import (
     Operation,
     is_entry,
 )
-
-POINTER = DOUBLE.as_pointer()
 
 
 def kernel_module(kernel: Kernel, lanes: int = 1) -> ir.Module:
@@ -105,7 +96,7 @@ class _Writer:
 
     def _spread(self, value: Any, width: int) -> Any:
         # A condition may stay one for all lanes.
-        return llvm_vectors.spread(self._builder, value, width) if value.type == DOUBLE else value
+        return instructions.spread(self._builder, value, width) if value.type == DOUBLE else value
 
     def _written(self, operation: Operation) -> Any:
         kind, arguments, detail = operation
@@ -114,8 +105,9 @@ class _Writer:
         values = [self._values[number] for number in arguments]
         match kind:
             case "number":
-                count = 1 if self._mixed else self._lanes
-                return constant(DOUBLE if count == 1 else ir.VectorType(DOUBLE, count), detail)
+                single = self._mixed or self._lanes == 1
+                of = DOUBLE if single else ir.VectorType(DOUBLE, self._lanes)
+                return instructions.constant(of, detail)
             case "entry":
                 return self._load(*detail)
             case "store":
@@ -126,11 +118,11 @@ class _Writer:
                 return values[0][detail]
             case _ if kind in VECTOR_STATEMENTS:
                 parts = [self._address(*d) if is_entry(d) else d for d in detail]
-                return llvm_vectors.write(kind, self._builder, parts, values)
+                return instructions.write(kind, self._builder, parts, values)
             case _ if kind in ELEMENTARY:
-                results = elementary(self._builder, kind, *values)
+                results = instructions.elementary(self._builder, kind, *values)
                 return results if kind == "sincos" else results[0]
-        return arithmetic(self._builder, kind, self._alike(values))
+        return instructions.arithmetic(self._builder, kind, self._alike(values))
 
     def _sums(self, arguments: Sequence[int], array: str, first: int, targets: int) -> list[Any]:
         # A generator: each factor is used as soon as it is computed, since registers are few.
@@ -139,8 +131,8 @@ class _Writer:
         if self._lanes > 1:
             factors = self._alike(list(factors))
             if factors[0].type != DOUBLE:
-                return llvm_vectors.sums_of_lanes(self._builder, address, factors, targets)
-        return llvm_vectors.weighted_sums(self._builder, address, factors, targets)
+                return instructions.sums_of_lanes(self._builder, address, factors, targets)
+        return instructions.weighted_sums(self._builder, address, factors, targets)
 
     def _load(self, name: str, index: int) -> Any:
         builder = self._builder
@@ -175,14 +167,14 @@ class _Writer:
         builder, arguments = self._builder, self._alike(arguments)
         if arguments[0].type != DOUBLE:
             # The arguments are vectors of samples already.
-            results = [elementary(builder, name, argument) for argument in arguments]
+            results = [instructions.elementary(builder, name, argument) for argument in arguments]
             return [value for values in zip(*results, strict=True) for value in values]
         lanes, parts = [LANE(lane) for lane in range(WIDTH)], []
         for first in range(0, LANES, WIDTH):
             vector = ir.Constant(VECTOR, ir.Undefined)
             for k, lane in enumerate(lanes):
                 vector = builder.insert_element(vector, arguments[first + k], lane)
-            parts.append(elementary(builder, name, vector))
+            parts.append(instructions.elementary(builder, name, vector))
         return [
             builder.extract_element(vector, lane)
             for vectors in zip(*parts, strict=True)

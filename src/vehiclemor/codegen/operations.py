@@ -8,10 +8,10 @@ other; each has a kind, numbers of earlier operations whose values it takes, and
     add ... >=        arithmetic, comparisons and functions, see `KINDS`
     sincos            sine and cosine of a value
     batch             `sincos` or `atan` of `LANES` values at once: its name
-    sums              (array, first, targets): see `llvm_vectors`
+    sums              (array, first, targets): see `instructions`
     part              index of one of several results of these three
     store             index of the result, row by row
-    combine ...       statements on whole vectors, see `llvm_vectors`
+    combine ...       statements on whole vectors, see `instructions`
 
 Named operations run in order; the others are inlined where used.
 """
@@ -113,7 +113,7 @@ class Listing:
         return [self.new("part", value, detail=index) for index in range(count)]
 
     def sums(self, array: str, first: int, targets: int, factors: Sequence[Value]) -> list[Value]:
-        """Sums of factors times weights from index `first` of an array on, see `llvm_vectors`."""
+        """Sums of factors times weights from index `first` of an array on, see `instructions`."""
         sums = self.new("sums", *factors, detail=(array, first, targets))
         return self.parts(sums, targets)
 
