@@ -78,8 +78,7 @@ def test_other_physics_are_another_test_set(name):
     for function in filter(model.kernels.__contains__, EQUATIONS):
         kernel = model.equations.sources[function]
         other = replace(kernel, listed=kernel.listed.replace("multiply", "add", 1))
-        equations = Kernels([*model.equations.sources.values(), other])
-        found.append(digest_with(equations=equations))
+        found.append(digest_with(equations=Kernels([*model.equations.sources.values(), other])))
     if model.kind == "structural":
         found.append(digest_with(definition=stiffer(model.definition)))
     assert len({digest_of(protocol), *found}) == 1 + len(found)

@@ -21,8 +21,7 @@ class Argument:
 
     def sums(self, first: int, targets: int, factors: Sequence[Value | float]) -> list[Value]:
         """Sums of factors with weights from a place on."""
-        values = [f if isinstance(f, Value) else self.listing.number(f) for f in factors]
-        return self.listing.sums(self.name, first, targets, values)
+        return self.listing.sums(self.name, first, targets, factors)
 
 
 def kernel(body: Callable[..., None], columns: int = 0) -> Kernel:
