@@ -171,7 +171,4 @@ def checked_times(times: Any) -> np.ndarray:
 
 def checked_factor(name: str, value: object) -> float:
     """A factor on the frequency or amplitude; `InputError` if it is none, or out of bounds."""
-    factor = number(f"{name} factor", value)
-    if name == "frequency" and factor <= 0.0:
-        raise InputError(f"{name} factor: {factor:g} is not positive")
-    return within(f"{name} factor", factor, FACTORS[name])
+    return within(f"{name} factor", number(f"{name} factor", value), FACTORS[name])
