@@ -36,10 +36,8 @@ def completed(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
     """
     names = tuple(quantity.name for quantity in definition.inputs)
     needed = f"{definition.name} needs {', '.join(names)}"
-    further = [name for name in maneuver.inputs if name not in names]
-    optional = {quantity.name for quantity in definition.optional_inputs} if further else ()
-    for name in further:
-        if name in optional:
+    for name in maneuver.inputs:
+        if name not in names and any(name == q.name for q in definition.optional_inputs):
             alone = f"alone: it is reduced from runs without {name}"
             raise InputError(f"{maneuver} gives input {name}, {needed} {alone}")
     complete = maneuver.for_inputs(names, tuple(q.default or 0.0 for q in definition.inputs))

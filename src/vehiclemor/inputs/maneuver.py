@@ -12,6 +12,7 @@ import numpy as np
 
 from vehiclemor.arguments import count, line_of_text, loop_array, number, quoted, real_array, within
 from vehiclemor.exceptions import InputError, PlugInError, blamed
+from vehiclemor.inputs.columns import listed
 from vehiclemor.inputs.excitation import (
     FACTORS,
     LONGEST_DURATION,
@@ -81,10 +82,7 @@ class Maneuver(Excitation):
         for name, function in functions.items():
             if not callable(function):
                 raise InputError(f"{self}: {name} is not a function")
-        if isinstance(self.inputs, list):
-            object.__setattr__(self, "inputs", tuple(self.inputs))
-        if not (isinstance(self.inputs, tuple) and all(isinstance(i, str) for i in self.inputs)):
-            raise InputError(f"{self}: inputs is {quoted(self.inputs)}, not a tuple of names")
+        object.__setattr__(self, "inputs", listed(self.inputs, f"{self}: inputs"))
         if number(f"{self}: duration", self.duration) <= 0.0:
             raise InputError(f"{self}: duration is {self.duration:g} s, not positive")
         within(f"{self}: duration", self.duration, (0.0, LONGEST_DURATION), " s")
