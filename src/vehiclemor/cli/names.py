@@ -3,7 +3,6 @@
 import json
 import os
 import re
-from collections.abc import Iterable
 from importlib.util import find_spec
 from keyword import iskeyword
 from pathlib import Path
@@ -21,6 +20,8 @@ KINDS = ("models", "methods", "maneuvers", "studies")
 LONGEST = 30
 # Rows of a table that are printed without --all, where it has some more.
 FEW, SOME = 4, 6
+# Columns of nothing else are left out.
+EMPTY = ("", None, [], {})
 
 
 def list_components(
@@ -83,14 +84,10 @@ def _print(key: str, content: Any, few: bool, indent: str = "") -> int:
     shown = content[:FEW] if few and len(content) > SOME else content
     cut = len(content) - len(shown)
     for heading, rows in _by_source(key, shown).items():
-        columns = [name for name in rows[0] if not _empty(row[name] for row in rows)]
+        columns = [name for name in rows[0] if any(row[name] not in EMPTY for row in rows)]
         more = f" ({len(shown)} of {len(content)})" if cut else ""
         print(f"\n{wrapped(f'{heading}{more}:', 0, 2)}\n{Table(rows, columns, explain=False)}")
     return cut
-
-
-def _empty(column: Iterable[Any]) -> bool:
-    return all(value in ("", None, [], {}) for value in column)
 
 
 def _by_source(key: str, rows: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:

@@ -1,7 +1,6 @@
 """One run or one model: simulated, drawn, exported, given to other programs."""
 
 import inspect
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,13 +33,31 @@ from vehiclemor.report.labels import Kind
 from vehiclemor.report.printing import wrapped
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Driven:
-    """Options of what drives a run, and where it starts.
+def simulate(
+    model: str,
+    *,
+    method: str = "full_order",
+    settings: Settings = None,
+    maneuver: str | None = None,
+    csv: Annotated[list[str] | None, Several] = None,
+    frequency: float = 1.0,
+    amplitude: float = 1.0,
+    start: str | None = None,
+    preset: str = "recommended",
+    training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = (),
+    parameter: Parameters = None,
+    out: Path | None = None,
+    plot: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None,
+    all_outputs: bool = False,
+) -> int:
+    """Simulate a model with a method; errors are against the full-order solution.
 
     Parameters
     ----------
+    model
+        Registered name.
+    method
+        Registered name; shipped: the reduced model that ships with the package.
     maneuver
         Registered name, or a CSV file of a log; the model's default maneuver if left out.
     csv
@@ -53,22 +70,11 @@ class Driven:
         Factor on the input's amplitude.
     start
         Initial condition; the model's first by default.
-    """
-
-    maneuver: str | None = None
-    csv: Annotated[list[str] | None, Several] = None
-    frequency: float = 1.0
-    amplitude: float = 1.0
-    start: str | None = None
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Shown:
-    """Options of what is saved, drawn and printed of a run.
-
-    Parameters
-    ----------
+    preset
+        Preset of the method's settings.
+    training
+        matched (the very run that is simulated; the default), nominal (the model's maneuver),
+        protocol (the training of the model's protocol), or names of maneuvers; one or several.
     out
         netCDF file for the result.
     plot
@@ -76,52 +82,21 @@ class Shown:
     all_outputs
         Print errors of every output, not only of those that tables show.
     """
-
-    out: Path | None = None
-    plot: Annotated[list[Path] | None, Parameter(consume_multiple=True)] = None
-    all_outputs: bool = False
-
-
-def simulate(
-    model: str,
-    *,
-    method: str = "full_order",
-    settings: Settings = None,
-    driven: Driven = Driven(),
-    preset: str = "recommended",
-    training: Annotated[tuple[str, ...], Several, Parameter(show_default=False)] = (),
-    parameter: Parameters = None,
-    shown: Shown = Shown(),
-) -> int:
-    """Simulate a model with a method; errors are against the full-order solution.
-
-    Parameters
-    ----------
-    model
-        Registered name.
-    method
-        Registered name; shipped: the reduced model that ships with the package.
-    preset
-        Preset of the method's settings.
-    training
-        matched (the very run that is simulated; the default), nominal (the model's maneuver),
-        protocol (the training of the model's protocol), or names of maneuvers; one or several.
-    """
     check_names("--training", training)
     chosen = key_values("--set", settings)
     for key in inspect.signature(vm.simulate).parameters.keys() & chosen.keys():
         raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
-    picture = _picture(shown.plot, f"{model}-{method}.png")
-    if shown.out is not None:
-        result_file("--out", shown.out)
+    picture = _picture(plot, f"{model}-{method}.png")
+    if out is not None:
+        result_file("--out", out)
     ready = vm.model(model, key_values("--parameter", parameter))
     dataset = vm.simulate(
         ready if parameter else model,
         method,
-        maneuver=_maneuver(driven.maneuver, driven.csv),
-        start=driven.start,
-        frequency=driven.frequency,
-        amplitude=driven.amplitude,
+        maneuver=_maneuver(maneuver, csv),
+        start=start,
+        frequency=frequency,
+        amplitude=amplitude,
         preset=preset,
         training=training or "matched",
         **chosen,
@@ -129,14 +104,8 @@ def simulate(
     from vehiclemor.report.labels import tabled_outputs
     from vehiclemor.report.printing import simulation_text
 
-    outputs = ready.outputs if shown.all_outputs else tabled_outputs(ready.definition)
+    outputs = ready.outputs if all_outputs else tabled_outputs(ready.definition)
     print(simulation_text(dataset, outputs, ready.counts))
-    _write(dataset, shown.out, picture)
-    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
-
-
-def _write(dataset: Any, out: Path | None, picture: Path | None) -> None:
-    """Write a run to those files that are asked for, and say so."""
     if out is not None:
         from vehiclemor.netcdf_file import write_dataset
 
@@ -147,6 +116,7 @@ def _write(dataset: Any, out: Path | None, picture: Path | None) -> None:
         print(f"written: {picture}")
     if out is None and picture is None:
         print("nothing is saved: --out FILE.nc saves the result, --plot draws it")
+    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
 def _maneuver(name: str | None, csv: list[str] | None) -> str | vm.Signal | None:
@@ -254,32 +224,6 @@ def plot(
     print(f"written: {picture}")
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Exported:
-    """Options of what an export holds: its integrator, numbers, inputs and outputs.
-
-    Parameters
-    ----------
-    step
-        Step size in s of the integrator in C and FMU.
-    integrator
-        In C and FMU: rk4, explicit; ros2, linearly implicit with one Jacobian, for longer steps.
-    precision
-        Of the numbers in C and FMU.
-    inputs
-        Optional inputs of the full model that the export has, such as brake_torque_FL.
-    outputs
-        Outputs that the export computes; all by default.
-    """
-
-    step: float = STEP
-    integrator: Integrator = "rk4"
-    precision: Precision = "double"
-    inputs: Annotated[tuple[str, ...], Several, Parameter(name="--input", show_default=False)] = ()
-    outputs: Annotated[list[str] | None, Several, Parameter(name="--output")] = None
-
-
 def export(
     model: str,
     *,
@@ -289,7 +233,11 @@ def export(
     parameter: Parameters = None,
     out: Path | None = None,
     overwrite: bool = False,
-    exported: Exported = Exported(),
+    step: float = STEP,
+    integrator: Integrator = "rk4",
+    precision: Precision = "double",
+    inputs: Annotated[tuple[str, ...], Several, Parameter(name="--input", show_default=False)] = (),
+    outputs: Annotated[list[str] | None, Several, Parameter(name="--output")] = None,
 ) -> None:
     """Export a model, or a reduced one, for another tool.
 
@@ -308,6 +256,16 @@ def export(
         Folder or file; under the model's name here by default.
     overwrite
         Replace an export that is there.
+    step
+        Step size in s of the integrator in C and FMU.
+    integrator
+        In C and FMU: rk4, explicit; ros2, linearly implicit with one Jacobian, for longer steps.
+    precision
+        Of the numbers in C and FMU.
+    inputs
+        Optional inputs of the full model that the export has, such as brake_torque_FL.
+    outputs
+        Outputs that the export computes; all by default.
     """
     given, values = key_values("--set", settings), key_values("--parameter", parameter)
     file = Path(model).suffix == ".nc"
@@ -325,7 +283,17 @@ def export(
         out = destination(name_of(model, method), to, out, overwrite)
         if method is not None:
             chosen = vm.reduce(chosen, method, **given)
-    written = vm.export(chosen, to, out, overwrite=overwrite, **vars(exported))
+    written = vm.export(
+        chosen,
+        to,
+        out,
+        step=step,
+        precision=precision,
+        integrator=integrator,
+        inputs=inputs,
+        outputs=outputs,
+        overwrite=overwrite,
+    )
     print(f"written: {written}")
 
 
