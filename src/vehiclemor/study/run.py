@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Collection
 from contextlib import nullcontext
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import xarray as xr
@@ -18,31 +16,16 @@ from vehiclemor.progress import tell
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
-from vehiclemor.study.plans.protocol import load_protocol
+from vehiclemor.study.plans.protocol import Protocol, load_protocol
 from vehiclemor.study.plans.protocol_run import run_protocol, validation_keys
-from vehiclemor.study.plans.results import combined, grid_digest
-from vehiclemor.study.plans.study_file import MOST_SEED, ProtocolFile, StudyFile
-from vehiclemor.study.store import combined_path, read_run, result_path, run_path, stored
+from vehiclemor.study.plans.results import combined, stored_study
+from vehiclemor.study.plans.study_file import MOST_SEED, GridFile
+from vehiclemor.study.store import read_run, result_path
 from vehiclemor.study.workers import Engine, Workers, cluster
 
 LATER = "then the chosen ones are tested"
 # What differs from run to run of one reason.
 NUMBER = re.compile(r"-?\d[\d.e+-]*")
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a study runs, all names resolved.
-
-    `run` takes the results folder, a number of jobs, and what runs them elsewhere; `keys` gives the
-    keys of the runs that come first, after which a protocol does what `later` says.
-    """
-
-    name: str
-    definition: StudyFile
-    run: Callable[[Path, int, Engine | None], xr.Dataset]
-    keys: Callable[[], Collection[str]]
-    later: str = ""
 
 
 def run_studies(
@@ -57,54 +40,46 @@ def run_studies(
     if jobs > 1 and scheduler:
         raise InputError("jobs: a scheduler has its own workers")
     plans = _plans(study, seed)
+    results: dict[str, xr.Dataset] = {}
     with cluster(scheduler) if scheduler else nullcontext() as elsewhere:
-        return {plan.name: plan.run(folder, jobs, elsewhere) for plan in plans}
+        for name, plan in plans.items():
+            if isinstance(plan, Grid):
+                results[name] = run_grid(plan, folder, jobs, elsewhere)
+            else:
+                results[name] = run_protocol(plan, folder, jobs, elsewhere)
+    return results
 
 
-def _plans(study: str, seed: int | None) -> list[Plan]:
-    """Plan of a study, or of every study of a collection."""
+def _plans(study: str, seed: int | None) -> dict[str, Grid | Protocol]:
+    """What a study, or every study of a collection, runs, by the name of its results."""
+    files = studies_and_files(study)
     if seed is not None:
         count("seed", seed, least=0, most=MOST_SEED)
-    files = studies_and_files(study)
-    if seed is not None and not any(_samples(definition) for _, definition in files.values()):
-        raise InputError(f"seed: {study} samples no test runs")
-    return [_plan(name, path, definition, seed) for name, (path, definition) in files.items()]
-
-
-def _samples(definition: StudyFile) -> bool:
-    return isinstance(definition, ProtocolFile) and definition.drawn is not None
-
-
-def _plan(name: str, path: Path, definition: StudyFile, seed: int | None) -> Plan:
-    if isinstance(definition, ProtocolFile):
-        own_seed = seed if definition.drawn else None
-        protocol = load_protocol(str(path), own_seed, name)
-        keys = partial(validation_keys, protocol)
-        return Plan(protocol.study, definition, partial(run_protocol, protocol), keys, LATER)
-    grid = expand(name, definition, path.parent)
-    return Plan(name, definition, partial(run_grid, grid), grid.experiments.keys)
+        if not any(getattr(definition, "drawn", None) for _, definition in files.values()):
+            raise InputError(f"seed: {study} samples no test runs")
+    plans: dict[str, Grid | Protocol] = {}
+    for name, (path, definition) in files.items():
+        if isinstance(definition, GridFile):
+            plans[name] = expand(name, definition, path.parent)
+        else:
+            protocol = load_protocol(str(path), seed if definition.drawn else None, name)
+            plans[protocol.study] = protocol
+    return plans
 
 
 def run_grid(
     grid: Grid, folder: Path, jobs: int = 1, elsewhere: Engine | None = None
 ) -> xr.Dataset:
     """Run a grid; what an earlier run has finished is not computed again."""
-    keys = grid.experiments.keys()
     workers = Workers(grid.name, folder, jobs, elsewhere)
 
     def run_and_combine() -> xr.Dataset:
         workers([[experiment] for experiment in grid.experiments.values()])
         return combined(grid, folder)
 
-    dataset = stored(
-        combined_path(folder, grid.name),
-        "cells",
-        grid_digest(grid),
-        run_and_combine,
-        lambda: (run_path(folder, key) for key in keys),
-        content_hash(grid.definition),
-    )
-    tell(grid.name, len(keys), len(keys))
+    keys = grid.keys.ravel().astype(str).tolist()
+    dataset = stored_study(folder, grid.name, grid.definition, keys, run_and_combine)
+    tell(grid.name, len(grid.experiments), len(grid.experiments))
     return dataset
 
 
@@ -144,13 +119,16 @@ def status_of(study: str, folder: Path, seed: int | None = None) -> dict[str, St
     """
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder}: not a folder")
-    return {plan.name: _status(plan, folder) for plan in _plans(study, seed)}
+    return {name: _status(name, plan, folder) for name, plan in _plans(study, seed).items()}
 
 
-def _status(plan: Plan, folder: Path) -> StudyStatus:
-    result = result_path(folder, plan.name, content_hash(plan.definition))
-    keys = plan.keys()
-    status = StudyStatus(len(keys), result=result, later=plan.later)
+def _status(name: str, plan: Grid | Protocol, folder: Path) -> StudyStatus:
+    result = result_path(folder, name, content_hash(plan.definition))
+    if isinstance(plan, Grid):
+        keys, later = plan.experiments.keys(), ""
+    else:
+        keys, later = validation_keys(plan), LATER
+    status = StudyStatus(len(keys), result=result, later=later)
     examples: dict[tuple[str, str], tuple[str, str]] = {}
     for key in keys:
         try:
@@ -158,9 +136,9 @@ def _status(plan: Plan, folder: Path) -> StudyStatus:
         except FileError:
             # Missing, or quarantined by the next call.
             continue
-        for (name, message), runs in run.ends.items():
-            alike = name, NUMBER.sub("#", message)
-            status.ends[examples.setdefault(alike, (name, message))] += runs
+        for (end, message), runs in run.ends.items():
+            alike = end, NUMBER.sub("#", message)
+            status.ends[examples.setdefault(alike, (end, message))] += runs
         status.done += not run.broken
         status.warned += run.warned
     return status

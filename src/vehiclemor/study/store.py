@@ -258,7 +258,7 @@ def stored(
     attribute: str,
     key: str,
     make: Callable[[], xr.Dataset],
-    sources: Callable[[], Iterable[Path]] = list,
+    sources: Iterable[Path] = (),
     content: str = "",
 ) -> xr.Dataset:
     """What is stored for this key, else what `make` gives, which is then stored.
@@ -271,7 +271,7 @@ def stored(
     # Asked before it is read: what another process stores meanwhile is none of others.
     there = os.path.lexists(path)
     held = global_attributes(path, stored=True)
-    if held.get(attribute) == key and all(source.exists() for source in sources()):
+    if held.get(attribute) == key and all(source.exists() for source in sources):
         dataset = read_dataset(path, stored=True)
         # What a bug has ended is tried again.
         ended = "status" not in dataset or "error" not in dataset["status"].values

@@ -5,7 +5,6 @@ The stages are functions of what they may see: `validate` gets no scenario of th
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,7 +15,6 @@ import numpy as np
 import xarray as xr
 
 from vehiclemor.exceptions import FileError
-from vehiclemor.provenance import layout_digest
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study import timing
 from vehiclemor.study.experiment import Experiment, complete_settings, make_experiment
@@ -28,7 +26,6 @@ from vehiclemor.study.plans.choice import (
     reasons,
     validation_of,
 )
-from vehiclemor.study.plans.loading import content_hash
 from vehiclemor.study.plans.protocol import (
     CONTENDER,
     FULL_ORDER,
@@ -37,8 +34,8 @@ from vehiclemor.study.plans.protocol import (
     Scenarios,
     sampled_sets,
 )
-from vehiclemor.study.plans.results import judged_set, protocol_dataset
-from vehiclemor.study.store import combined_path, run_path, stored
+from vehiclemor.study.plans.results import judged_set, protocol_dataset, stored_study
+from vehiclemor.study.store import combined_path
 from vehiclemor.study.workers import Engine, Workers
 
 
@@ -75,16 +72,13 @@ def run_protocol(
     ends = np.array([row["status"].values[sample] for row in results[judged]])
     tests = tuple(sets[judged][run] for run in sample)
     timed = _timed(protocol, rows, tests, np.isin(ends, FINISHED), path)
-    keys = sorted(workers.asked)
-    times = str(timed["seconds"].values.tolist())
-    parts = [layout_digest(), protocol.definition.model_dump_json(), times, *keys]
-    return stored(
-        path,
-        "cells",
-        hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20],
+    return stored_study(
+        folder,
+        protocol.study,
+        protocol.definition,
+        sorted(workers.asked),
         lambda: protocol_dataset(protocol, rows, sets, results, timed, apart),
-        lambda: (run_path(folder, key) for key in keys),
-        content_hash(protocol.definition),
+        times=str(timed["seconds"].values.tolist()),
     )
 
 

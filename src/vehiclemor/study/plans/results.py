@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,22 +18,31 @@ from vehiclemor.provenance import attributes, layout_digest, versions
 from vehiclemor.simulation.model import Model
 from vehiclemor.study.plans.choice import Row
 from vehiclemor.study.plans.grid import Grid
+from vehiclemor.study.plans.loading import content_hash
 from vehiclemor.study.plans.protocol import Protocol, Scenarios
 from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.plans.study_runs import PARAMETER
 from vehiclemor.study.result import meaning_of, variables
-from vehiclemor.study.store import MEND, read_run, run_path
+from vehiclemor.study.store import MEND, combined_path, read_run, run_path, stored
 
 # Dimensions of a run's errors; each has the units of its labels beside it.
 QUANTITIES = ("output", "coordinate", "speed")
 
 
-def grid_digest(grid: Grid) -> str:
-    """Hash of a study and the keys of its runs, for a combined dataset to be current."""
-    digest = hashlib.sha256(grid.definition.model_dump_json().encode())
-    digest.update(layout_digest().encode())
-    digest.update(grid.keys.tobytes())
-    return digest.hexdigest()[:20]
+def stored_study(
+    folder: Path,
+    name: str,
+    definition: StudyFile,
+    keys: Sequence[str],
+    make: Callable[[], xr.Dataset],
+    times: str = "",
+) -> xr.Dataset:
+    """Combined dataset of a study: what is stored of the same runs, else what `make` gives."""
+    parts = [layout_digest(), definition.model_dump_json(), times, *keys]
+    digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
+    sources = (run_path(folder, key) for key in dict.fromkeys(keys))
+    path, content = combined_path(folder, name), content_hash(definition)
+    return stored(path, "cells", digest, make, sources, content)
 
 
 def combined(grid: Grid, folder: Path) -> xr.Dataset:
