@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from vehiclemor.exceptions import CorruptError
+from vehiclemor.exceptions import CorruptError, InputError
 from vehiclemor.parameters import AXES, parameter_and_axis
 from vehiclemor.provenance import attributes, layout_digest, versions
 from vehiclemor.simulation.model import Model
@@ -91,14 +91,11 @@ def _with_attributes(
 
 def _coordinates(grid: Grid) -> dict[str, Any]:
     """Values of the dimensions, with meanings."""
-    values: dict[str, tuple[str, list[Any]]] = {}
+    coordinates: dict[str, Any] = {}
     for name, points in grid.dimensions.items():
-        values[name] = name, points
-    values["method"] = "label", [entry.method for entry in grid.definition.methods]
-    return {
-        name: (dimension, points, described(grid.model, name))
-        for name, (dimension, points) in values.items()
-    }
+        coordinates[name] = name, points, described(grid.model, name)
+    methods = [entry.method for entry in grid.definition.methods]
+    return coordinates | {"method": ("label", methods, described(grid.model, "method"))}
 
 
 def described(model: Model, dimension: str) -> dict[str, str]:
@@ -116,31 +113,32 @@ def flattened(results: dict[str, xr.Dataset]) -> xr.Dataset:
     """Combined datasets of several studies as rows of one, on the dimension `cell`.
 
     Histories are left out; grid dimensions become coordinates of the rows, missing where a study
-    does not have them.
+    does not have them.  `InputError` if units of one name differ.
     """
     parts: list[xr.Dataset] = []
-    units: dict[str, dict[str, str]] = {name: {} for name in QUANTITIES}
-    for name, dataset in results.items():
-        rows = dataset.drop_dims([d for d in ("time", "input") if d in dataset.dims])
-        for quantity in set(QUANTITIES) & set(rows.dims):
-            units[quantity] |= rows[f"{quantity}_unit"].to_series().to_dict()
-            rows = rows.drop_vars(f"{quantity}_unit")
-        rows = rows.stack(cell=[d for d in rows.dims if d not in QUANTITIES]).reset_index("cell")
-        parts.append(rows.assign_coords(study=("cell", [name] * rows.sizes["cell"])))
     labels: set[str] = set()
-    for part in parts:
-        labels |= {str(name) for name in part.coords if part[name].dims == ("cell",)}
-    complete: list[xr.Dataset] = []
-    for part in parts:
-        missing = "cell", np.full(part.sizes["cell"], np.nan)
-        absent = sorted(labels.difference(map(str, part.coords)))
-        complete.append(part.assign_coords(dict.fromkeys(absent, missing)))
-    # Models differ in their quantities and counts: what a row does not have is missing in it.
-    dataset = xr.concat(complete, dim="cell", coords="minimal", compat="override", join="outer")
-    for quantity in (name for name in QUANTITIES if name in dataset.dims):
-        column = [units[quantity][label] for label in dataset[quantity].values.tolist()]
-        meaning = {"long_name": f"SI unit of the {quantity}"}
-        dataset = dataset.assign_coords({f"{quantity}_unit": (quantity, column, meaning)})
+    for name, dataset in results.items():
+        rows = dataset.drop_dims(["time", "input"], errors="ignore")
+        rows = rows.stack(cell=[d for d in rows.dims if d not in QUANTITIES]).reset_index("cell")
+        rows = rows.assign_coords(study=("cell", [name] * rows.sizes["cell"]))
+        of_rows = [str(label) for label in rows.coords if rows[label].dims == ("cell",)]
+        labels.update(of_rows)
+        # Data that a study does not have are missing in its rows; coordinates must not be.
+        parts.append(rows.reset_coords(of_rows))
+    try:
+        dataset = xr.concat(
+            parts,
+            dim="cell",
+            data_vars="minimal",
+            coords="minimal",
+            compat="no_conflicts",
+            join="outer",
+        )
+    except xr.MergeError:
+        raise InputError(
+            "quantities of one name have several units in these studies: read each of the results"
+        ) from None
+    dataset = dataset.set_coords(labels)
     dataset.attrs = {"source": "vehiclemor", "studies": ", ".join(results), "versions": versions()}
     return dataset
 
@@ -174,12 +172,20 @@ def protocol_dataset(
     dataset = dataset.merge(parts[0][fixed])
     # How the files store text holds for the longest words in each of them only.
     dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
-    per_row: dict[str, list[Any]] = {"offline_seconds": timed["offline_seconds"].values.tolist()}
-    for index, row in enumerate(rows):
-        keys = {name: datasets[index].attrs["cell"] for name, datasets in results.items()}
-        record = _record(row) | {"cell_keys": json.dumps(keys)}
-        for name, value in record.items():
-            per_row.setdefault(name, []).append(value)
+    per_row: dict[str, object] = {
+        "offline_seconds": timed["offline_seconds"].values.tolist(),
+        "role": [row.entry.role for row in rows],
+        "series": [row.entry.label for row in rows],
+        "winner": [row.winner for row in rows],
+        "method": [row.entry.method for row in rows],
+        "settings": [json.dumps(row.settings, sort_keys=True) for row in rows],
+        "validation": [_validation(row) for row in rows],
+        "validation_score": [row.result.score for row in rows],
+        "cell_keys": [
+            json.dumps({name: of_set[number].attrs["cell"] for name, of_set in results.items()})
+            for number in range(len(rows))
+        ],
+    }
     dataset = dataset.assign(variables(per_row, "label")).set_coords("method")
     dataset = dataset.assign_coords(label=[row.label for row in rows])
     for name in ("label", "scenario"):
@@ -201,19 +207,6 @@ def protocol_dataset(
         evaluations=protocol.model.evaluations,
         test_set=_test_set(protocol, results),
     )
-
-
-def _record(row: Row) -> dict[str, Any]:
-    """What describes a row, by names of variables."""
-    return {
-        "role": row.entry.role,
-        "series": row.entry.label,
-        "winner": row.winner,
-        "method": row.entry.method,
-        "settings": json.dumps(row.settings, sort_keys=True),
-        "validation": _validation(row),
-        "validation_score": row.result.score,
-    }
 
 
 def _test_set(protocol: Protocol, results: Mapping[str, Sequence[xr.Dataset]]) -> str:
