@@ -28,16 +28,10 @@ ROUNDING = 1e-9
 FEW = 16
 
 
-def overrides(table: Mapping[str, float | Sequence[float]]) -> Overrides:
-    """Parameters of a model from a table of them, whose order does not matter."""
-    return tuple((name, _plain(value)) for name, value in sorted(table.items()))
-
-
-def _plain(value: Any) -> Any:
-    """Numbers as floats and lists as tuples; what is neither is refused where it is used."""
-    if isinstance(value, list | tuple):
-        return tuple(map(_plain, value))
-    return float(value) if isinstance(value, int) else value
+def overrides(table: Mapping[str, Any]) -> Overrides:
+    """Numbers of a model's parameters; a text, which a grid may have, is refused by the model."""
+    sizes = {name: float(x) if isinstance(x, int) else x for name, x in table.items()}
+    return tuple(sorted(sizes.items()))
 
 
 @dataclass(frozen=True)

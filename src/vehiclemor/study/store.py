@@ -104,7 +104,7 @@ def encoded(dataset: xr.Dataset, key: str) -> bytes:
     coordinates = [str(name) for name in dataset.coords]
     content = {"variables": described, "coordinates": coordinates, "attributes": dataset.attrs}
     header = {"schema": SCHEMA, "key": key, "sha256": ZEROS}
-    file = save(arrays, header | {"dataset": json.dumps(content, default=_plain)})
+    file = save(arrays, header | {"dataset": json.dumps(content)})
     return _with_hash(file, ZEROS, hashlib.sha256(file).hexdigest())
 
 
@@ -158,13 +158,6 @@ def _with_hash(content: bytes, old: str, new: str) -> bytes:
     return content.replace(HASH.format(old).encode(), HASH.format(new).encode(), 1)
 
 
-def _plain(value: Any) -> Any:
-    """What NumPy has of JSON's types."""
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} can't be stored")
-
-
 def prepare_folder(folder: Path) -> None:
     """Make a results folder, prove that it can be written, and remove old parts of files."""
     for part in (folder / "cells", folder / "studies"):
@@ -202,13 +195,6 @@ def read_run(folder: Path, key: str) -> StoredRun:
         machine = machine_reason(error)
         kind = MachineError if machine else FileError
         raise kind(f"{path}: can't be read ({machine or error.strerror})") from None
-
-
-def is_stored(folder: Path, key: str) -> bool:
-    """Whether a finished result is stored."""
-    with suppress(FileError, MachineError):
-        return not read_run(folder, key).broken
-    return False
 
 
 def finished_runs(folder: Path, keys: Iterable[str]) -> set[str]:

@@ -151,17 +151,18 @@ def evaluate_and_store(experiments: Sequence[Experiment], folder: Path) -> Done:
     """Evaluate some experiments, and store each complete file."""
     finished, fault = [], ""
     for experiment in experiments:
-        # Another driver may have stored it, or a worker that was killed before it could say so.
-        if not store.is_stored(folder, experiment.key):
-            try:
-                dataset = evaluate(experiment)
-            except Exception as error:
-                fault = str(error) if isinstance(error, MachineError) else machine_reason(error)
-                if not fault:
-                    raise
-                continue
-            store.write_run(store.encoded(dataset, experiment.key), folder, experiment.key)
-        finished.append(experiment.key)
+        key = experiment.key
+        try:
+            # Another driver may have stored it, or a worker that was killed before it said so.
+            dataset = None if store.finished_runs(folder, [key]) else evaluate(experiment)
+        except Exception as error:
+            fault = str(error) if isinstance(error, MachineError) else machine_reason(error)
+            if not fault:
+                raise
+            continue
+        if dataset is not None:
+            store.write_run(store.encoded(dataset, key), folder, key)
+        finished.append(key)
     return Done(finished, fault)
 
 

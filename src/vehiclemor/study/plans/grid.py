@@ -66,7 +66,8 @@ def expand(name: str, study: GridFile, folder: Path = Path()) -> Grid:
         experiments: dict[str, Experiment] = {}
         axes = {name: points for name, points in dimensions.items() if name != "label"}
         for number, entry in enumerate(study.methods):
-            points = _points(axes)
+            every = itertools.product(*axes.values())
+            points = (dict(zip(axes, point, strict=True)) for point in every)
             of_method = list(_of_method(model, study, entry, points, driven))
             # Settings that a method does not have give no further experiments of it.
             experiments |= {experiment.key: experiment for experiment in of_method}
@@ -127,12 +128,6 @@ def _check_histories(
         )
     if any(not np.array_equal(first.times, other.times) for other in others):
         raise InputError('maneuvers of other output times need keep = "metrics"')
-
-
-def _points(dimensions: Mapping[str, list[Any]]) -> Iterator[dict[str, Any]]:
-    """Name of a dimension -> value, at every point."""
-    for coordinates in itertools.product(*dimensions.values()):
-        yield dict(zip(dimensions, coordinates, strict=True))
 
 
 def _of_method(

@@ -74,9 +74,9 @@ def combined(grid: Grid, folder: Path) -> xr.Dataset:
     columns |= variables({"cell_key": keys.astype(str).astype(object)}, *names)
     coordinates = {str(name): variable for name, variable in template.coords.items()}
     dataset = xr.Dataset(columns, _coordinates(grid) | coordinates)
-    return _with_attributes(
-        dataset, grid.name, grid.definition, grid.model, training=grid.definition.trained_on
-    )
+    training = grid.definition.training
+    training = training if isinstance(training, str) else ", ".join(training)
+    return _with_attributes(dataset, grid.name, grid.definition, grid.model, training=training)
 
 
 def _with_attributes(

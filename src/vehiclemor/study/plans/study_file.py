@@ -192,11 +192,6 @@ class GridFile(StudyOfModel):
     )
 
     @property
-    def trained_on(self) -> str:
-        """What is trained on, in one line."""
-        return self.training if isinstance(self.training, str) else ", ".join(self.training)
-
-    @property
     def points(self) -> int:
         """Number of points; one run may stand at several of them."""
         sizes = [len(values(axis)) for axis in self.grid.values()]
