@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vehiclemor import VehiclemorError, errors
-from vehiclemor.api import RESULTS, reduce
+from vehiclemor.api import RESULTS, reduce, run_study
 from vehiclemor.exceptions import FileError
 from vehiclemor.files import data_folder, make_folder
 from vehiclemor.provenance import code_digest
@@ -30,7 +30,6 @@ from vehiclemor.simulation.trajectory import Trajectory
 from vehiclemor.study.experiment import Settings
 from vehiclemor.study.plans.choice import errors_by
 from vehiclemor.study.plans.protocol import Protocol, load_protocol, protocol_names
-from vehiclemor.study.plans.protocol_run import run_protocol
 from vehiclemor.study.scenario import Scenario, parameters_of, start_of
 
 COMMAND = "python paper/reduced_models.py"
@@ -53,7 +52,7 @@ class Choice(NamedTuple):
 def chosen(name: str, results: Path) -> Choice:
     """What validation has chosen in a model's protocol."""
     protocol = load_protocol(protocol_names()[name])
-    dataset = run_protocol(protocol, results)
+    dataset = run_study(protocol_names()[name], results=results)
     row = dataset.isel(label=int(dataset["winner"].values.argmax()))
     training = next(c.training for c in protocol.entries if c.label == row["label"].item())
     method, settings = str(row["method"].item()), json.loads(str(row["settings"].item()))

@@ -17,11 +17,11 @@ from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.grid import Grid, expand
 from vehiclemor.study.plans.loading import content_hash, studies_and_files
 from vehiclemor.study.plans.protocol import Protocol, load_protocol
-from vehiclemor.study.plans.protocol_run import run_protocol, validation_keys
+from vehiclemor.study.plans.protocol_run import run_protocol, validation_runs
 from vehiclemor.study.plans.results import combined, stored_study
 from vehiclemor.study.plans.study_file import MOST_SEED, GridFile
 from vehiclemor.study.store import read_run, result_path
-from vehiclemor.study.workers import Engine, Workers, cluster
+from vehiclemor.study.workers import Workers, cluster
 
 LATER = "then the chosen ones are tested"
 # What differs from run to run of one reason.
@@ -43,10 +43,9 @@ def run_studies(
     results: dict[str, xr.Dataset] = {}
     with cluster(scheduler) if scheduler else nullcontext() as elsewhere:
         for name, plan in plans.items():
-            if isinstance(plan, Grid):
-                results[name] = run_grid(plan, folder, jobs, elsewhere)
-            else:
-                results[name] = run_protocol(plan, folder, jobs, elsewhere)
+            workers = Workers(name, folder, jobs, elsewhere)
+            of_grid = isinstance(plan, Grid)
+            results[name] = run_grid(plan, workers) if of_grid else run_protocol(plan, workers)
     return results
 
 
@@ -67,18 +66,15 @@ def _plans(study: str, seed: int | None) -> dict[str, Grid | Protocol]:
     return plans
 
 
-def run_grid(
-    grid: Grid, folder: Path, jobs: int = 1, elsewhere: Engine | None = None
-) -> xr.Dataset:
+def run_grid(grid: Grid, workers: Workers) -> xr.Dataset:
     """Run a grid; what an earlier run has finished is not computed again."""
-    workers = Workers(grid.name, folder, jobs, elsewhere)
 
     def run_and_combine() -> xr.Dataset:
         workers([[experiment] for experiment in grid.experiments.values()])
-        return combined(grid, folder)
+        return combined(grid, workers.folder)
 
     keys = grid.keys.ravel().astype(str).tolist()
-    dataset = stored_study(folder, grid.name, grid.definition, keys, run_and_combine)
+    dataset = stored_study(workers, grid.definition, keys, run_and_combine)
     tell(grid.name, len(grid.experiments), len(grid.experiments))
     return dataset
 
@@ -127,7 +123,8 @@ def _status(name: str, plan: Grid | Protocol, folder: Path) -> StudyStatus:
     if isinstance(plan, Grid):
         keys, later = plan.experiments.keys(), ""
     else:
-        keys, later = validation_keys(plan), LATER
+        groups = validation_runs(plan)
+        keys, later = {run.key for group in groups for run in group}, LATER
     status = StudyStatus(len(keys), result=result, later=later)
     examples: dict[tuple[str, str], tuple[str, str]] = {}
     for key in keys:

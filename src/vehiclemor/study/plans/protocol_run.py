@@ -1,14 +1,10 @@
-"""Running a protocol: fit, validate, choose, test.
-
-The stages are functions of what they may see: `validate` gets no scenario of the test set.
-"""
+"""Running a protocol: fit, validate, choose, test."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -26,33 +22,21 @@ from vehiclemor.study.plans.choice import (
     reasons,
     validation_of,
 )
-from vehiclemor.study.plans.protocol import (
-    CONTENDER,
-    FULL_ORDER,
-    Entry,
-    Protocol,
-    Scenarios,
-    sampled_sets,
-)
+from vehiclemor.study.plans.protocol import CONTENDER, FULL_ORDER, Protocol, Scenarios, sampled_sets
 from vehiclemor.study.plans.results import judged_set, protocol_dataset, stored_study
 from vehiclemor.study.store import combined_path
-from vehiclemor.study.workers import Engine, Workers
+from vehiclemor.study.workers import Workers
 
 
-def run_protocol(
-    protocol: Protocol, folder: Path, jobs: int = 1, elsewhere: Engine | None = None
-) -> xr.Dataset:
+def run_protocol(protocol: Protocol, workers: Workers) -> xr.Dataset:
     """Run a protocol; what an earlier run has finished is not computed again."""
-    workers = Workers(protocol.study, folder, jobs, elsewhere)
     sets = {key: protocol.sets[key] for key in ("test", "outside") if protocol.sets[key]}
     sets |= sampled_sets(protocol)
-    path, model = combined_path(folder, protocol.study), protocol.model
-    validation = protocol.sets["validation"]
-    rows = validate(protocol, protocol.entries, validation, workers)
-    rows = with_winner(protocol, rows, path)
+    path = combined_path(workers.folder, protocol.study)
+    rows = with_winner(protocol, validate(protocol, workers), path)
     experiments: list[list[Experiment]] = []
     for row in rows:
-        test = partial(row.entry.experiment, model, row.candidate)
+        test = partial(row.entry.experiment, protocol.model, row.candidate)
         experiments.append([test(scenarios) for scenarios in sets.values()])
     workers(experiments)
     results: dict[str, list[xr.Dataset]] = {}
@@ -72,14 +56,9 @@ def run_protocol(
     ends = np.array([row["status"].values[sample] for row in results[judged]])
     tests = tuple(sets[judged][run] for run in sample)
     timed = _timed(protocol, rows, tests, np.isin(ends, FINISHED), path)
-    return stored_study(
-        folder,
-        protocol.study,
-        protocol.definition,
-        sorted(workers.asked),
-        lambda: protocol_dataset(protocol, rows, sets, results, timed, apart),
-        times=str(timed["seconds"].values.tolist()),
-    )
+    combine = partial(protocol_dataset, protocol, rows, sets, results, timed, apart)
+    times = str(timed["seconds"].values.tolist())
+    return stored_study(workers, protocol.definition, sorted(workers.asked), combine, times)
 
 
 def second_runs(protocol: Protocol, scenarios: Scenarios) -> Experiment:
@@ -92,26 +71,23 @@ def second_runs(protocol: Protocol, scenarios: Scenarios) -> Experiment:
     return make_experiment(model, "full_order", settings, training, scenarios, "errors")
 
 
-def validation_keys(protocol: Protocol) -> set[str]:
-    """Keys of the runs that the choice of candidates needs, which come first."""
-    validation = protocol.sets["validation"]
-    groups = (entry.experiments(protocol.model, validation) for entry in protocol.entries)
-    return {experiment.key for experiment in chain.from_iterable(groups)}
+def validation_runs(protocol: Protocol) -> list[list[Experiment]]:
+    """Candidates of every entry on the validation set; the choice needs them before any test."""
+    model, scenarios = protocol.model, protocol.sets["validation"]
+    return [entry.experiments(model, scenarios) for entry in protocol.entries]
 
 
-def validate(
-    protocol: Protocol, entries: Sequence[Entry], validation: Scenarios, workers: Workers
-) -> list[Row]:
+def validate(protocol: Protocol, workers: Workers) -> list[Row]:
     """Fit every candidate on its training, simulate the validation set, choose.
 
     Of a full-order method every candidate becomes a row.
     """
     model, bounds = protocol.model, protocol.definition.bounds
-    experiments = [entry.experiments(model, validation) for entry in entries]
+    experiments = validation_runs(protocol)
     # Most candidates of an entry share a fit.
     workers(experiments)
     rows: list[Row] = []
-    for entry, candidates in zip(entries, experiments, strict=True):
+    for entry, candidates in zip(protocol.entries, experiments, strict=True):
         datasets = map(workers.result, candidates)
         results = tuple(validation_of(data, bounds, model.evaluations) for data in datasets)
         every = entry.role == FULL_ORDER

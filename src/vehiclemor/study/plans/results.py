@@ -24,14 +24,14 @@ from vehiclemor.study.plans.study_file import StudyFile
 from vehiclemor.study.plans.study_runs import PARAMETER
 from vehiclemor.study.result import meaning_of, variables
 from vehiclemor.study.store import MEND, combined_path, read_run, run_path, stored
+from vehiclemor.study.workers import Workers
 
 # Dimensions of a run's errors; each has the units of its labels beside it.
 QUANTITIES = ("output", "coordinate", "speed")
 
 
 def stored_study(
-    folder: Path,
-    name: str,
+    workers: Workers,
     definition: StudyFile,
     keys: Sequence[str],
     make: Callable[[], xr.Dataset],
@@ -40,8 +40,8 @@ def stored_study(
     """Combined dataset of a study: what is stored of the same runs, else what `make` gives."""
     parts = [layout_digest(), definition.model_dump_json(), times, *keys]
     digest = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:20]
-    sources = (run_path(folder, key) for key in dict.fromkeys(keys))
-    path, content = combined_path(folder, name), content_hash(definition)
+    sources = (run_path(workers.folder, key) for key in dict.fromkeys(keys))
+    path, content = combined_path(workers.folder, workers.name), content_hash(definition)
     return stored(path, "cells", digest, make, sources, content)
 
 
