@@ -70,9 +70,10 @@ def make_experiment(
     test: tuple[Scenario, ...],
     keep: Keep = "trajectories",
 ) -> Experiment:
-    """An experiment with present kernels, parameters and source; settings are complete ones."""
-    if keep != "errors" and len(test) != 1:
-        raise ValueError(f"{keep} are stored of one test scenario, not of {len(test)}")
+    """An experiment with present kernels, parameters and source; settings are complete ones.
+
+    Unless `errors` are kept there is one test scenario.
+    """
     online = model.definition.online
     models: set[Overrides] = set()
     for scenario in test:

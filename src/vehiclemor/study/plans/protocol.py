@@ -105,13 +105,10 @@ class Protocol:
 
 def protocol_names() -> dict[str, str]:
     """Model -> name of the study with bounds that the package has of it."""
-    models = {name.removeprefix(PREFIX): name for name in fixed_protocols()}
+    protocols = [name for name in data_names("studies") if name.startswith(PREFIX)]
+    models = {name.removeprefix(PREFIX): name for name in protocols}
+    # Names of further test sets end in -2, and the like.
     return {model: name for model, name in models.items() if model.isidentifier()}
-
-
-def fixed_protocols() -> list[str]:
-    """Names of all studies with bounds of the package: those of further test sets end in `-2`."""
-    return [name for name in data_names("studies") if name.startswith(PREFIX)]
 
 
 def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protocol:
