@@ -73,7 +73,7 @@ def run_grid(grid: Grid, workers: Workers) -> xr.Dataset:
         workers([[experiment] for experiment in grid.experiments.values()])
         return combined(grid, workers.folder)
 
-    keys = grid.keys.ravel().astype(str).tolist()
+    keys = grid.keys.ravel().tolist()
     dataset = stored_study(workers, grid.definition, keys, run_and_combine)
     tell(grid.name, len(grid.experiments), len(grid.experiments))
     return dataset

@@ -30,8 +30,6 @@ from vehiclemor.study.scenario import Overrides, Scenario, Values, check, overri
 
 # Histories of a study that are held at once.
 MOST_BYTES = 4e9
-# A key is 20 characters of ASCII.
-KEY = "S20"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +60,14 @@ def expand(name: str, study: GridFile, folder: Path = Path()) -> Grid:
             dimensions = {"maneuver": [*driven]} | dimensions
         if study.keep == "trajectories":
             _check_histories(model, driven, dimensions)
-        keys = np.empty([len(entry) for entry in dimensions.values()], KEY)
+        keys = np.empty([len(entry) for entry in dimensions.values()], object)
         experiments: dict[str, Experiment] = {}
         axes = {name: points for name, points in dimensions.items() if name != "label"}
         for number, entry in enumerate(study.methods):
-            every = itertools.product(*axes.values())
-            points = (dict(zip(axes, point, strict=True)) for point in every)
-            of_method = list(_of_method(model, study, entry, points, driven))
+            of_method = list(_of_method(model, study, entry, axes, driven))
             # Settings that a method does not have give no further experiments of it.
             experiments |= {experiment.key: experiment for experiment in of_method}
-            keys_of_method = np.array([experiment.key for experiment in of_method], KEY)
+            keys_of_method = np.array([experiment.key for experiment in of_method], object)
             keys[..., number] = keys_of_method.reshape(keys.shape[:-1])
     except PlugInError:
         raise
@@ -134,10 +130,10 @@ def _of_method(
     model: Model,
     study: GridFile,
     entry: MethodEntry,
-    points: Iterator[dict[str, Any]],
+    axes: Mapping[str, list[Any]],
     driven: Mapping[str, Scenario],
 ) -> Iterator[Experiment]:
-    """Experiments of a method at some points; `InputError` if its settings fit at none of them.
+    """Experiments of a method at all points; `InputError` if its settings fit at none of them.
 
     Corners of a grid may not fit, such as a rank above the number of snapshots.
     """
@@ -145,7 +141,8 @@ def _of_method(
     first_refusal, fits = "", False
     only = next(iter(driven))
     factors = tuple((one, other) for one, other in study.training_set)
-    for point in points:
+    for coordinates in itertools.product(*axes.values()):
+        point = dict(zip(axes, coordinates, strict=True))
         given = entry.settings | {d: point[d] for d in study.grid if d in names}
         settings = _complete(model, entry.method, tuple(given.items()), entry.preset)
         parameters = {

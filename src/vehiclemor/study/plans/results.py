@@ -48,19 +48,18 @@ def stored_study(
 def combined(grid: Grid, folder: Path) -> xr.Dataset:
     """All runs of a grid put together; `FileError` if one is missing, corrupt or foreign."""
     names, keys = tuple(grid.dimensions), grid.keys
-    different, numbers = np.unique(keys, return_inverse=True)
-    # One run may stand at several points: points sorted by the number of their run.
-    order = np.argsort(numbers, axis=None, kind="stable")
-    ends = np.cumsum(np.bincount(numbers.ravel(), minlength=len(different)))
-    run_keys = different.astype(str).tolist()
-    first = read_run(folder, run_keys[0])
+    # One run may stand at several points.
+    points_of: dict[str, list[int]] = {}
+    for point, key in enumerate(keys.ravel().tolist()):
+        points_of.setdefault(key, []).append(point)
+    first = read_run(folder, next(iter(points_of)))
     template = first.dataset()
     arrays: dict[str, np.ndarray] = {}
     for name, variable in template.data_vars.items():
         # Texts of any length.
         dtype = object if variable.dtype.kind in "OU" else variable.dtype
         arrays[str(name)] = np.empty(keys.shape + variable.shape, dtype)
-    for key, points in zip(run_keys, np.split(order, ends[:-1]), strict=True):
+    for key, points in points_of.items():
         indices = np.unravel_index(points, keys.shape)
         run = read_run(folder, key)
         if run.layout != first.layout:
@@ -71,7 +70,7 @@ def combined(grid: Grid, folder: Path) -> xr.Dataset:
         name: (names + template[name].dims, array, template[name].attrs)
         for name, array in arrays.items()
     }
-    columns |= variables({"cell_key": keys.astype(str).astype(object)}, *names)
+    columns |= variables({"cell_key": keys}, *names)
     coordinates = {str(name): variable for name, variable in template.coords.items()}
     dataset = xr.Dataset(columns, _coordinates(grid) | coordinates)
     training = grid.definition.training
