@@ -86,7 +86,12 @@ def simulate(
     chosen = key_values("--set", settings)
     for key in inspect.signature(vm.simulate).parameters.keys() & chosen.keys():
         raise InputError(f"--set {key}: not a setting of a method, but an argument of simulate")
-    picture = _picture(plot, f"{model}-{method}.png")
+    picture = None
+    if plot is not None:
+        if len(plot) > 1:
+            raise InputError(f"--plot: one file, not {len(plot)}")
+        # The option may stand without a file.
+        picture = picture_file("--plot", plot[0] if plot else Path(f"{model}-{method}.png"))
     if out is not None:
         result_file("--out", out)
     ready = vm.model(model, key_values("--parameter", parameter))
@@ -130,15 +135,6 @@ def _maneuver(name: str | None, csv: list[str] | None) -> str | vm.Signal | None
     if options:
         raise InputError("--csv is for a log: --maneuver FILE.csv")
     return name
-
-
-def _picture(plot: list[Path] | None, usual: str) -> Path | None:
-    """File of `--plot`, which may stand without one."""
-    if plot is None:
-        return None
-    if len(plot) > 1:
-        raise InputError(f"--plot: one file, not {len(plot)}")
-    return picture_file("--plot", plot[0] if plot else Path(usual))
 
 
 def metrics(
