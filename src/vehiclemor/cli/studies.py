@@ -50,6 +50,7 @@ def run(
     from vehiclemor.report.results import counted_ends
     from vehiclemor.report.unseen import count_rows
     from vehiclemor.study.run import run_studies
+    from vehiclemor.study.store import combined_path
 
     began, errors = time.perf_counter(), 0
     with shown_progress() as runs:
@@ -57,7 +58,7 @@ def run(
     for name, dataset in datasets.items():
         sizes = f"{dataset['status'].size} grid points, {runs[name]} runs"
         counts = counted_ends(dataset)
-        print(wrapped(f"{name}: {sizes}: {counts}; {dataset.encoding['source']}", 0, 2))
+        print(wrapped(f"{name}: {sizes}: {counts}; {combined_path(results, name)}", 0, 2))
         ends = zip(dataset["status"].values.flat, dataset["message"].values.flat, strict=True)
         _print_reasons(Counter(end for end in ends if end[0] in ("rejected", "error")))
         errors += int((dataset["status"] == "error").sum())

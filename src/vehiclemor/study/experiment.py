@@ -15,7 +15,7 @@ from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.scenario import Overrides, Scenario, Values, parameters_of, scenario_text
+from vehiclemor.study.scenario import Overrides, Scenario, parameters_of
 
 Settings = dict[str, Value]
 Keep = Literal["trajectories", "metrics", "errors"]
@@ -44,22 +44,15 @@ class Experiment(ShortRepr):
     @property
     def configuration(self) -> str:
         """Canonical JSON text of the experiment."""
-        names = sorted(self.__dataclass_fields__)
-        pairs = [f'"{name}": {_text(getattr(self, name))}' for name in names]
-        return "{" + ", ".join(pairs) + "}"
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        for name in ("training", "test"):
+            fields[name] = [scenario.content for scenario in fields[name]]
+        return json.dumps(fields, sort_keys=True)
 
     @cached_property
     def key(self) -> str:
         """Hash of the configuration: the name of the result's file."""
         return hashlib.sha256(self.configuration.encode()).hexdigest()[:20]
-
-
-def _text(value: object) -> str:
-    if isinstance(value, Values):
-        return value.text
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(scenario_text, value))}]"
-    return json.dumps(value) if isinstance(value, str) else json.dumps(value, sort_keys=True)
 
 
 def make_experiment(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -84,7 +85,7 @@ def digest_of(protocol: Protocol) -> str:
     runs = sampled_sets(protocol).get("drawn") or protocol.sets["test"]
     model = of_run.driven_by_all(protocol.model, runs)
     texts = [protocol.definition.model_dump_json(include={"model", "bounds"})]
-    texts.append(of_run.parameters_of(model).text)
+    texts.append(json.dumps(of_run.parameters_of(model), sort_keys=True))
     texts += [repr(model.kernels.sources[name]) for name in EQUATIONS if name in model.kernels]
     if isinstance(model, StructuralModel):
         structure = model.system.structure

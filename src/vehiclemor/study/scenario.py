@@ -60,7 +60,7 @@ class Scenario:
             parts.append(" ".join([name, *(f"{number:g}" for number in numbers)]))
         return ", ".join(parts)
 
-    @property
+    @cached_property
     def content(self) -> dict[str, Any]:
         """Everything that determines the run of a given model, for a hash."""
         changed = {} if self.parameters == () else {"parameters": self.parameters}
@@ -121,13 +121,6 @@ def _received(sent: Excitation | tuple[str, float, float]) -> Excitation:
     return component("maneuver", name).perturbed(*factors)
 
 
-# Of as many as are looked at by turns; settings vary over each of them.
-@lru_cache(maxsize=4096)
-def scenario_text(scenario: Scenario) -> str:
-    """Canonical JSON text of a scenario's content."""
-    return json.dumps(scenario.content, sort_keys=True)
-
-
 @lru_cache(maxsize=1024)
 def input_hash(maneuver: Excitation) -> str:
     """Hash of the output times and the inputs at these times; of a signal all there is of it."""
@@ -141,19 +134,9 @@ def input_hash(maneuver: Excitation) -> str:
     return hashlib.sha256(times.tobytes() + inputs.tobytes()).hexdigest()[:16]
 
 
-class Values(dict[str, Any]):
-    """Values by name that many experiments share: their canonical JSON text is written once."""
-
-    @cached_property
-    def text(self) -> str:
-        """Canonical JSON text."""
-        return json.dumps(self, sort_keys=True)
-
-
-@lru_cache(maxsize=16)
-def parameters_of(model: Model) -> Values:
-    """Name -> value of a model's parameters, SI units."""
-    return Values((name, entry.value) for name, entry in model.parameters.entries.items())
+def parameters_of(model: Model) -> dict[str, Any]:
+    """Name -> value of a model's parameters, SI units, as JSON has them."""
+    return {name: entry.value for name, entry in model.parameters.entries.items()}
 
 
 def model_of_run(model: Model, scenario: Scenario) -> Model:

@@ -262,7 +262,6 @@ def stored(
         # What a bug has ended is tried again.
         ended = "status" not in dataset or "error" not in dataset["status"].values
         if ended and not held.get("missing"):
-            dataset.encoding["source"] = str(path)
             return dataset
     make_folder(path.parent)
     if there and held.get("source") != "vehiclemor":
@@ -273,5 +272,4 @@ def stored(
         if held.get("content", content) != content:
             _LOG.info("%s: replaces the results of another %s.toml", path, path.stem)
     write_dataset(dataset, path)
-    dataset.encoding["source"] = str(path)
     return dataset

@@ -78,9 +78,9 @@ class Workers:
 
         `MachineError` if the machine has failed again and again; what was finished is stored.
         """
-        wanted = {e.key: e for group in groups for e in group}
-        self.asked |= wanted.keys()
-        self.finished |= store.finished_runs(self.folder, wanted.keys() - self.finished)
+        wanted = {experiment.key for group in groups for experiment in group}
+        self.asked |= wanted
+        self.finished |= store.finished_runs(self.folder, wanted - self.finished)
         if self._missing(groups):
             # A folder that can't be is named before anything is announced.
             store.prepare_folder(self.folder)
@@ -108,14 +108,13 @@ class Workers:
         seen = set(self.finished)
         missing: list[list[Experiment]] = []
         for group in groups:
-            part: list[Experiment] = []
-            for experiment in group:
-                # Two candidates may be the same experiment: it stays with the first.
-                if experiment.key not in seen:
-                    seen.add(experiment.key)
-                    part.append(experiment)
+            # Two candidates may be the same experiment: it stays with the first.
+            part = {
+                experiment.key: experiment for experiment in group if experiment.key not in seen
+            }
+            seen |= part.keys()
             if part:
-                missing.append(part)
+                missing.append([*part.values()])
         return missing
 
     def _evaluated(self, work: Groups, again: bool) -> Iterator[str]:

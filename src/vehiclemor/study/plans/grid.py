@@ -26,7 +26,7 @@ from vehiclemor.study.plans.logs import windows
 from vehiclemor.study.plans.study_file import GridFile, MethodEntry
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER, TEXTS, values
 from vehiclemor.study.plans.training import training_set
-from vehiclemor.study.scenario import Overrides, Scenario, Values, check, overrides, with_parameters
+from vehiclemor.study.scenario import Overrides, Scenario, check, overrides, with_parameters
 
 # Histories of a study that are held at once.
 MOST_BYTES = 4e9
@@ -170,8 +170,10 @@ def _of_method(
 
 
 @lru_cache(maxsize=4096)
-def _complete(model: Model, method: str, given: tuple[tuple[str, Any], ...], preset: str) -> Values:
-    return Values(complete_settings(model, method, dict(given), preset))
+def _complete(
+    model: Model, method: str, given: tuple[tuple[str, Any], ...], preset: str
+) -> dict[str, Any]:
+    return complete_settings(model, method, dict(given), preset)
 
 
 @lru_cache(maxsize=4096)
