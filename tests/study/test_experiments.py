@@ -141,6 +141,12 @@ def test_of_a_run_that_has_failed_nothing_counts_in_a_protocol(model):
     assert one["iterations"].item() > 0
 
 
+def test_a_bug_in_a_braked_run_is_a_result(vehicle, monkeypatch):
+    braked = make_cell(vehicle, component("maneuver", "braking_in_turn"), "fixed_basis", {})
+    monkeypatch.setattr(evaluation, "in_training", None)
+    assert evaluate(braked)["status"].item() == "error"
+
+
 # Runs of other cars
 
 
@@ -158,8 +164,7 @@ SCENARIOS = (Scenario(component("maneuver", "lane_change"), "equilibrium"),)
 
 
 def experiment(model, method, **settings):
-    complete = complete_settings(model, method, settings)
-    return make_experiment(model, method, complete, SCENARIOS, SCENARIOS, "errors")
+    return of_runs(model, method, SCENARIOS, SCENARIOS, **settings)
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import numpy as np
 
 import vehiclemor as vm
 from tests.models import CAR
+from tests.refusing import refused
 from tests.study.small import small_study
 from vehiclemor.study.plans.grid import expand
 from vehiclemor.study.plans.loading import load_studies, read_study, write_study
@@ -49,6 +50,9 @@ def test_rows_of_different_models_keep_their_units_and_counts(tmp_path):
         assert (np.isfinite(rows[counted].values) == there).all()
     speeds = np.isfinite(rows["rms_speed_error"].transpose("cell", ...).values)
     assert (speeds == of_car[:, None]).all()
+    found = run_studies(str(car), tmp_path)["small"]
+    other = found.assign_coords(output_unit=("output", ["ft"] * found.sizes["output"]))
+    assert "several units" in refused(lambda: flattened({"one": found, "other": other}))
 
 
 def test_a_study_that_is_written_is_the_same_again(tmp_path, protocol_text):

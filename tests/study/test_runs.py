@@ -305,11 +305,8 @@ def test_a_full_disk_is_called_so_whatever_the_library_says(run, monkeypatch, tm
     def full(*_):
         raise OSError(errno.ENOSPC, reason)
 
-    def dataset(error):
-        def broken(*_):
-            raise error
-
-        return broken
+    def denied(*_):
+        raise PermissionError(errno.EACCES, "Permission denied")
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_bytes", full)
@@ -318,8 +315,7 @@ def test_a_full_disk_is_called_so_whatever_the_library_says(run, monkeypatch, tm
         assert not stored(tmp_path / "out")
     with monkeypatch.context() as patch:
         # The combined dataset: plain writing tells what netCDF hides.
-        denied = PermissionError(errno.EACCES, "Permission denied")
-        patch.setattr(netCDF4, "Dataset", dataset(denied))
+        patch.setattr(netCDF4, "Dataset", denied)
         fill = {".nc": full, store.ENDING: Path.write_bytes}
         patch.setattr(Path, "write_bytes", lambda path, what: fill[path.suffix](path, what))
         with pytest.raises(MachineError, match=rf"small\.nc: .*{reason}"):

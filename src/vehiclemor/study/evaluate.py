@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vehiclemor.error_measures import rms
-from vehiclemor.exceptions import ConvergenceError, InputError, PlugInError, blamed
+from vehiclemor.exceptions import ConvergenceError, PlugInError, blamed
 from vehiclemor.failure import Failure, attempt
 from vehiclemor.progress import first_use
 from vehiclemor.reduction.error_estimate import judged as judged_by_error
@@ -86,20 +86,18 @@ def evaluate(
     """
     solve = cached_reference if model is None else recent_reference
     with first_use(f"{experiment.model} with {experiment.method}"), one_thread():
-        full = model or model_of(experiment)
+        scenarios = (*experiment.training, *experiment.test)
+        full = driven_by_all(model or model_of(experiment), scenarios)
         result = attempt(partial(_evaluated, experiment, full, solve if errors else None))
         if isinstance(result, Failure):
-            # A bug has ended it.
+            # It is refused, or a bug has ended it.
             result = result_dataset(full, experiment, [result] * len(experiment.test), result)
     return result
 
 
 def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> xr.Dataset:
+    check_method(model, experiment)
     test = experiment.test
-    model = driven_by_all(model, (*experiment.training, *test))
-    tested = model_of_run(model, test[0])
-    if refused := refusal(model, experiment):
-        return result_dataset(tested, experiment, [refused] * len(test), refused)
     fit, outcomes = _shared(_wanted(model, experiment)), []
     for at in range(0, len(test), MOST_IN_STEP):
         some = test[at : at + MOST_IN_STEP]
@@ -113,6 +111,7 @@ def _evaluated(experiment: Experiment, model: Model, solve: Callable | None) -> 
         and not isinstance(outcomes[0], Failure)
         and in_training(model, experiment.training, test[0])
     )
+    tested = model_of_run(model, test[0])
     return result_dataset(tested, experiment, outcomes, fit.reduced, seen)
 
 
@@ -140,18 +139,11 @@ def _built(name: str, parameters: str) -> Model:
     return build(name, overrides=json.loads(parameters))
 
 
-def refusal(model: Model, experiment: Experiment) -> Failure | None:
-    """Why the method can't reduce the model with these settings, if it can't."""
-
-    def check() -> None:
-        method: Method = component("method", experiment.method)
-        accepted, reason = method.accepts(model)
-        if not accepted:
-            raise InputError(reason)
-        settings = for_method(model, experiment.method, experiment.settings)
-        checked_settings(method, model, settings)
-
-    return attempt(check)
+def check_method(model: Model, experiment: Experiment) -> None:
+    """Raise `InputError` if the method can't reduce the model with these settings."""
+    method: Method = component("method", experiment.method)
+    method.require(model)
+    checked_settings(method, model, for_method(model, experiment.method, experiment.settings))
 
 
 def reference_run(model: Model, scenario: Scenario) -> Trajectory:

@@ -5,17 +5,18 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vehiclemor.exceptions import FileError, GeometryError, InputError, PlugInError, VehiclemorError
+from vehiclemor.failure import attempt
 from vehiclemor.registry import component, unknown
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
-from vehiclemor.study.evaluate import refusal
+from vehiclemor.study.evaluate import check_method
 from vehiclemor.study.experiment import (
     Experiment,
     complete_settings,
@@ -159,7 +160,7 @@ def _of_method(
         learned = _training(model, learner, training, test, of_entry)
         experiment = make_experiment(model, entry.method, settings, learned, (test,), study.keep)
         if not fits:
-            failure = refusal(model, experiment)
+            failure = attempt(partial(check_method, model, experiment))
             # Of a method that refuses the model nothing is set; a bug is a result.
             fits = failure is None or failure.status != "rejected" or not settings
             if failure and not first_refusal:
