@@ -2,7 +2,7 @@
 
 import inspect
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -130,8 +130,7 @@ def _maneuver(name: str | None, csv: list[str] | None) -> str | vm.Signal | None
     if name and Path(name).suffix.lower() == ".csv":
         words = inspect.signature(vm.Signal.from_csv).parameters.keys() - {"path"}
         columns = {key: str(options.pop(key)) for key in options.keys() - words}
-        how: dict[str, Any] = {"inputs": columns, **options}
-        return vm.Signal.from_csv(name, **how)
+        return vm.Signal.from_csv(name, inputs=columns, **options)
     if options:
         raise InputError("--csv is for a log: --maneuver FILE.csv")
     return name

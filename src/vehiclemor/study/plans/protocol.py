@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -33,7 +32,6 @@ PREFIX = "predictive-"
 TRIES = 100
 
 Scenarios = tuple[Scenario, ...]
-Part = TypeVar("Part", Group | Log, Box)
 
 
 @dataclass(frozen=True)
@@ -71,20 +69,18 @@ class Entry:
 
 @dataclass(frozen=True)
 class Protocol:
-    """A study with bounds, with all names resolved; `seed` may be another one, for an audit."""
+    """A study with bounds, with all names resolved; `seed` may be another one, for an audit.
 
-    name: str
+    `study` is the name of its results; an audit's are apart.
+    """
+
+    study: str
     path: Path
     definition: ProtocolFile
     model: Model
     sets: dict[str, Scenarios]
     entries: tuple[Entry, ...]
     seed: int
-
-    @property
-    def study(self) -> str:
-        """Name of its results; an audit's are apart."""
-        return self.name + f"-seed-{self.seed}" * (self.seed != self.definition.seed)
 
     @property
     def test_set(self) -> str:
@@ -120,16 +116,19 @@ def load_protocol(study: str, seed: int | None = None, name: str = "") -> Protoc
     definition = read_study(path)
     if not isinstance(definition, ProtocolFile):
         raise FileError(f"{path}: has no bounds")
+    name = name or path.stem
     seed = definition.seed if seed is None else seed
+    if seed != definition.seed:
+        name += f"-seed-{seed}"
     try:
-        return _resolved(name or path.stem, path, definition, seed)
+        return _resolved(name, path, definition, seed)
     except PlugInError:
         raise
     except (GeometryError, InputError) as error:
         raise FileError(f"{path}: {error}") from None
 
 
-def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Protocol:
+def _resolved(study: str, path: Path, definition: ProtocolFile, seed: int) -> Protocol:
     model = build(definition.model, overrides=definition.parameters)
     straight = definition.straight
     outputs = [*definition.bounds, *definition.reported, *definition.sensitive]
@@ -137,10 +136,10 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
         choice(f"output of {model.name}", output, model.outputs)
     sets: dict[str, Scenarios] = {}
     for key in SETS:
-        groups = enumerate(getattr(definition, key), start=1)
-        make = partial(_of_group, folder=path.parent)
-        parts = [_checked(model, f"{key}, group {n}", make, group) for n, group in groups]
-        sets[key] = tuple(itertools.chain(*parts))
+        sets[key] = ()
+        for number, group in enumerate(getattr(definition, key), start=1):
+            make = partial(_of_group, model, group, path.parent)
+            sets[key] += _checked(model, f"{key}, group {number}", make)
     if definition.drawn_training:
         # An audit with another seed tests what has learnt the same.
         seeds = definition.seed, definition.version, len(DRAWN)
@@ -163,7 +162,7 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
         draws |= {"drawn_training": definition.drawn_training}
     for key, draw in draws.items():
         for number, box in enumerate(draw.boxes, start=1):
-            _checked(model, f"{key}, box {number}", _corners, box)
+            _checked(model, f"{key}, box {number}", partial(_corners, model, box))
     entries = tuple(_entry(model, entry, sets["training"]) for entry in definition.methods)
     labels = [label for entry in entries for label in entry.row_labels]
     for label in labels:
@@ -182,19 +181,17 @@ def _resolved(name: str, path: Path, definition: ProtocolFile, seed: int) -> Pro
                 f"rows is needed and must name its method, of {', '.join(base.labelled)}"
             )
         choice("row that a target is against", target.against, known)
-    return Protocol(name, path, definition, model, sets, entries, seed)
+    return Protocol(study, path, definition, model, sets, entries, seed)
 
 
 def _measured(scenario: Scenario) -> bool:
     return isinstance(scenario.maneuver, Signal)
 
 
-def _checked(
-    model: Model, where: str, make: Callable[[Model, Part], list[Scenario]], part: Part
-) -> list[Scenario]:
+def _checked(model: Model, where: str, make: Callable[[], list[Scenario]]) -> Scenarios:
     """Scenarios of a part of a file, in which the model can be run."""
     try:
-        scenarios = make(model, part)
+        scenarios = tuple(make())
         for scenario in scenarios:
             check(model, scenario)
     except InputError as error:
