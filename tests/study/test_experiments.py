@@ -19,18 +19,15 @@ from vehiclemor.simulation.build import build
 from vehiclemor.study import evaluate as evaluation
 from vehiclemor.study.evaluate import cached_fit, evaluate, fresh_fit
 from vehiclemor.study.experiment import complete_settings, make_experiment
-from vehiclemor.study.plans.training import training_set
 from vehiclemor.study.scenario import Scenario
 
 MOVED = (("tie_rod_inner.z", -0.09),)
 
 
-def make_cell(model, maneuver, method, given, training="matched", **factors):
-    """An experiment on one run from the equilibrium."""
-    test = Scenario(maneuver, "equilibrium")
-    settings = complete_settings(model, method, given)
-    trained = training_set(model, method, training, test, **factors)
-    return make_experiment(model, method, settings, trained, (test,))
+def make_cell(model, maneuver, method, given):
+    """An experiment on one run from the equilibrium, trained on the same."""
+    run = (Scenario(maneuver, "equilibrium"),)
+    return make_experiment(model, method, complete_settings(model, method, given), run, run)
 
 
 def of_runs(model, method, training, tests, **settings):

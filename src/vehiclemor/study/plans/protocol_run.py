@@ -120,8 +120,6 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
         seconds = timed["seconds"].mean("scenario").values
         near = np.flatnonzero(seconds <= (1.0 + TIE_OF_TIMES) * seconds.min())
         best = min((fitting[k] for k in near), key=lambda row: row.result.score)
-    elif fitting:
-        best = fitting[0]
     return [replace(row, winner=row is best) for row in rows]
 
 

@@ -169,8 +169,7 @@ def protocol_dataset(
     by_scenario = [part.drop_vars(fixed) for part in parts]
     dataset = xr.concat(by_scenario, dim="scenario", combine_attrs="override")
     dataset = dataset.merge(parts[0][fixed])
-    # How the files store text holds for the longest words in each of them only.
-    dataset = dataset.drop_vars(["seconds", "offline_seconds"]).drop_encoding()
+    dataset = dataset.drop_vars(["seconds", "offline_seconds"])
     per_row: dict[str, object] = {
         "offline_seconds": timed["offline_seconds"].values.tolist(),
         "role": [row.entry.role for row in rows],

@@ -199,7 +199,7 @@ class GridFile(StudyOfModel):
 
     @field_validator("grid")
     @classmethod
-    def _not_empty(cls, value: dict[str, Axis]) -> dict[str, Axis]:
+    def _different_values(cls, value: dict[str, Axis]) -> dict[str, Axis]:
         for name, axis in value.items():
             points = values(axis)
             if len(set(points)) != len(points):
