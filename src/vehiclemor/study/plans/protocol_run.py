@@ -52,10 +52,8 @@ def run_protocol(protocol: Protocol, workers: Workers) -> xr.Dataset:
             f"{protocol.path}: no run can be judged, the first because {apart[judged][0]}"
         )
     # A run whose result in the test set is a failure is not timed.
-    sample = protocol.timed_runs(len(sets[judged]))
-    ends = np.array([row["status"].values[sample] for row in results[judged]])
-    tests = tuple(sets[judged][run] for run in sample)
-    timed = _timed(protocol, rows, tests, np.isin(ends, FINISHED), path)
+    ends = np.array([row["status"].values for row in results[judged]])
+    timed = _timed(protocol, rows, sets[judged], np.isin(ends, FINISHED), path)
     combine = partial(protocol_dataset, protocol, rows, sets, results, timed, apart)
     times = str(timed["seconds"].values.tolist())
     return stored_study(workers, protocol.definition, sorted(workers.asked), combine, times)
@@ -113,10 +111,8 @@ def with_winner(protocol: Protocol, rows: Sequence[Row], path: Path) -> list[Row
     ]
     if len(fitting) > 1:
         validation = protocol.sets["validation"]
-        sample = protocol.timed_runs(len(validation))
-        tests = tuple(validation[run] for run in sample)
-        every = np.ones((len(fitting), len(tests)), dtype=bool)
-        timed = _timed(protocol, fitting, tests, every, path, "validation-")
+        every = np.ones((len(fitting), len(validation)), dtype=bool)
+        timed = _timed(protocol, fitting, validation, every, path, "validation-")
         seconds = timed["seconds"].mean("scenario").values
         near = np.flatnonzero(seconds <= (1.0 + TIE_OF_TIMES) * seconds.min())
         best = min((fitting[k] for k in near), key=lambda row: row.result.score)
@@ -131,12 +127,16 @@ def _timed(
     path: Path,
     name: str = "",
 ) -> xr.Dataset:
-    """Stored timing of the finished runs (rows, scenarios), measured first if one is missing."""
-    experiments = {
-        row.label: row.entry.experiment(protocol.model, row.candidate, scenarios) for row in rows
-    }
-    return timing.stored_timing(
-        path.with_name(f"timing-{name}{path.name}"),
-        [[label, experiment.key] for label, experiment in experiments.items()],
-        lambda: timing.timed_tests(experiments, finished, what=f"{name}runs of {protocol.study}"),
-    )
+    """Stored timing of the finished runs (rows, scenarios), measured first if one is missing.
+
+    Of a large set it is that of the runs that the protocol times.
+    """
+    sample = protocol.timed_runs(len(scenarios))
+    tests = tuple(scenarios[run] for run in sample)
+    experiments: dict[str, Experiment] = {}
+    for row in rows:
+        experiments[row.label] = row.entry.experiment(protocol.model, row.candidate, tests)
+    keys = [[label, experiment.key] for label, experiment in experiments.items()]
+    what = f"{name}runs of {protocol.study}"
+    measure = partial(timing.timed_tests, experiments, finished[:, sample], what)
+    return timing.stored_timing(path.with_name(f"timing-{name}{path.name}"), keys, measure)
