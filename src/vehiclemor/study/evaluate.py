@@ -20,13 +20,13 @@ from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.reduced_model import rom as shipped
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.trust import InputRange, input_range
-from vehiclemor.reduction.validation import checked_run, checked_settings, fitted
+from vehiclemor.reduction.validation import checked_run, checked_settings, fitted, validated
 from vehiclemor.registry import component
 from vehiclemor.simulation.build import build
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Trajectory
-from vehiclemor.study.experiment import Experiment, default_settings, for_method, make_experiment
+from vehiclemor.study.experiment import Experiment, default_settings, make_experiment
 from vehiclemor.study.result import Outcome, result_dataset
 from vehiclemor.study.scenario import (
     Overrides,
@@ -143,7 +143,7 @@ def check_method(model: Model, experiment: Experiment) -> None:
     """Raise `InputError` if the method can't reduce the model with these settings."""
     method: Method = component("method", experiment.method)
     method.require(model)
-    checked_settings(method, model, for_method(model, experiment.method, experiment.settings))
+    checked_settings(method, model, validated(method, model.kind, experiment.settings))
 
 
 def reference_run(model: Model, scenario: Scenario) -> Trajectory:
@@ -213,7 +213,8 @@ def _new_fit(fit: Fit) -> FittedModel | Failure:
     if isinstance(reduced, Failure):
         return reduced
     reduced = replace(reduced, **{name: settings[name] for name in integration})
-    return with_fallback(reduced, fit.model, for_method(fit.model, fit.method, settings))
+    complete = validated(component("method", fit.method), fit.model.kind, settings)
+    return with_fallback(reduced, fit.model, complete)
 
 
 def _fit(fit: Fit) -> FittedModel | Failure:
@@ -222,7 +223,7 @@ def _fit(fit: Fit) -> FittedModel | Failure:
     def fit_model() -> FittedModel:
         model = with_parameters(fit.model, fit.parameters).driven_as(fit.model)
         runs = [training_run(fit.model, scenario) for scenario in fit.training]
-        settings = for_method(fit.model, fit.method, json.loads(fit.settings))
+        settings = validated(method, model.kind, json.loads(fit.settings))
         return fitted(method, model, runs, settings)
 
     with one_thread():

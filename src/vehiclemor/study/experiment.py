@@ -105,11 +105,6 @@ def complete_settings(
     return validated(method, model.kind, given or {}, preset, coordinates).model_dump()
 
 
-def for_method(model: Model, method_name: str, settings: Settings) -> Any:
-    """Complete settings as `check` and `fit` of the method take them."""
-    return validated(component("method", method_name), model.kind, settings)
-
-
 def default_settings(model: Model, method_name: str) -> Settings:
     """Declared names and defaults; none for a kind of model that the method doesn't know."""
     schema = component("method", method_name).settings.get(model.kind)
