@@ -135,7 +135,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         maneuver = checked_maneuver(maneuver, self.model.definition)
         inputs = maneuver.recorded_inputs[1]
         run = self.run(maneuver, self.known(start, inputs[0]))
-        states = self.decode(run.recorded_states, inputs)
+        states = self.decode(run.output.states, inputs)
         trajectory = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)
         run.give_back()
         return trajectory

@@ -140,7 +140,8 @@ class AlgebraicModel(Model):
         target, reached = np.array([direction * self.definition.travel_limit, rack]), np.empty(2)
         iteration = _iteration(NEWTON_TOLERANCE, SHORTEST_SEARCH_STEP)
         loop = kinematic_loop("travel_limit")
-        if loop(self._mechanism, target, iteration, reached, self._buffer()):
+        loop(self._mechanism, target, iteration, reached, self._buffer())
+        if reached[1] != rack:
             raise UnreachableError(
                 f"{self.name}: rack displacement {rack:g} m is out of reach at the design height; "
                 f"it goes to {reached[1]:.4f} m"

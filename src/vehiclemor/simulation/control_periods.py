@@ -48,20 +48,16 @@ class ControlPeriods(ShortRepr):
         return ready(Subspaces(self.means, self.trial_basis, self.test_basis, self.ranks))
 
     def spans(self, breaks: np.ndarray, end: float, begin: float = 0.0) -> Ready:
-        """As `smooth_spans`, with the window edges; cached."""
+        """Spans from `begin` to `end` without a window edge or a break point of the inputs inside.
+
+        Break points are ends of the smooth segments of the inputs, from 0 to the maneuver's end.
+        """
         return _spans(breaks.tobytes(), self.edges.tobytes(), end, begin)
 
 
 @lru_cache(maxsize=256)
-def _spans(breaks: bytes, edges: bytes, end: float, begin: float) -> Ready:
-    return ready(smooth_spans(np.frombuffer(breaks), np.frombuffer(edges), end, begin))
-
-
-def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float = 0.0) -> Spans:
-    """Spans from `begin` to `end` without a window edge or a break point of the inputs inside.
-
-    Break points are ends of the smooth segments of the inputs, from 0 to the end of the maneuver.
-    """
+def _spans(breaks_in_bytes: bytes, edges_in_bytes: bytes, end: float, begin: float) -> Ready:
+    breaks, edges = np.frombuffer(breaks_in_bytes), np.frombuffer(edges_in_bytes)
     cuts = np.sort(np.concatenate([breaks, edges, [begin, end]]))
     cuts = cuts[(cuts >= begin) & (cuts <= end)]
     # Times that differ by rounding are one.
@@ -74,7 +70,7 @@ def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float
         np.minimum(np.searchsorted(known, middles, side="right") - 1, len(known) - 2)
         for known in (breaks, edges)
     )
-    return Spans(cuts, segments, windows)
+    return ready(Spans(cuts, segments, windows))
 
 
 @lru_cache(maxsize=64)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import loop_array, number
-from vehiclemor.codegen.loops import Ready
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.excitation import Excitation
@@ -21,6 +20,7 @@ from vehiclemor.simulation.evaluation import By, chosen
 from vehiclemor.simulation.integrators.catalogue import frozen, integrator
 from vehiclemor.simulation.integrators.step_kernels import partners
 from vehiclemor.simulation.linear_model import LinearModel
+from vehiclemor.simulation.loop_arguments import Output
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.recording import Recorder, Recording
 from vehiclemor.simulation.system import System
@@ -32,7 +32,7 @@ from vehiclemor.simulation.trajectory import (
     Trajectory,
     output_names,
 )
-from vehiclemor.simulation.workspaces import ALL_SAMPLES, Run, Solver
+from vehiclemor.simulation.workspaces import Run, Solver
 
 # What derivatives are of -> function of the equations.
 RESULTS = {"rhs": "derivative", "outputs": "outputs"}
@@ -200,8 +200,8 @@ class DynamicModel(Model):
         if how.times is None and not how.begin:
             inputs = maneuver.recorded_inputs[1]
         else:
-            inputs = maneuver.at(run.times)
-        trajectory = self.recorded(maneuver, run, inputs, run.recorded_states, outputs=outputs)
+            inputs = maneuver.at(run.output.samples)
+        trajectory = self.recorded(maneuver, run, inputs, run.output.states, outputs=outputs)
         run.give_back()
         if LOCKED in trajectory.remark and frozen(how.name):
             remark = f"{trajectory.remark}; {how.name} errs there, its Jacobian is frozen"
@@ -218,8 +218,9 @@ class DynamicModel(Model):
         failure: str = "",
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
-        run = Run(times, states, np.asarray(counts), seconds, failure)
-        return self.recorded(None, run, loop_array(inputs), loop_array(states))
+        states = loop_array(states)
+        run = Run(Output.of(times, states, counts), seconds, failure)
+        return self.recorded(None, run, loop_array(inputs), states)
 
     def recorded(
         self,
@@ -236,20 +237,21 @@ class DynamicModel(Model):
         are computed; else all can be read.
         """
         remark = "" if maneuver is None else cut_short(maneuver)
-        recorder, times, n = self._recorder, run.times, len(self.definition.states)
-        at_points = run.recorded_at(inputs)[1]
-        first = recorder.first_outside(run, at_points, states)
+        recorder, times, n = self.recorder, run.output.samples, len(self.definition.states)
+        rows, samples = run.rows, run.output.point_of_sample
+        whole = states, run.inputs_at_rows(inputs), samples
+        points = whole[0][:rows], whole[1][:rows], samples
+        first = recorder.first_outside(whole, rows, run.cached_loops)
         limited, message, end = len(recorder.limited), run.failure, len(times)
-        points = states[: run.rows], at_points[: run.rows], run.point_of_sample
         left = min(first[:limited], default=end)
         status, reached = "diverged" if message else "ok", end
         if message:
             # From the failure on there are no numbers, which says nothing of limits.
-            reached = int(np.isfinite(Recording(recorder, *points).state_history[:, 0]).sum())
+            reached = int(np.isfinite(Recording(recorder, points).state_history[:, 0]).sum())
             first = [end if sample == reached else sample for sample in first]
         if left < reached:
             name = recorder.limited[first.index(left)]
-            ended = Recording(recorder, *points).columns((name, *self.definition.standstill))[left]
+            ended = Recording(recorder, points).columns((name, *self.definition.standstill))[left]
             if stopped(self.definition, name, ended[1:]):
                 # At rest the slip is so stiff that a solver may fail there.
                 status, message = "stopped", f"the vehicle stops at t = {times[left]:.4g} s"
@@ -262,7 +264,7 @@ class DynamicModel(Model):
         fields = {
             "times": times,
             "inputs": inputs,
-            "counts": dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
+            "counts": dict(zip(DYNAMIC_COUNTS, run.output.counts.tolist(), strict=True)),
             "seconds": run.seconds,
             "status": status,
             "message": message,
@@ -272,11 +274,11 @@ class DynamicModel(Model):
             "maneuver": "" if maneuver is None else maneuver.name,
         }
         if outputs not in (None, self.outputs) and not message:
-            histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]
-            fields |= {"names": outputs, **dict.fromkeys(STATE_KINDS, nothing)}
+            histories = recorder.histories(outputs, whole, rows, run.cached_loops)
+            fields |= {"names": outputs, **dict.fromkeys(STATE_KINDS, inputs[:, :0])}
             return Trajectory.of(**fields, outputs=histories)
-        points = points[0][:, :n], *points[1:]
-        recording = Recording(recorder, *(array.copy() for array in points))
+        copies = points[0][:, :n].copy(), points[1].copy(), samples.copy()
+        recording = Recording(recorder, copies)
         if left < end and (status == "stopped" or not run.failure):
             # What follows means nothing.
             recording.end = left
@@ -287,15 +289,9 @@ class DynamicModel(Model):
         self, names: tuple[str, ...], states: np.ndarray, inputs: np.ndarray
     ) -> np.ndarray:
         """Outputs, coordinates or speeds (samples, names) along a path of states and inputs."""
-        return Recording(self._recorder, states, inputs, ALL_SAMPLES).columns(names)
-
-    def packed(self, names: tuple[str, ...], samples: int) -> tuple[Ready, int]:
-        """Outputs, coordinates or speeds for loops over so many samples, see `Recorder.packed`.
-
-        They may have the constants of another model with the same equations.
-        """
-        return self._recorder.packed(names, samples)
+        return Recording(self.recorder, (states, inputs, np.empty((0, 2)))).columns(names)
 
     @cached_property
-    def _recorder(self) -> Recorder:
-        return Recorder(self) if self.near is None else self.near._recorder.of(self)
+    def recorder(self) -> Recorder:
+        """Makes outputs of its runs; loops over them may serve models with the same equations."""
+        return Recorder(self) if self.near is None else self.near.recorder.of(self)

@@ -67,8 +67,7 @@ def evaluate(
     """Write the results of a kernel along a path."""
     lanes = LANES if len(result) >= LANES else 1
     address = np.array([address_of(kernels, name, lanes)], dtype=np.int64)
-    loop = path_loops()["lane_path" if lanes == LANES else "kernel_path"]
-    loop(*paths, address, constants, result)
+    path_loops()["kernel_path"](*paths, address, constants, result)
 
 
 def address_of(kernels: Kernels, name: str, lanes: int = 1, results: tuple[int, ...] = ()) -> int:
@@ -84,8 +83,7 @@ def address_of(kernels: Kernels, name: str, lanes: int = 1, results: tuple[int, 
 
 def path_loops() -> Mapping[str, Loop]:
     """Loops over the samples of a path, the same for all systems."""
-    entries = "kernel_path", "lane_path", "watched", "chosen", "sampled"
-    return loops(PATH_LOOPS, entries)
+    return loops(PATH_LOOPS, ("kernel_path", "watched", "chosen", "sampled"))
 
 
 def partial(kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int) -> np.ndarray:

@@ -32,8 +32,8 @@ from vehiclemor.codegen.operations import LANES
 from vehiclemor.simulation.integrators.dense_solves import small_solve
 
 CONVERGED, TOO_MANY_ITERATIONS, NOT_FINITE, SINGULAR, OFF_BRANCH = range(5)
-# Indices of the counts; behind them the sample at which a loop has stopped.
-ITERATIONS, RESIDUALS, JACOBIANS, LINEAR_SOLVES, SAMPLE = range(5)
+# Index of the sample at which a loop has stopped, behind `trajectory.ALGEBRAIC_COUNTS`.
+SAMPLE = 4
 # Largest first correction (rad or m), and largest ratio of the second to it, on the branch.
 CORRECTION, CONTRACTION = 0.1, 1.0 / 16.0
 # A second correction (rad or m) below which the iteration can't have crossed a fold.
@@ -142,12 +142,10 @@ def failure(q):
     return TOO_MANY_ITERATIONS
 
 
-def stopped(counts, iterations, jacobians, status):
-    """Status of a loop that ends; writes its counts."""
-    counts[ITERATIONS] = iterations
-    counts[RESIDUALS] = iterations
-    counts[LINEAR_SOLVES] = iterations
-    counts[JACOBIANS] = jacobians
+def stopped(counts, iterations, status):
+    """Status of a loop that ends; writes its counts, each of which an iteration raises by one."""
+    for count in range(SAMPLE):
+        counts[count] = iterations
     return status
 
 
@@ -253,33 +251,26 @@ def newton_path(
                 count = approach(q, u, target, mechanism, iteration, work)
                 iterations += abs(count)
                 if count < 0:
-                    return stopped(counts, iterations, iterations, OFF_BRANCH)
+                    return stopped(counts, iterations, OFF_BRANCH)
                 break
         if not within(q, mechanism.stops):
-            return stopped(counts, iterations, iterations, OFF_BRANCH)
+            return stopped(counts, iterations, OFF_BRANCH)
         for i in range(len(u)):
             previous[i] = target[i]
         for i in range(len(q)):
             path[sample, i] = q[i]
-    return stopped(counts, iterations, iterations, CONVERGED)
+    return stopped(counts, iterations, CONVERGED)
 
 
 def travel_limit(
     mechanism: Mechanism, target: Vector, iteration: Iteration, reached: Vector, buffer: Vector
 ) -> Int:
-    """How far the branch goes to a target, one input after the other, the height last.
-
-    `reached` are the inputs at which it ends; the status is that of all inputs but the height.
-    """
+    """How far the branch goes to a target, see `approach`; `reached` are the inputs at its end."""
     q, u, _, _, work = scratch(mechanism.start, len(target), buffer)
-    status = CONVERGED
-    for index in range(len(target) - 1, -1, -1):
-        if moved(q, u, index, target[index], mechanism, iteration, work) < 0 and index:
-            status = OFF_BRANCH
-            break
+    approach(q, u, target, mechanism, iteration, work)
     for i in range(len(u)):
         reached[i] = u[i]
-    return status
+    return CONVERGED
 
 
 def scratch(start, inputs, buffer):
@@ -383,7 +374,7 @@ def lane_path(
         count = corrected(positions, u, mechanism, lane_kernels, iteration, work)
         iterations += abs(count) * LANES
         if count < 0:
-            return stopped(counts, iterations, iterations, OFF_BRANCH)
+            return stopped(counts, iterations, OFF_BRANCH)
         if step < 0:
             continue
         call_lanes(lane_kernels, LANE_OUTPUTS, q, u, mechanism.constants, results, 0)
@@ -394,4 +385,4 @@ def lane_path(
                 path[sample, i] = q[lane, i]
             for i in range(columns):
                 path[sample, n + i] = results[lane, i]
-    return stopped(counts, iterations, iterations, CONVERGED if inside else OFF_BRANCH)
+    return stopped(counts, iterations, CONVERGED if inside else OFF_BRANCH)

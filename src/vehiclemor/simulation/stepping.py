@@ -21,7 +21,7 @@ from vehiclemor.simulation.evaluation import CONSTANTS, STATE, directional, part
 from vehiclemor.simulation.loop_arguments import Output, Spans
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import Pool, RunInputs, Solver, Workspace
+from vehiclemor.simulation.workspaces import Pool, Solver, Workspace
 
 # Shortest step in s: the time loop takes times that differ by less for one.
 SHORTEST = 1e-9
@@ -134,9 +134,8 @@ class SteppedSystem:
         signal = ready(Pieces(edges, one, np.empty(0), coefficients))
         spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
         path = np.empty((1, len(self.system.error_scale)))
-        drive = RunInputs(signal, spans, np.empty((0, 0)))
-        output = Output.of(sample, path, counts)
-        space = self.system.packed(self.spaces, Solver(self.solver, self.tolerance), drive, output)
+        how = Solver(self.solver, self.tolerance)
+        space = self.system.packed(self.spaces, how, signal, spans, Output.of(sample, path, counts))
         words = space.call.words
         first = c_double.from_buffer(words, 8 * space.call.address("control.first"))
         times = edges, span, sample

@@ -29,7 +29,6 @@ so that defective matrices, those of stabilised constraints, are no exception.
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -214,19 +213,16 @@ def _doubled(functions: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     )
 
 
-def exponential_tables(
-    jacobian: np.ndarray, step_sizes: Sequence[float] | np.ndarray
-) -> np.ndarray:
+def exponential_tables(jacobian: np.ndarray, step_sizes: np.ndarray) -> np.ndarray:
     """Tables (step sizes, 7, n, n) of the loops, each matrix transposed.
 
     J; phi_1(z/2) / 2 and phi_2(z/2); phi_1, 2 phi_2, 2 phi_2 - 4 phi_3, 4 phi_3 - phi_2 of
     z = h J.  Step sizes grow by a root of 2: each octave doubles the one before.
     """
-    steps = np.asarray(step_sizes)
-    octave = int((steps < 1.99 * steps[0]).sum())
-    tables = np.empty((len(steps), TABLES, *jacobian.shape))
-    half = phi_functions(0.5 * steps[:octave, None, None] * jacobian)
-    for begin in range(0, len(steps), octave):
+    octave = int((step_sizes < 1.99 * step_sizes[0]).sum())
+    tables = np.empty((len(step_sizes), TABLES, *jacobian.shape))
+    half = phi_functions(0.5 * step_sizes[:octave, None, None] * jacobian)
+    for begin in range(0, len(step_sizes), octave):
         full = _doubled(half)
         _, first, second, third = full
         columns = (

@@ -236,7 +236,6 @@ def record_sample(output, sample):
     if not len(output.point_of_sample):
         return
     output.point_of_sample[sample, 0], output.point_of_sample[sample, 1] = row, -1.0
-    output.point_times[row] = output.samples[sample]
     for j in range(output.sample_inputs.shape[1]):
         output.point_inputs[row, j] = output.sample_inputs[sample, j]
 
@@ -251,7 +250,6 @@ def record_nodes(problem, step, first, following, work, output):
         part = part if node < 2 else 1.0 - part
         interpolate(part, h, work)
         reconstruct(problem, work.middle, output.states[row + node])
-        output.point_times[row + node] = t + part * h
         input_at(problem, t + part * h, output.point_inputs[row + node])
     for k in range(first, following):
         output.point_of_sample[k, 0] = row

@@ -15,12 +15,7 @@ import numpy as np
 from vehiclemor.codegen.loop_types import IntVector, Matrix, Vector, matrix
 from vehiclemor.simulation.integrators.contract import POWERS, rhs
 from vehiclemor.simulation.integrators.dense_solves import factorise, substitute
-from vehiclemor.simulation.loop_arguments import (
-    FACTORISATIONS,
-    JACOBIANS,
-    LINEAR_SOLVES,
-    RHS_CALLS,
-)
+from vehiclemor.simulation.loop_arguments import FACTORISATIONS, JACOBIANS, LINEAR_SOLVES, RHS_CALLS
 
 GAMMA = 0.25
 S = 6
