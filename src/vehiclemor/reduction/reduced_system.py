@@ -11,6 +11,7 @@ from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost
+from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
@@ -20,7 +21,6 @@ from vehiclemor.simulation.evaluation import (
     PLACES,
     STATE,
     By,
-    chosen,
     parameter_names,
 )
 from vehiclemor.simulation.stepping import Sensitivity, SteppedSystem
@@ -103,7 +103,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
     ) -> np.ndarray:
         """Analytic derivatives of the rates or of the outputs."""
-        function, names = chosen(of, RESULTS), parameter_names(by)
+        function, names = RESULTS[choice("of", of, RESULTS)], parameter_names(by)
         if not names:
             sensitivity = Sensitivity(PLACES[str(by)])
         elif np.array_equal(self.system.constants, self.model.constants):

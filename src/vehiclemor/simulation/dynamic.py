@@ -14,10 +14,11 @@ from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import STATE_KINDS
+from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import LOCKED, left_validity, stopped, wheel_remarks
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
-from vehiclemor.simulation.evaluation import By, chosen
-from vehiclemor.simulation.integrators.catalogue import frozen, integrator
+from vehiclemor.simulation.evaluation import By
+from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES, frozen, integrator
 from vehiclemor.simulation.integrators.step_kernels import partners
 from vehiclemor.simulation.linear_model import LinearModel
 from vehiclemor.simulation.loop_arguments import Output
@@ -47,6 +48,7 @@ class DynamicModel(Model):
     Near is a model of similar parameters, whose operators and workspaces serve this one too.
     """
 
+    loops = LOOP_SOURCES
     near: DynamicModel | None = None
 
     def _numbers(self, states: Iterable[str]) -> np.ndarray:
@@ -114,7 +116,7 @@ class DynamicModel(Model):
         self, state: Any, u: Any, with_respect_to: By = "state", of: str = "rhs"
     ) -> np.ndarray:
         """Analytic derivatives of `rhs` or `outputs`, see `Model.jacobian`."""
-        return self.jacobian_of(chosen(of, RESULTS), state, u, with_respect_to)
+        return self.jacobian_of(RESULTS[choice("of", of, RESULTS)], state, u, with_respect_to)
 
     def linearise(self, state: Start | None = None, inputs: Any = None) -> LinearModel:
         """Linear model at a state or start, the first by default, and inputs, 0 by default."""

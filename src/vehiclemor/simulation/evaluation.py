@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.codegen.derivatives import JacobianProduct, jacobian_product
+from vehiclemor.codegen.derivatives import jacobian_product
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.codegen.operations import LANES
@@ -88,21 +88,18 @@ def path_loops() -> Mapping[str, Loop]:
 
 def partial(kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int) -> np.ndarray:
     """Derivatives (size, n) of a kernel's result by the entries of the argument at a argument."""
-    return _jacobian_product(kernels, name, arrays, size, argument).jacobian(arrays)
+    source = kernels.sources[name]
+    product = jacobian_product(source, source.arguments[argument], size, len(arrays[argument]))
+    return product.jacobian(arrays)
 
 
 def directional(
     kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int, directions: np.ndarray
 ) -> np.ndarray:
     """Derivatives (k, size) of a kernel's result along directions (k, n) of one argument."""
-    return _jacobian_product(kernels, name, arrays, size, argument).columns(arrays, directions)
-
-
-def _jacobian_product(
-    kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int
-) -> JacobianProduct:
     source = kernels.sources[name]
-    return jacobian_product(source, source.arguments[argument], size, len(arrays[argument]))
+    product = jacobian_product(source, source.arguments[argument], size, len(arrays[argument]))
+    return product.columns(arrays, directions)
 
 
 def parameter_names(by: Any) -> tuple[str, ...]:
@@ -118,11 +115,6 @@ def parameter_names(by: Any) -> tuple[str, ...]:
             f"with_respect_to is {quoted(by)}, neither state nor inputs nor names of parameters"
         )
     return names
-
-
-def chosen(of: Any, known: Mapping[str, str]) -> str:
-    """What the derivatives are of, by its name; `InputError` if there is no such thing."""
-    return known[choice("of", of, known)]
 
 
 # --- constants ------------------------------------------------------------------------------------

@@ -7,11 +7,10 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.columns import listed
@@ -67,6 +66,7 @@ class Model(ShortRepr):
     """
 
     repr_fields = ("name", "kind", "coordinates", "inputs", "outputs", "starts")
+    loops: ClassVar[Sequence[str]]  # Modules of the loops that run it.
 
     definition: ModelDefinition
     equations: Derivation
@@ -178,10 +178,6 @@ class Model(ShortRepr):
             choice("input", name, (*self.inputs, *self._undriven))
         return self._with_driven(names)
 
-    def driven_as(self, other: Model) -> Self:
-        """The model whose runs drive the optional inputs that those of another one drive."""
-        return self._with_driven(other.inputs)
-
     def _with_driven(self, names: Sequence[str]) -> Self:
         if self._undriven.isdisjoint(names):
             return self
@@ -204,10 +200,7 @@ class Model(ShortRepr):
         """State (n,) of an initial condition, the first by default, or a copy of the one given."""
         if not isinstance(name, str | None):
             return self._state(name, "start").copy()
-        name = self.starts[0] if name is None else name
-        if name not in self.initial:
-            known = ", ".join(self.starts)
-            raise InputError(f"unknown start {quoted(name)}; {self.name} has {known}")
+        name = self.starts[0] if name is None else choice("start", name, self.initial)
         return self.initial[name].copy()
 
     @abstractmethod
