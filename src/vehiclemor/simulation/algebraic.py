@@ -58,7 +58,7 @@ LaneRun = tuple[Prepared, np.ndarray, int]
 class AlgebraicModel(Model):
     """Compiled residual equations Phi(q; u) = 0 of one mechanism."""
 
-    loops = KINEMATIC_LOOPS
+    loops, reference = KINEMATIC_LOOPS, ("newton", NEWTON_TOLERANCE)
 
     def __post_init__(self) -> None:
         """`GeometryError` where it can't be assembled or is locked at design."""

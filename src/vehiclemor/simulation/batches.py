@@ -20,13 +20,10 @@ from vehiclemor.inputs.maneuver import registered
 from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.provenance import attributes
 from vehiclemor.registry import choice
-from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.build import build, reparametrised
 from vehiclemor.simulation.checks import checked_path
-from vehiclemor.simulation.dynamic import REFERENCE_SOLVER, REFERENCE_TOLERANCE
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
-from vehiclemor.simulation.structures.model import SOLVER, TIGHT
 from vehiclemor.simulation.trajectory import (
     STATUSES,
     Names,
@@ -166,8 +163,7 @@ def _judgement(given: Any, bounds: Any, trust: str) -> dict[str, Any]:
 
 def _about(given: Any, full: Model, signals: Sequence[Excitation]) -> dict[str, Any]:
     """Attributes of the result: of which model with which settings it is."""
-    others = {"structural": (SOLVER, TIGHT), "ae": ("newton", NEWTON_TOLERANCE)}
-    solver, tolerance = others.get(full.kind, (REFERENCE_SOLVER, REFERENCE_TOLERANCE))
+    solver, tolerance = full.reference
     runs, default = len(signals), {"solver": solver, "tolerance": tolerance}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
     title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}
@@ -215,23 +211,18 @@ def _kept_times(
     given: Any, signals: Sequence[Excitation]
 ) -> tuple[np.ndarray, list[slice | np.ndarray]]:
     """Times in s of the result, and which samples of each run these are."""
-    first = signals[0]
-    if given is None:
-        for run, signal in enumerate(signals):
-            if (signal.duration, signal.samples) != (first.duration, first.samples):
-                raise InputError(
-                    f"signals[{run}] has other output times than the first: choose times="
-                )
-        return first.times, [slice(None)] * len(signals)
-    known: dict[tuple[float, int], np.ndarray] = {}
+    known: dict[tuple[float, int], slice | np.ndarray] = {}
     for run, signal in enumerate(signals):
         alike = signal.duration, signal.samples
-        if alike not in known:
-            try:
-                known[alike] = sample_rows(given, signal.times)
-            except InputError as error:
-                raise InputError(f"signals[{run}]: {error}") from None
-    times = np.atleast_1d(real_array(given))
+        if alike in known:
+            continue
+        if given is None and known:
+            raise InputError(f"signals[{run}] has other output times than the first: choose times=")
+        try:
+            known[alike] = slice(None) if given is None else sample_rows(given, signal.times)
+        except InputError as error:
+            raise InputError(f"signals[{run}]: {error}") from None
+    times = signals[0].times if given is None else np.atleast_1d(real_array(given))
     return times, [known[signal.duration, signal.samples] for signal in signals]
 
 

@@ -37,8 +37,6 @@ from vehiclemor.simulation.workspaces import Run, Solver
 
 # What derivatives are of -> function of the equations.
 RESULTS = {"rhs": "derivative", "outputs": "outputs"}
-# How full-order runs are solved that others are measured against.
-REFERENCE_SOLVER, REFERENCE_TOLERANCE = "dopri5", 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +46,8 @@ class DynamicModel(Model):
     Near is a model of similar parameters, whose operators and workspaces serve this one too.
     """
 
-    loops = LOOP_SOURCES
+    # Full-order runs are solved like this that others are measured against.
+    loops, reference = LOOP_SOURCES, ("dopri5", 1e-8)
     near: DynamicModel | None = None
 
     def _numbers(self, states: Iterable[str]) -> np.ndarray:
@@ -164,7 +163,7 @@ class DynamicModel(Model):
         if driven is not self:
             how = times, solver, tolerance, outputs, longest_step, begin
             return driven.simulate(maneuver, start, *how)
-        solver = REFERENCE_SOLVER if solver is None else solver
+        solver = self.reference[0] if solver is None else solver
         integrator(solver)
         trajectory = self.integrate(
             maneuver,
@@ -172,7 +171,7 @@ class DynamicModel(Model):
             whole_space(len(self.definition.states)),
             Solver(
                 solver,
-                REFERENCE_TOLERANCE if tolerance is None else tolerance,
+                self.reference[1] if tolerance is None else tolerance,
                 times,
                 longest_step,
                 begin if type(begin) is float else number("begin", begin),
@@ -221,7 +220,7 @@ class DynamicModel(Model):
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
         states = loop_array(states)
-        run = Run(Output.of(times, states, counts), seconds, failure)
+        run = Run(Output.of(times, states, np.asarray(counts)), seconds, failure)
         return self.recorded(None, run, loop_array(inputs), states)
 
     def recorded(

@@ -50,24 +50,12 @@ def at_samples(
     """
     states = checked_path(paths[0], sizes[0], "states", finite=finite)
     inputs = checked_path(paths[1], sizes[1], "inputs", len(states), finite)
-    result = np.empty((len(states), sizes[2]))
-    if name in kernels:
-        kernels.sources[name].check(sizes[0], sizes[1], len(constants), sizes[2])
-    evaluate(kernels, name, constants, (states, inputs), result)
-    return result
-
-
-def evaluate(
-    kernels: Kernels,
-    name: str,
-    constants: np.ndarray,
-    paths: tuple[np.ndarray, np.ndarray],
-    result: np.ndarray,
-) -> None:
-    """Write the results of a kernel along a path."""
-    lanes = LANES if len(result) >= LANES else 1
+    lanes = LANES if len(states) >= LANES else 1
     address = np.array([address_of(kernels, name, lanes)], dtype=np.int64)
-    path_loops()["kernel_path"](*paths, address, constants, result)
+    kernels.sources[name].check(sizes[0], sizes[1], len(constants), sizes[2])
+    result = np.empty((len(states), sizes[2]))
+    path_loops()["kernel_path"](states, inputs, address, constants, result)
+    return result
 
 
 def address_of(kernels: Kernels, name: str, lanes: int = 1, results: tuple[int, ...] = ()) -> int:

@@ -67,6 +67,7 @@ class Model(ShortRepr):
 
     repr_fields = ("name", "kind", "coordinates", "inputs", "outputs", "starts")
     loops: ClassVar[Sequence[str]]  # Modules of the loops that run it.
+    reference: ClassVar[tuple[str, float]]  # Solver and tolerance by default.
 
     definition: ModelDefinition
     equations: Derivation
@@ -177,6 +178,10 @@ class Model(ShortRepr):
         for name in names:
             choice("input", name, (*self.inputs, *self._undriven))
         return self._with_driven(names)
+
+    def driven_as(self, other: Model) -> Self:
+        """The model whose runs drive the optional inputs that those of another one drive."""
+        return self._with_driven(other.inputs)
 
     def _with_driven(self, names: Sequence[str]) -> Self:
         if self._undriven.isdisjoint(names):

@@ -12,7 +12,7 @@ from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import limits_of
-from vehiclemor.simulation.evaluation import address_of, evaluate, path_loops
+from vehiclemor.simulation.evaluation import address_of, path_loops
 from vehiclemor.simulation.loop_arguments import Outputs
 from vehiclemor.simulation.model import Model
 
@@ -118,9 +118,7 @@ class Recording:
     @cached_property
     def output_history(self) -> np.ndarray:
         """Outputs (samples, number of outputs)."""
-        model = self._recorder.model
-        table = np.empty((len(self.states), len(model.outputs)))
-        evaluate(model.kernels, "outputs", model.constants, (self.states, self.inputs), table)
+        table = self._recorder.model.values_at("outputs", self.states, self.inputs)
         return self._cut(self._sampled(table))
 
     def columns(self, names: tuple[str, ...]) -> np.ndarray:

@@ -54,18 +54,11 @@ class SteppedSystem:
     """A system as a function of a state, the inputs and a length of time.
 
     Steps are independent of one another: the same arguments give the same state, in any thread.
-
-    Attributes
-    ----------
-    system, spaces
-        A `System`, and its formulation with the subspaces, `ControlPeriods`; in more windows
-        than one the time says which.
-    solver, tolerance
-        Integrator and its tolerance.
     """
 
     if TYPE_CHECKING:
-        # Any: a field or a property.
+        # A `System`, and its formulation with the subspaces, `ControlPeriods`; in more windows than
+        # one the time says which.  Any: a field or a property.
         system: Any
         spaces: Any
         solver: str
@@ -81,10 +74,7 @@ class SteppedSystem:
     ) -> np.ndarray:
         """State (n,) after dt s; inputs are held, or go straight to those at the end.
 
-        Raises
-        ------
-        ConvergenceError
-            If the integration fails.
+        `ConvergenceError` if the integration fails.
         """
         held = self._pool.taken(None, self._packed)
         space, coefficients = held.space, held.coefficients

@@ -228,7 +228,7 @@ def _fit(fit: Fit) -> FittedModel | Failure:
     method: Method = component("method", fit.method)
 
     def fit_model() -> FittedModel:
-        model = with_parameters(fit.model, fit.parameters).driving(fit.model.inputs)
+        model = with_parameters(fit.model, fit.parameters).driven_as(fit.model)
         runs = [training_run(fit.model, scenario) for scenario in fit.training]
         settings = for_method(fit.model, fit.method, json.loads(fit.settings))
         return fitted(method, model, runs, settings)

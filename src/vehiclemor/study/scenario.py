@@ -166,7 +166,7 @@ def model_of_run(model: Model, scenario: Scenario) -> Model:
     """The model with the parameters of a scenario, whose maneuver drives it."""
     driven = model.driven_by(scenario.maneuver)
     # What a run drives is no parameter of it.
-    return with_parameters(driven, scenario.parameters).driving(driven.inputs)
+    return with_parameters(driven, scenario.parameters).driven_as(driven)
 
 
 def driven_by_all(model: Model, scenarios: Sequence[Scenario]) -> Model:

@@ -175,7 +175,7 @@ def wrong_matrices(structure: Structure, ports: int, outputs: int) -> str:
 class StructuralModel(Model):
     """A structure whose ports have a compiled law; it starts from its static state alone."""
 
-    loops = STRUCTURAL_LOOPS
+    loops, reference = STRUCTURAL_LOOPS, (SOLVER, TIGHT)
 
     def __post_init__(self) -> None:
         """Wrong matrices raise now; `GeometryError` where it can't stand."""

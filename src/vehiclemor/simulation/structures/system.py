@@ -103,7 +103,8 @@ class StructuralSystem:
     @cached_property
     def order(self) -> np.ndarray:
         """Order (n,) of the coordinates in which factors of the matrices stay sparse."""
-        return ordering(self.structure.mass + self.structure.stiffness)
+        matrix = self.structure.mass + self.structure.stiffness
+        return np.argsort(factored(matrix, "MMD_AT_PLUS_A").perm_c)
 
     def step_matrices(self, h: float, radius: float = DAMPED) -> Ready:
         """The structure with a step size in s; its matrix is factored once."""
@@ -197,22 +198,13 @@ def columns_of(matrix: Any) -> Columns:
     return Columns(pieces, table.ravel().astype(np.int64), values)
 
 
-def ordering(matrix: Any) -> np.ndarray:
-    """Order (n,) of rows and columns in which the factors of a matrix stay sparse."""
-    return np.argsort(factored(matrix, "MMD_AT_PLUS_A").perm_c)
-
-
 def factored(matrix: Any, order: str = "NATURAL") -> Any:
     """Factors L (D L') of a symmetric matrix, without pivoting; `GeometryError` if it has none."""
     from scipy.sparse.linalg import splu
 
     try:
-        return splu(
-            matrix.tocsc(),
-            permc_spec=order,
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        symmetric = {"SymmetricMode": True}
+        return splu(matrix.tocsc(), permc_spec=order, diag_pivot_thresh=0.0, options=symmetric)
     except RuntimeError as error:
         raise GeometryError(f"the matrices of the structure are singular ({error})") from None
 
