@@ -159,25 +159,14 @@ class DynamicModel(Model):
         begin: float = 0.0,
     ) -> Trajectory:
         """Full-order trajectory, see `Model.simulate`."""
-        driven = self.driven_by(maneuver)
-        if driven is not self:
-            how = times, solver, tolerance, outputs, longest_step, begin
-            return driven.simulate(maneuver, start, *how)
         solver = self.reference[0] if solver is None else solver
+        tolerance = self.reference[1] if tolerance is None else tolerance
         integrator(solver)
-        trajectory = self.integrate(
-            maneuver,
-            self.start(start),
-            whole_space(len(self.definition.states)),
-            Solver(
-                solver,
-                self.reference[1] if tolerance is None else tolerance,
-                times,
-                longest_step,
-                begin if type(begin) is float else number("begin", begin),
-            ),
-            None if outputs is None else output_names(outputs),
-        )
+        begin = begin if type(begin) is float else number("begin", begin)
+        how = Solver(solver, tolerance, times, longest_step, begin)
+        names = None if outputs is None else output_names(outputs)
+        state, space = self.start(start), whole_space(len(self.definition.states))
+        trajectory = self.driven_by(maneuver).integrate(maneuver, state, space, how, names)
         if trajectory.status not in WITHOUT_COMPLAINT:
             raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)
         return trajectory

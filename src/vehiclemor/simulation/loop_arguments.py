@@ -73,9 +73,6 @@ class Control(NamedTuple):
     shrink: Float = 0.2
     grow: Float = 6.0
     safety: Float = 0.9
-    # Factors between which the step size stays.
-    keep_least: Float = 1.0
-    keep_most: Float = 1.0
     # Whether two equal steps are taken instead of a long and a tiny one (1) or not (0).
     halve_last: Float = 1.0
     shortest_first: Float = 0.0  # Shortest first guess of a step in s.

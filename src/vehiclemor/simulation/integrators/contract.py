@@ -33,7 +33,7 @@ def begin(problem, t, method, work):
     raise NotImplementedError(COMPILED_ONLY)
 
 
-def longest_step(h, method, control, work):
+def longest_step(h, method, work):
     """The longest step in s that the method can take and that is not above h."""
     return h
 

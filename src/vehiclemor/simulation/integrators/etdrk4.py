@@ -124,7 +124,7 @@ def keep_past(work):
         work.past[i] = work.arguments[i]
 
 
-def longest_step(h, method, control, work):
+def longest_step(h, method, work):
     """The longest stored step size that is not above h."""
     work.step_index[0] = index_below(method.step_sizes, work.step_index[0], h)
     return min(h, method.step_sizes[work.step_index[0]])

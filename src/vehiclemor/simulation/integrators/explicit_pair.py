@@ -41,17 +41,10 @@ def pair_table(
     """Table (s + 2 + `POWERS`, s) of a pair of s stages.
 
     Its rows are the weights by stage, the times of the stages, the error, dense output by power.
-
-    Parameters
-    ----------
-    weights
-        Of the stages before, for the second and further stages; the last row gives the new state.
-    error
-        Weights (s,) of the stages in the difference of both solutions.
-    correction
-        Dense output is the cubic through states and slopes at both ends of a step, plus
-        h z^2 (1 - z)^2 times the stages with these weights (s,), 0 by default, where z is the part
-        of the step that has passed.
+    Weights are of the stages before, for the second and further stages, the last of which gives the
+    new state; the error weighs (s,) the stages in the difference of both solutions.  Dense output
+    is the cubic through states and slopes at both ends of a step, plus h z^2 (1 - z)^2 times the
+    stages with the weights `correction` (s,), where z is the part of the step that has passed.
     """
     s = len(weights) + 1
     a, ends = np.zeros((s, s)), np.eye(s)[[0, -1]]

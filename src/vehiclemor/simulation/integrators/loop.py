@@ -150,7 +150,7 @@ def over_span(problem, times, h, method, control, work, output, sample):
     while t < end - 1e-12 * (1.0 + abs(end)):
         if calls_of_this_second(problem, t, counts) > control.most_calls:
             return TOO_MANY_CALLS, t, tried, sample
-        h = longest_step(min(tried, control.longest), method, control, work)
+        h = longest_step(min(tried, control.longest), method, work)
         if t + 1.0001 * h > end:
             h = end - t
         elif control.halve_last > 0.0 and t + 2.0 * h > end:
@@ -181,8 +181,6 @@ def over_span(problem, times, h, method, control, work, output, sample):
         factor = control.safety * error**-control.exponent * before**control.memory_exponent
         before = max(error, control.memory_floor)
         factor = min(control.grow, max(control.shrink, factor))
-        if control.keep_least < factor < control.keep_most:
-            factor = 1.0
         if rejected:
             factor = min(1.0, factor)
             rejected = False
