@@ -25,7 +25,7 @@ from vehiclemor.simulation.checks import checked_path
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
 from vehiclemor.simulation.trajectory import (
-    STATUSES,
+    REPORTED,
     Names,
     Start,
     Trajectory,
@@ -44,10 +44,7 @@ LARGEST = 4 << 30
 # Parameter sets whose models are kept.
 MOST_SETS = 32
 # What else there is of each run: unit and meaning.
-REPORTED = {
-    "status": ("", f"one of {', '.join(STATUSES)}"),
-    "message": ("", "why the status is not ok"),
-    "remark": ("", "what else there is to know"),
+MEANINGS = {name: ("", meaning) for name, meaning in REPORTED.items()} | {
     "indicator": ("1", "how far the run goes in what its model knows; 1 is the edge"),
     "until": ("s", "time at which the indicator has first passed 1"),
     "seconds": ("s", "time spent in the compiled loop"),
@@ -171,7 +168,7 @@ def _about(given: Any, full: Model, signals: Sequence[Excitation]) -> dict[str, 
 
 
 def _report(done: Trajectory | Failure, model: Model) -> tuple:
-    """What else there is of a run: what `REPORTED` names, and solver counts."""
+    """What else there is of a run: what `MEANINGS` names, and solver counts."""
     if isinstance(done, Failure):
         return done.status, done.message, "", np.nan, 0.0, 0.0, *[0] * len(model.counts)
     trust = done.trust or Trust(np.nan)
@@ -305,7 +302,7 @@ def _dataset(
 
     declared = (*model.definition.outputs, *model.definition.state_quantities)
     units = {quantity.name: quantity.unit for quantity in reversed(declared)}
-    described = REPORTED | {name: ("1", long_name) for name, long_name in model.counts.items()}
+    described = MEANINGS | {name: ("1", long_name) for name, long_name in model.counts.items()}
     variables: dict[str, Any] = {
         "values": (("run", "time", "output"), values, {"long_name": "quantities"})
     }

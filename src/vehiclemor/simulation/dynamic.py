@@ -187,10 +187,7 @@ class DynamicModel(Model):
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
         run = self.system.run(maneuver, state, windows, how, 0.0)
-        if how.times is None and not how.begin:
-            inputs = maneuver.recorded_inputs[1]
-        else:
-            inputs = maneuver.at(run.output.samples)
+        inputs = maneuver.recorded_inputs[1] if how.complete else run.output.sample_inputs
         trajectory = self.recorded(maneuver, run, inputs, run.output.states, outputs=outputs)
         run.give_back()
         if LOCKED in trajectory.remark and frozen(how.name):

@@ -39,12 +39,12 @@ class Sensitivity(NamedTuple):
 class StepSpace(NamedTuple):
     """A workspace of one step at a time, and what is overwritten for each.
 
-    Times are arrays that end with the length of the step; window is an index (1,), coefficients
-    (1, 6, inputs) are of the inputs, first is the first step.
+    Times are 0 and the length of the step; window is an index (1,), coefficients (1, 6, inputs) are
+    of the inputs, first is the first step.
     """
 
     space: Workspace
-    times: tuple[np.ndarray, ...]
+    times: np.ndarray
     window: np.ndarray
     coefficients: np.ndarray
     first: c_double
@@ -87,8 +87,7 @@ class SteppedSystem:
             if slope is not None:
                 coefficients[0, 0] += begin * slope
                 coefficients[0, 1] = length * slope
-            for array in held.times:
-                array[-1] = length
+            held.times[1] = length
             held.first.value = length
             held.window[0] = window
             output.counts.fill(0)
@@ -118,17 +117,15 @@ class SteppedSystem:
             yield begin, end - begin, window
 
     def _packed(self) -> StepSpace:
-        edges, coefficients = np.zeros(2), np.zeros((1, 6, self.system.inputs))
-        span, window, sample = np.zeros(2), np.zeros(1, dtype=np.int64), np.ones(1)
-        counts, one = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64), np.array([0, 1])
-        signal = ready(Pieces(edges, one, np.empty(0), coefficients))
-        spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
-        path = np.empty((1, len(self.system.error_scale)))
+        times, coefficients = np.zeros(2), np.zeros((1, 6, self.system.inputs))
+        window, counts = (np.zeros(size, dtype=np.int64) for size in (1, len(DYNAMIC_COUNTS)))
+        signal = ready(Pieces(times, np.array([0, 1]), np.empty(0), coefficients))
+        spans = ready(Spans(times, np.zeros(1, dtype=np.int64), window))
+        output = Output.of(times[1:], np.empty((1, len(self.system.error_scale))), counts)
         how = Solver(self.solver, self.tolerance)
-        space = self.system.packed(self.spaces, how, signal, spans, Output.of(sample, path, counts))
+        space = self.system.packed(self.spaces, how, signal, spans, output)
         words = space.call.words
         first = c_double.from_buffer(words, 8 * space.call.address("control.first"))
-        times = edges, span, sample
         return StepSpace(space, times, window, coefficients, first)
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:

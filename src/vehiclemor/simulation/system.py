@@ -169,7 +169,7 @@ class System(ShortRepr):
         if solver.longest_step is not None:
             check_positive("longest_step", solver.longest_step)
         pool, kind = Pool(), None
-        if solver.times is None and not solver.begin:
+        if solver.complete:
             # Complete maneuvers with the same output times share a workspace.
             length = maneuver.duration, maneuver.samples
             pool, kind = self._pool, (length, id(windows), solver, record_all_until)
@@ -203,13 +203,12 @@ class System(ShortRepr):
         times = output_times(solver.times, maneuver, begin=solver.begin)
         spans = _spans(maneuver, windows, times, solver.begin)
         path = np.empty((len(times), len(self.error_scale)))
-        output = Output.of(times, path, np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64))
-        if solver.times is None and not solver.begin:
-            few = catalogue.integrator(solver.name).cubic and len(times) >= LANES
-            if not few or record_all_until >= times[-1]:
-                record_all_until = np.inf
-            inputs = maneuver.recorded_inputs[1].copy()
-            output = Output.of(times, path, output.counts, inputs, record_all_until)
+        counts = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
+        inputs = maneuver.recorded_inputs[1] if solver.complete else maneuver.at(times)
+        few = solver.complete and catalogue.integrator(solver.name).cubic and len(times) >= LANES
+        if not few or record_all_until >= times[-1]:
+            record_all_until = np.inf
+        output = Output.of(times, path, counts, inputs.copy(), record_all_until)
         return self.packed(windows, solver, maneuver.packed_pieces, spans, output)
 
     def packed(

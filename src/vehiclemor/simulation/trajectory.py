@@ -34,6 +34,12 @@ STATUSES = ("ok", "untrusted", "stopped", "diverged", "unreachable", "rejected",
 WITHOUT_COMPLAINT = ("ok", "stopped")
 # Of a run that has come to its end; `untrusted` it has left what its model knows, and says so.
 FINISHED = (*WITHOUT_COMPLAINT, "untrusted")
+# What a run says of itself, in datasets.
+REPORTED = {
+    "status": f"one of {', '.join(STATUSES)}",
+    "message": "why the status is not ok",
+    "remark": "what else there is to know",
+}
 # What the solvers of a kind of model count: name -> meaning.
 ALGEBRAIC_COUNTS = {
     "iterations": "solver iterations",
@@ -328,11 +334,7 @@ def trajectory_dataset(
         variables[name] = ((), trajectory.counts.get(name, 0), attributes)
     seconds = {"units": "s", "long_name": "time spent in the compiled loop", "clock": CLOCK}
     variables["seconds"] = ((), trajectory.seconds, seconds)
-    for name, long_name in (
-        ("status", f"one of {', '.join(STATUSES)}"),
-        ("message", "why the status is not ok"),
-        ("remark", "what else there is to know"),
-    ):
+    for name, long_name in REPORTED.items():
         variables[name] = ((), getattr(trajectory, name), {"long_name": long_name})
     names = trajectory.names or model.outputs
     labels = _labels(model.definition, held, names, trajectory.times.tobytes())

@@ -54,6 +54,11 @@ class Solver(NamedTuple):
     longest_step: float | None = None
     begin: float = 0.0
 
+    @property
+    def complete(self) -> bool:
+        """Whether it runs over a whole maneuver, at its output times."""
+        return self.times is None and not self.begin
+
 
 @dataclass(eq=False, slots=True)
 class Workspace:

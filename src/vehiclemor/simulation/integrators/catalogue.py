@@ -61,6 +61,7 @@ def explicit(
     table: np.ndarray,
     control: Control | None = None,
     modules: tuple[str, ...] = ("explicit_pair",),
+    cubic: bool = True,
 ) -> Integrator:
     """An explicit Runge-Kutta pair by its table, see `explicit_pair.pair_table`."""
     return Integrator(
@@ -69,7 +70,7 @@ def explicit(
         order,
         control or Control(1.0 / order, 1.0 / order),
         rows=explicit_pair.scratch_rows(table),
-        cubic=not table[-1].any(),
+        cubic=cubic,
         tableau=table,
     )
 
@@ -81,6 +82,7 @@ INTEGRATORS = {
         dopri5.TABLE,
         Control(0.17, 0.17, 0.04, 1e-4, shrink_least=0.2, grow=10.0, halve_last=0.0),
         modules=("explicit_pair", "dopri5"),
+        cubic=False,
     ),
     "rodas4": Integrator(
         "Rosenbrock method of order 4, fresh Jacobians",

@@ -35,7 +35,7 @@ import numpy as np
 
 from vehiclemor.codegen.loop_types import IntVector, Matrix, Vector, call_kernel, matrix, vector
 from vehiclemor.inputs.polynomial_loops import input_at
-from vehiclemor.simulation.integrators.contract import POWERS, rhs
+from vehiclemor.simulation.integrators.contract import POWERS
 from vehiclemor.simulation.loop_arguments import RHS_CALLS, STEP_KERNEL
 
 # Called once in the time loop: bundles of arrays cost more to pass than they take inside.
@@ -61,7 +61,7 @@ AT_ZERO = (0.0, 1.0 / 2.0, 1.0 / 2.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 6.0)
 
 
 class Work(NamedTuple):
-    """Scratch space: `contract.WORK`, coefficients of the cubic, and what the step kernel takes.
+    """Scratch space: `contract`'s vectors, powers of the cubic, and what the step kernel takes.
 
     Past are state and right-hand side a step before, one behind the other; their step size, 0 if
     there was none; the kernel's numbers and inputs, parts of its arguments; its result; the number
@@ -111,9 +111,8 @@ def work_space(buffer, first, integers, dim, inputs, method):
     )
 
 
-def begin(problem, t, method, work):
-    """Right-hand side at the beginning of a span; there is no step before."""
-    rhs(problem, t, work.y, work.f)
+def begin(method, work):
+    """There is no step before."""
     work.step_index[0], work.past_step[0] = len(method.step_sizes) // 2, 0.0
     keep_past(work)
 

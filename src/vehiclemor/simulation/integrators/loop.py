@@ -16,6 +16,7 @@ from vehiclemor.simulation.integrators.contract import (
     prepare_curve,
     project,
     reconstruct,
+    rhs,
     step,
     work_space,
 )
@@ -134,7 +135,8 @@ def over_span(problem, times, h, method, control, work, output, sample):
     """
     t, end = times
     y, f, counts = work.y, work.f, output.counts
-    begin(problem, t, method, work)
+    rhs(problem, t, y, f)
+    begin(method, work)
     counts[RHS_CALLS] += 1
     if h <= 0.0:
         # The slope changes the state by a hundredth of its scale, at most.

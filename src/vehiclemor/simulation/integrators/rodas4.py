@@ -55,7 +55,7 @@ def tableau() -> np.ndarray:
 
 
 class Work(NamedTuple):
-    """Scratch space: `contract.WORK`, coefficients of the cubic, and what a step needs.
+    """Scratch space: `contract`'s vectors, coefficients of the cubic, and what a step needs.
 
     Right-hand side at a shifted state, time derivative, right side of a linear system; stages by
     row; Jacobian, factors and pivots of the matrix; whether the Jacobian is fresh.
@@ -103,9 +103,8 @@ def work_space(buffer, first, integers, dim, inputs, method):
     )
 
 
-def begin(problem, t, method, work):
-    """Right-hand side at the beginning of a span; no Jacobian is known yet."""
-    rhs(problem, t, work.y, work.f)
+def begin(method, work):
+    """No Jacobian is known yet."""
     work.fresh[0] = 0
 
 

@@ -42,7 +42,8 @@ def test_its_error_falls_with_its_order_and_follows_the_tolerance(standard):
 
 
 def test_a_pair_that_is_written_out_gives_what_its_table_gives(standard):
-    model, times = standard(), np.linspace(0.0, 8.0, 999)
+    # Its own dense output is of higher order.
+    model, times = standard(), np.array([8.0])
     runs = [model.simulate(DRIVEN, None, times, name, 1e-8) for name in ("dopri5", "table")]
     assert runs[0].counts == runs[1].counts
     np.testing.assert_allclose(runs[0].states, runs[1].states, rtol=0, atol=1e-12)
