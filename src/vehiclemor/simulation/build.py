@@ -196,21 +196,18 @@ def build_derived(name: str) -> Model | None:
 
 def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
     """Raise `InputError` if functions that were derived are missing or of another shape."""
-    n, outputs = len(definition.coordinates), len(definition.outputs)
-    constraints = len(definition.constraints)
-    needed: dict[str, tuple[int, ...]]
-    further: dict[str, tuple[int, ...]]
+    n, constraints = len(definition.coordinates), len(definition.constraints)
+    needed: dict[str, tuple[int, ...]] = {"outputs": (len(definition.outputs),)}
+    further: dict[str, tuple[int, ...]] = {}
     if definition.kind == "ae":
-        needed = {"residual": (n,), "residual_jacobian": (n, n + 1), "newton_step": (n,)}
+        needed |= {"residual": (n,), "residual_jacobian": (n, n + 1), "newton_step": (n,)}
         further = {"joints": (len(definition.joints), 3)}
     elif definition.kind == "structural":
-        needed, further = {"port_forces": (len(definition.ports), 3)}, {}
+        needed = {"port_forces": (len(definition.ports), 3)}
     else:
-        needed = {"derivative": (len(definition.states),)}
+        needed |= {"derivative": (len(definition.states),)}
         further = {"second_order": (n, n + 1), "speeds": (n,), "violations": (constraints, 2)}
-        further["descriptor"] = (n + constraints, n + 1)
-    if definition.kind != "structural":
-        needed["outputs"] = (outputs,)
+        further |= {"descriptor": (n + constraints, n + 1)}
     if definition.further_states:
         for function in {"second_order", "speeds"}.intersection(equations.shapes):
             raise InputError(f"model {definition.name!r} has further states, so no {function}")

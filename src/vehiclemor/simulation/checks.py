@@ -148,18 +148,15 @@ def wheel_remarks(
     if min(first, default=len(times)) == len(times):
         return remarks
     loads, slips = definition.loads, watched_slips(definition)
-    if off := _wheels(loads, first[: len(loads)], times):
-        remarks.append(f"off the ground for a time: {off}")
-    if sliding := _wheels(slips, first[len(loads) :], times):
-        remarks.append(f"{LOCKED}: {sliding}")
+    for text, outputs, samples in (
+        ("off the ground for a time", loads, first[: len(loads)]),
+        (LOCKED, slips, first[len(loads) :]),
+    ):
+        wheels = [
+            f"{name.rpartition('_')[2]} (first at {times.item(sample):.4g} s)"
+            for name, sample in zip(outputs, samples, strict=True)
+            if sample < len(times)
+        ]
+        if wheels:
+            remarks.append(f"{text}: {', '.join(wheels)}")
     return remarks
-
-
-def _wheels(outputs: Sequence[str], first: Sequence[int], times: np.ndarray) -> str:
-    """Wheels with a first sample inside the run, and its time; empty if there is none."""
-    parts = [
-        f"{name.rpartition('_')[2]} (first at {times.item(sample):.4g} s)"
-        for name, sample in zip(outputs, first, strict=True)
-        if sample < len(times)
-    ]
-    return ", ".join(parts)

@@ -159,26 +159,25 @@ def components(definition: ModelDefinition, name: str) -> range:
 
 
 def constant_derivatives(
-    definition: ModelDefinition, flat: np.ndarray, equations: Derivation, numbers: Sequence[int]
+    definition: ModelDefinition, equations: Derivation, values: np.ndarray, numbers: Sequence[int]
 ) -> np.ndarray:
     """Derivatives (numbers, constants) of the hoisted constants by components of the parameters.
 
-    The model is built anew with each: what its equilibrium solves for follows.  That part is by
-    differences of order 4, the rest is exact.
+    Values are `Model.parameter_values`.  The model is built anew with each: what its equilibrium
+    solves for follows.  That part is by differences of order 4, the rest is exact.
     """
+    flat = values[: len(values) - len(definition.solved)]
 
     def solved(moved: np.ndarray) -> np.ndarray:
         solved = solved_parameters(definition, moved, equations)
         return np.array([solved[name] for name in definition.solved])
 
-    directions = np.zeros((len(numbers), len(flat) + len(definition.solved)))
+    directions = np.zeros((len(numbers), len(values)))
     directions[np.arange(len(numbers)), numbers] = 1.0
-    if definition.solved:
-        directions[:, len(flat) :] = differences(solved, flat, numbers)
-    given = np.concatenate([flat, solved(flat)]) if definition.solved else flat
+    directions[:, len(flat) :] = differences(solved, flat, numbers)
     source = equations.sources["constants"]
-    found = jacobian_product(source, source.arguments[0], equations.constants, len(given))
-    return found.columns((given,), directions)
+    product = jacobian_product(source, source.arguments[0], equations.constants, len(values))
+    return product.columns((values,), directions)
 
 
 def differences(

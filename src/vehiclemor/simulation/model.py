@@ -329,10 +329,9 @@ class Model(ShortRepr):
         """Derivatives (components, constants) of the constants by parameters, cached."""
         for name in names:
             if name not in self._constant_derivatives:
-                numbers, flat = components(self.definition, name), self.parameters.flat()
-                self._constant_derivatives[name] = constant_derivatives(
-                    self.definition, flat, self.equations, numbers
-                )
+                numbers = components(self.definition, name)
+                arguments = self.definition, self.equations, self.parameter_values, numbers
+                self._constant_derivatives[name] = constant_derivatives(*arguments)
         return np.concatenate([self._constant_derivatives[name] for name in names])
 
     @cached_property
