@@ -29,8 +29,7 @@ LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
 SOLVERS = ("newton", "newton_lanes")
-# What derivatives are of -> function of the equations, if it is one.
-RESULTS = {"residual": "residual", "outputs": "outputs", "coordinates": ""}
+RESULTS = ("residual", "outputs", "coordinates")
 # Largest gap (m or rad) between joints at which coordinates count as a solution, and with which a
 # mechanism counts as assembled.
 CLOSED, ASSEMBLED = 1e-6, 1e-9
@@ -109,22 +108,22 @@ class AlgebraicModel(Model):
         of the residual with q held, of coordinates and outputs with q following, by the implicit
         function theorem dq = -Phi_q^-1 Phi_u du; the coordinates must close the joints.
         """
-        function, by = RESULTS[choice("of", of, RESULTS)], with_respect_to
-        if by == "state" and not function:
+        of, by = choice("of", of, RESULTS), with_respect_to
+        if by == "state" and of == "coordinates":
             raise InputError("derivatives of the coordinates are by inputs or parameters")
         if of == "residual" and by == "state":
             return self.evaluated("residual_jacobian", state, u)[:, :-1].copy()
         if of == "residual" or by == "state":
-            return self.jacobian_of(function, state, u, by)
+            return self.jacobian_of(of, state, u, by)
         gap = float(np.abs(self.evaluated("residual", state, u)).max())
         if not gap < CLOSED:
             raise InputError(f"{self.name}: at these coordinates the joints are {gap:.3g} m apart")
         change = self.jacobian_of("residual", state, u, by)
         moved = -np.linalg.solve(self.evaluated("residual_jacobian", state, u)[:, :-1], change)
-        if not function:
+        if of == "coordinates":
             return moved
-        follows = self.jacobian_of(function, state, u, "state") @ moved
-        return self.jacobian_of(function, state, u, by) + follows
+        follows = self.jacobian_of(of, state, u, "state") @ moved
+        return self.jacobian_of(of, state, u, by) + follows
 
     def joints_at(self, q: Any) -> dict[str, np.ndarray]:
         """Positions (3,) in m of the moving joints, for drawing."""

@@ -126,9 +126,8 @@ def simulate_many(
 
     with one_thread(), ThreadPoolExecutor(threads, "vehiclemor") as pool:
         found = list(itertools.chain(*pool.map(reports, range(0, runs, CHUNK))))
-    return _dataset(full, list(names), kept, values, found).assign_attrs(
-        _about(given, full, driven)
-    )
+    dataset = _dataset(full, list(names), kept, values, found)
+    return dataset.assign_attrs(_about(given, full, driven))
 
 
 def _driven(model: Any, signals: Any) -> tuple[Any, Model, Any]:
@@ -303,12 +302,10 @@ def _dataset(
     declared = (*model.definition.outputs, *model.definition.state_quantities)
     units = {quantity.name: quantity.unit for quantity in reversed(declared)}
     described = MEANINGS | {name: ("1", long_name) for name, long_name in model.counts.items()}
-    variables: dict[str, Any] = {
-        "values": (("run", "time", "output"), values, {"long_name": "quantities"})
-    }
-    for (name, (unit, long_name)), column in zip(
-        described.items(), zip(*reports, strict=True), strict=True
-    ):
+    variables: dict[str, Any] = {}
+    variables["values"] = ("run", "time", "output"), values, {"long_name": "quantities"}
+    columns = zip(*reports, strict=True)
+    for (name, (unit, long_name)), column in zip(described.items(), columns, strict=True):
         further = {"units": unit} if unit else {}
         variables[name] = "run", np.array(column), {"long_name": long_name} | further
     variables["seconds"][2]["clock"] = CLOCK

@@ -32,11 +32,9 @@ class ControlPeriods(ShortRepr):
         windows, form = len(self.ranks), self.formulation
         rows, columns = self.trial_basis.shape[1:]
         require(form in ("full", "state", "coordinates") and windows > 0, "formulation")
-        bases = (
-            (self.trial_basis, windows, rows, columns),
-            (self.test_basis, windows, rows, columns),
-        )
-        check_shapes("spaces", (self.edges, windows + 1), (self.means, windows, columns), *bases)
+        check_shapes("spaces", (self.edges, windows + 1), (self.means, windows, columns))
+        for basis in (self.trial_basis, self.test_basis):
+            check_shapes("spaces", (basis, windows, rows, columns))
         if form != "full":
             # A coordinate and its rate share a row where coordinates are projected.
             most = rows * (2 if form == "coordinates" else 1)
@@ -76,12 +74,6 @@ def _spans(breaks_in_bytes: bytes, edges_in_bytes: bytes, end: float, begin: flo
 @lru_cache(maxsize=64)
 def whole_space(dim: int) -> ControlPeriods:
     """The full space of a system with `dim` states, in one window."""
-    nothing = np.zeros((1, 1, 1))
-    return ControlPeriods(
-        "full",
-        np.array([0.0, np.inf]),
-        np.zeros((1, 1)),
-        nothing,
-        nothing,
-        np.array([dim], dtype=np.int64),
-    )
+    edges, ranks = np.array([0.0, np.inf]), np.array([dim], dtype=np.int64)
+    mean, nothing = np.zeros((1, 1)), np.zeros((1, 1, 1))
+    return ControlPeriods("full", edges, mean, nothing, nothing, ranks)

@@ -205,9 +205,9 @@ class DynamicModel(Model):
         failure: str = "",
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
-        states = loop_array(states)
-        run = Run(Output.of(times, states, np.asarray(counts)), seconds, failure)
-        return self.recorded(None, run, loop_array(inputs), states)
+        states, inputs = loop_array(states), loop_array(inputs)
+        run = Run(Output.of(times, states, np.asarray(counts), inputs), seconds, failure)
+        return self.recorded(None, run, inputs, states)
 
     def recorded(
         self,
@@ -223,10 +223,9 @@ class DynamicModel(Model):
         recorded, those of the model and what may follow them.  Where outputs are named, these alone
         are computed; else all can be read.
         """
-        remark = "" if maneuver is None else cut_short(maneuver)
         recorder, times, n = self.recorder, run.output.samples, len(self.definition.states)
         rows, samples = run.rows, run.output.point_of_sample
-        whole = states, run.inputs_at_rows(inputs), samples
+        whole = states, run.inputs, samples
         points = whole[0][:rows], whole[1][:rows], samples
         first = recorder.first_outside(whole, rows, run.cached_loops)
         limited, message, end = len(recorder.limited), run.failure, len(times)
@@ -246,8 +245,7 @@ class DynamicModel(Model):
                 message = left_validity(self.definition, name, ended[0], times[left])
                 status = "diverged"
         remarks = wheel_remarks(self.definition, first[limited:], times)
-        if remark:
-            remarks.append(remark)
+        remarks.append("" if maneuver is None else cut_short(maneuver))
         fields = {
             "times": times,
             "inputs": inputs,
@@ -255,7 +253,7 @@ class DynamicModel(Model):
             "seconds": run.seconds,
             "status": status,
             "message": message,
-            "remark": "; ".join(remarks),
+            "remark": "; ".join(filter(None, remarks)),
             "names": self.outputs,
             "model": self,
             "maneuver": "" if maneuver is None else maneuver.name,

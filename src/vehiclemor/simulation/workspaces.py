@@ -108,11 +108,8 @@ class Run:
         """States (samples, dim) at the output times, or at points, see `loop_arguments.Output`."""
         return self.output.states[: self.rows]
 
-    def inputs_at_rows(self, inputs: np.ndarray) -> np.ndarray:
-        """Inputs of its rows, or of more; those at the samples are given.
-
-        In a workspace that serves further runs their address stays the same.
-        """
-        if len(self.output.point_of_sample):
-            return self.output.point_inputs
-        return self.output.sample_inputs if len(self.output.sample_inputs) else inputs
+    @property
+    def inputs(self) -> np.ndarray:
+        """Inputs of its rows, or of more; their address stays the same in a workspace."""
+        output = self.output
+        return output.point_inputs if len(output.point_of_sample) else output.sample_inputs

@@ -104,14 +104,14 @@ class Decoding(ShortRepr):
         sizes = self.features.states + PLANAR, self.features.inputs, self._results
         return at_samples(kernels, "full_state", constants, (path, inputs), sizes)
 
-    def of_run(self, run: Run, inputs: np.ndarray) -> np.ndarray:
+    def of_run(self, run: Run) -> np.ndarray:
         """As of `states`, results where a run is recorded: its first `run.rows` rows.
 
-        `inputs` are those at the samples.  The array belongs to the run.
+        The array belongs to the run.
         """
         space = run.cached_loops.get("decoded")
         if space is None:
-            space = self._space(run.output.states, run.inputs_at_rows(inputs), run.rows)
+            space = self._space(run.output.states, run.inputs, run.rows)
             run.cached_loops["decoded"] = space
         for index in space.counts:
             space.call.words[index] = run.rows
@@ -259,7 +259,7 @@ class ReducedVehicle(ReducedSystem):
         inputs = maneuver.recorded_inputs[1]
         state, encoded = self.known(start, inputs[0])
         run = self.run(maneuver, encoded, record_all_until=0.0)
-        states = self.decoder.of_run(run, inputs)
+        states = self.decoder.of_run(run)
         samples = run.output.point_of_sample
         if not len(samples) or samples[0, 1] < 0.0:
             # The start is known better than its slow part.
