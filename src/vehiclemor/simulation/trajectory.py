@@ -200,11 +200,9 @@ class Trajectory(ShortRepr):
             for group in reversed(groups)
             for column, name in enumerate(groups[group])
         }
-        for name in names:
-            choice("quantity", name, columns)
         histories = []
         for name in names:
-            group, column = columns[name]
+            group, column = columns[choice("quantity", name, columns)]
             histories.append(getattr(self, group)[:, column])
         return np.stack(histories, 1)
 

@@ -7,15 +7,19 @@ import numpy as np
 import pytest
 
 from tests.unit.standard_problems import driven, maneuver
-from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, explicit
+from vehiclemor.simulation.integrators.catalogue import INTEGRATORS, Integrator
 from vehiclemor.simulation.integrators.dopri5 import TABLE
-from vehiclemor.simulation.integrators.explicit_pair import pair_table
+from vehiclemor.simulation.integrators.explicit_pair import pair_table, scratch_rows
+from vehiclemor.simulation.loop_arguments import Control
 
 WEIGHTS = ((1 / 2,), (0.0, 3 / 4), (2 / 9, 1 / 3, 4 / 9))
 ERROR = (2 / 9 - 7 / 24, 1 / 3 - 1 / 4, 4 / 9 - 1 / 3, -1 / 8)
 PAIRS = {
-    "bogacki_shampine": explicit("Bogacki-Shampine 3(2)", 3, pair_table(WEIGHTS, ERROR)),
-    "table": explicit("dopri5 by its table", 5, TABLE, INTEGRATORS["dopri5"].control),
+    name: Integrator("", ("explicit_pair",), order, control, scratch_rows(table), tableau=table)
+    for name, order, control, table in (
+        ("bogacki_shampine", 3, Control(1 / 3, 1 / 3), pair_table(WEIGHTS, ERROR)),
+        ("table", 5, INTEGRATORS["dopri5"].control, TABLE),
+    )
 }
 DRIVEN = maneuver(driven, 8.0)
 
