@@ -175,7 +175,7 @@ class AlgebraicModel(Model):
 
     def _buffer(self) -> np.ndarray:
         n = len(self.coordinates)
-        return np.empty(n * (n + 4) + 3 * len(self.inputs))
+        return np.empty(n * (n + 4) + 2 * len(self.inputs))
 
     def simulate(
         self,

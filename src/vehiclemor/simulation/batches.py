@@ -103,7 +103,7 @@ def simulate_many(
     from joblib import cpu_count
 
     given, full, driven = _driven(model, signals)
-    runs, names = _count_of(driven, full), _names(full, outputs)
+    runs, names = len(driven), _names(full, outputs)
     kept, rows = _kept_times(times, driven)
     begins = _starts_of(starts, runs, full)
     model_of = _models(given, full, parameters, runs)
@@ -130,17 +130,23 @@ def simulate_many(
     return dataset.assign_attrs(_about(given, full, driven))
 
 
-def _driven(model: Any, signals: Any) -> tuple[Any, Model, Any]:
+def _driven(model: Any, signals: Any) -> tuple[Any, Model, Sequence[Excitation]]:
     """What is to run, its full model and what drives it, all inputs of which a full one has."""
-    if isinstance(signals, list | tuple):
-        signals = [registered(each) if isinstance(each, str) else each for each in signals]
     given = build(model) if isinstance(model, str) else model
     full = getattr(given, "model", given)
     if not isinstance(full, Model):
         raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
-    is_list = isinstance(signals, Sequence) and all(isinstance(s, Excitation) for s in signals)
-    if given is full and is_list:
+    if isinstance(signals, Excitation) or not isinstance(signals, Sequence) or not len(signals):
+        raise InputError(f"signals is {quoted(signals)}, not a list with a signal for each run")
+    if isinstance(signals, list | tuple):
+        signals = [registered(each) if isinstance(each, str) else each for each in signals]
+    for run, signal in enumerate(signals):
+        if not isinstance(signal, Excitation):
+            raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
+    if given is full:
         given = full = full.driving([name for signal in signals for name in signal.inputs])
+    for signal in signals:
+        completed(signal, full.definition)
     return given, full, signals
 
 
@@ -183,17 +189,6 @@ def _whole_run(model: Any, signal: Excitation, start: Start, how: Mapping[str, A
         if error.trajectory is None:
             raise
         return error.trajectory
-
-
-def _count_of(signals: Any, model: Model) -> int:
-    """Number of runs; `InputError` if something else than inputs of the model is given."""
-    if isinstance(signals, Excitation) or not isinstance(signals, Sequence) or not len(signals):
-        raise InputError(f"signals is {quoted(signals)}, not a list with a signal for each run")
-    for run, signal in enumerate(signals):
-        if not isinstance(signal, Excitation):
-            raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
-        completed(signal, model.definition)
-    return len(signals)
 
 
 def _names(model: Model, outputs: Names) -> tuple[str, ...]:

@@ -245,7 +245,8 @@ class DynamicModel(Model):
                 message = left_validity(self.definition, name, ended[0], times[left])
                 status = "diverged"
         remarks = wheel_remarks(self.definition, first[limited:], times)
-        remarks.append("" if maneuver is None else cut_short(maneuver))
+        if maneuver is not None:
+            remarks.append(cut_short(maneuver))
         fields = {
             "times": times,
             "inputs": inputs,

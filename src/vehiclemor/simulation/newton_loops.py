@@ -235,12 +235,11 @@ def newton_path(
     method does not contract, the sample is approached from the design position instead.
     """
     path, counts = solution.path, solution.counts
-    q, u, previous, target, work = scratch(mechanism.start, inputs.shape[1], buffer)
+    q, u, previous, work = scratch(mechanism.start, inputs.shape[1], buffer)
     iterations = 0
     for sample in range(len(inputs)):
         counts[SAMPLE] = sample
-        for i in range(len(u)):
-            target[i] = inputs[sample, i]
+        target = inputs[sample]
         substeps = increments(previous, target, iteration.largest_increment)
         for substep in range(1, substeps + 1):
             for i in range(len(u)):
@@ -255,8 +254,7 @@ def newton_path(
                 break
         if not within(q, mechanism.stops):
             return stopped(counts, iterations, OFF_BRANCH)
-        for i in range(len(u)):
-            previous[i] = target[i]
+        previous = target
         for i in range(len(q)):
             path[sample, i] = q[i]
     return stopped(counts, iterations, CONVERGED)
@@ -266,7 +264,7 @@ def travel_limit(
     mechanism: Mechanism, target: Vector, iteration: Iteration, reached: Vector, buffer: Vector
 ) -> Int:
     """How far the branch goes to a target, see `approach`; `reached` are the inputs at its end."""
-    q, u, _, _, work = scratch(mechanism.start, len(target), buffer)
+    q, u, _, work = scratch(mechanism.start, len(target), buffer)
     approach(q, u, target, mechanism, iteration, work)
     for i in range(len(u)):
         reached[i] = u[i]
@@ -274,7 +272,7 @@ def travel_limit(
 
 
 def scratch(start, inputs, buffer):
-    """Coordinates; inputs now, at the previous sample and at the next; scratch space of Newton.
+    """Coordinates; inputs now and at the previous sample; scratch space of Newton.
 
     They are parts of the buffer.  Coordinates and inputs are those of the design position.
     """
@@ -283,12 +281,11 @@ def scratch(start, inputs, buffer):
     full = matrix(buffer, 3 * n, n, n + 1)
     first = 3 * n + n * (n + 1)
     u, previous = vector(buffer, first, inputs), vector(buffer, first + inputs, inputs)
-    target = vector(buffer, first + 2 * inputs, inputs)
     for i in range(n):
         q[i] = start[i]
     for i in range(inputs):
         u[i], previous[i] = 0.0, 0.0
-    return q, u, previous, target, Work(step, saved, full)
+    return q, u, previous, Work(step, saved, full)
 
 
 def same_side(q, u, mechanism, full):

@@ -44,7 +44,7 @@ class Recorder:
     def first_outside(self, points: Points, rows: int, cached_loops: dict[str, Any]) -> list[int]:
         """The first sample at which each watched output is out of its limits; else all samples.
 
-        As many rows of the points are recorded.
+        So many `rows` of the points are recorded.
         """
         states, held = points[0], cached_loops.get("watched")
         if held is None or held[0] is not states:
@@ -129,9 +129,10 @@ class Recording:
         """The same at some of the samples."""
         states, inputs, samples = self._points
         if len(samples):
-            part = Recording(self._recorder, (states, inputs, samples[rows]))
+            samples = samples[rows]
         else:
-            part = Recording(self._recorder, (states[rows], inputs[rows], samples))
+            states, inputs = states[rows], inputs[rows]
+        part = Recording(self._recorder, (states, inputs, samples))
         part.end = int(np.searchsorted(rows, self.end))
         return part
 

@@ -6,6 +6,7 @@ kind.  It belongs to one run at a time, in whichever thread: lists are popped an
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -26,23 +27,20 @@ class Pool(Generic[Item]):
     """What no run holds at present, by what all runs of a kind share."""
 
     def __init__(self) -> None:
-        self._spare: dict[Hashable, list[Item]] = {}
+        self._spare: dict[Hashable, list[Item]] = defaultdict(list)
 
     def taken(self, kind: Hashable, make: Callable[[], Item]) -> Item:
         """One of that kind, a new one if none is left."""
         try:
             return self._spare[kind].pop()
-        except (KeyError, IndexError):
+        except IndexError:
             return make()
 
     def give_back(self, kind: Hashable, held: Item) -> None:
         """Leave it to the next run."""
-        spare = self._spare.get(kind)
-        if spare is None:
-            if len(self._spare) >= MOST_KINDS:
-                self._spare.clear()
-            spare = self._spare.setdefault(kind, [])
-        spare.append(held)
+        if len(self._spare) > MOST_KINDS:
+            self._spare.clear()
+        self._spare[kind].append(held)
 
 
 class Solver(NamedTuple):
