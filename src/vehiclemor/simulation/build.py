@@ -25,7 +25,6 @@ from vehiclemor.multibody.quantities import DEFAULTS
 from vehiclemor.parameters import (
     ParameterSet,
     load_parameters,
-    overridden,
     parameter_path,
     with_entries,
 )
@@ -75,26 +74,21 @@ def build(
 
 def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
     """The model with some of its parameters changed: name -> value in SI units; see `build`."""
-    definition = with_overrides(model.definition, overrides)
-    if definition is not model.definition:
-        return _with_definition(model, definition, overrides)
-    parameters = overridden(model.parameters, definition.parameters, overrides)
-    return _made(definition, parameters, (model.equations, model.kernel_hash))
+    return _changed(model, with_overrides(model.definition, overrides), overrides)
 
 
 @lru_cache(maxsize=64)
 def _rebuilt(model: Model, definition: ModelDefinition) -> Model:
     """The model with the inputs of another declaration of it."""
-    return _with_definition(model, definition)
+    return _changed(model, definition, {})
 
 
-def _with_definition(
-    model: Model, definition: ModelDefinition, overrides: Mapping[str, object] | None = None
-) -> Model:
-    """A model with the same parameters, but for what another choice of inputs adds or drops."""
-    parameters = with_entries(model.parameters, definition.parameters, overrides or {})
+def _changed(model: Model, definition: ModelDefinition, overrides: Mapping[str, object]) -> Model:
+    """A model with other values, and what another choice of inputs adds or drops."""
+    parameters = with_entries(model.parameters, definition.parameters, overrides)
+    same = definition is model.definition
     with first_use(model.name):
-        return _made(definition, parameters)
+        return _made(definition, parameters, (model.equations, model.kernel_hash) if same else None)
 
 
 def _made(
