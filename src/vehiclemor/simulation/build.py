@@ -22,12 +22,7 @@ from vehiclemor.multibody.definition import (
     with_overrides,
 )
 from vehiclemor.multibody.quantities import DEFAULTS
-from vehiclemor.parameters import (
-    ParameterSet,
-    load_parameters,
-    parameter_path,
-    with_entries,
-)
+from vehiclemor.parameters import ParameterSet, load_parameters, parameter_path, with_entries
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array

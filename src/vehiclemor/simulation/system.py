@@ -212,12 +212,7 @@ class System(ShortRepr):
         return self.packed(windows, solver, maneuver.packed_pieces, spans, output)
 
     def packed(
-        self,
-        windows: ControlPeriods,
-        solver: Solver,
-        signal: Ready,
-        spans: Ready,
-        output: Output,
+        self, windows: ControlPeriods, solver: Solver, signal: Ready, spans: Ready, output: Output
     ) -> Workspace:
         """The time loop with all its arguments, see `integrators/loop.integrate`."""
         name, chosen = solver.name, catalogue.integrator(solver.name)
