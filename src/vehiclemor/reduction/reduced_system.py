@@ -15,14 +15,7 @@ from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
-from vehiclemor.simulation.evaluation import (
-    CONSTANTS,
-    INPUTS,
-    PLACES,
-    STATE,
-    By,
-    parameter_names,
-)
+from vehiclemor.simulation.evaluation import CONSTANTS, INPUTS, PLACES, STATE, By, parameter_names
 from vehiclemor.simulation.stepping import Sensitivity, SteppedSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Run, Solver

@@ -26,12 +26,7 @@ from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.evaluation import PLACES, By, parameter_names, partial
-from vehiclemor.simulation.structures.model import (
-    FIRST_STEP,
-    REASONS,
-    USUAL,
-    StructuralModel,
-)
+from vehiclemor.simulation.structures.model import FIRST_STEP, REASONS, USUAL, StructuralModel
 from vehiclemor.simulation.structures.system import StructuralSystem, factored
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
