@@ -6,22 +6,19 @@ Constants are hoisted from the equations: they follow from the parameters alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.derivatives import jacobian_product
-from vehiclemor.codegen.kernels import Kernels
+from vehiclemor.codegen.kernels import Derivation, Kernels
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.exceptions import InputError
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import checked_path
-
-if TYPE_CHECKING:
-    from vehiclemor.codegen.kernels import Derivation
-    from vehiclemor.multibody.definition import ModelDefinition
 
 PATH_LOOPS = ("simulation.loop_arguments", "simulation.path_loops")
 # Places of the arguments of a kernel.
