@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import check_shapes, quoted, real_array
+from vehiclemor.arguments import check_shapes, quoted
 from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.excitation import checked_times
 from vehiclemor.multibody.definition import STATE_KINDS, ModelDefinition
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
@@ -295,14 +296,9 @@ def sample_rows(times: Any, known: np.ndarray) -> np.ndarray:
 
     `InputError` if the times don't increase, or one of them is no output time.
     """
-    try:
-        wanted = np.atleast_1d(real_array(times))
-    except (TypeError, ValueError):
-        raise InputError(f"times is {quoted(times)}, no list of times in s") from None
-    if wanted.ndim != 1 or not len(wanted) or not np.isfinite(wanted).all():
-        raise InputError("times must be a list of finite times in s")
-    if (np.diff(wanted) <= SAME_TIME).any():
-        raise InputError("times must increase")
+    wanted = checked_times(times if np.iterable(times) else [times])
+    if not len(wanted) or (np.diff(wanted) <= SAME_TIME).any():
+        raise InputError("times must be one or more, and increase")
     rows = np.minimum(np.searchsorted(known, wanted - SAME_TIME), len(known) - 1)
     missed = abs(known[rows] - wanted) > SAME_TIME
     if missed.any():
