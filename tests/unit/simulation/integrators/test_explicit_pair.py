@@ -15,18 +15,17 @@ from vehiclemor.simulation.loop_arguments import Control
 WEIGHTS = ((1 / 2,), (0.0, 3 / 4), (2 / 9, 1 / 3, 4 / 9))
 ERROR = (2 / 9 - 7 / 24, 1 / 3 - 1 / 4, 4 / 9 - 1 / 3, -1 / 8)
 PAIRS = {
-    name: Integrator("", ("explicit_pair",), order, control, scratch_rows(table), tableau=table)
-    for name, order, control, table in (
-        ("bogacki_shampine", 3, Control(1 / 3, 1 / 3), pair_table(WEIGHTS, ERROR)),
-        ("table", 5, INTEGRATORS["dopri5"].control, TABLE),
-    )
+    "bogacki_shampine": (3, Control(1 / 3, 1 / 3), pair_table(WEIGHTS, ERROR)),
+    "table": (5, INTEGRATORS["dopri5"].control, TABLE),
 }
 DRIVEN = maneuver(driven, 8.0)
 
 
 @pytest.fixture(autouse=True)
 def registered(monkeypatch):
-    for name, pair in PAIRS.items():
+    for name, (order, control, table) in PAIRS.items():
+        rows = scratch_rows(table)
+        pair = Integrator("", ("explicit_pair",), order, control, rows, tableau=table)
         monkeypatch.setitem(INTEGRATORS, name, pair)
 
 
