@@ -103,7 +103,9 @@ def simulate_many(
     from joblib import cpu_count
 
     given, full, driven = _driven(model, signals)
-    runs, names = len(driven), _names(full, outputs)
+    runs, names = len(driven), full.outputs if outputs is None else output_names(outputs)
+    for name in names:
+        choice("output", name, (*full.outputs, *full.definition.states))
     kept, rows = _kept_times(times, driven)
     begins = _starts_of(starts, runs, full)
     model_of = _models(given, full, parameters, runs)
@@ -189,13 +191,6 @@ def _whole_run(model: Any, signal: Excitation, start: Start, how: Mapping[str, A
         if error.trajectory is None:
             raise
         return error.trajectory
-
-
-def _names(model: Model, outputs: Names) -> tuple[str, ...]:
-    """Names of what is kept; `InputError` if the model has no such quantity."""
-    known = *model.outputs, *model.definition.states
-    names = model.outputs if outputs is None else output_names(outputs)
-    return tuple(choice("output", name, known) for name in names)
 
 
 def _kept_times(
