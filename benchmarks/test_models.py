@@ -85,7 +85,7 @@ def test_kernel_from_python(benchmark, kernel):
     model, _, _ = nominal(SUSPENSION)
     result = np.empty(model.equations.shapes[kernel])
     q, u = model.solve([0.05, 0.0]), np.array([0.05, 0.0])
-    benchmark(model.equations.kernels.call, kernel, q, u, model.constants, result)
+    benchmark(model.equations.call, kernel, q, u, model.constants, result)
     benchmark.extra_info["operations"] = model.operation_counts[kernel]["total"]
     assert np.isfinite(result).all()
 

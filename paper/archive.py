@@ -12,7 +12,7 @@ from pathlib import Path
 
 import vehiclemor
 from vehiclemor.netcdf_file import read_dataset, write_dataset
-from vehiclemor.report.frames import frame
+from vehiclemor.report.results import frame
 
 README = """vehiclemor {version}: stored results of all studies
 
@@ -33,7 +33,7 @@ with xarray: xr.open_dataset("studies/figure-11.nc").  The program that made the
 
 def compressed(path: Path, target: Path, tables: Path) -> dict[str, str]:
     """Write a dataset and its table; gives what the dataset tells of its making."""
-    data = read_dataset(path, "source", "vehiclemor")
+    data = read_dataset(path)
     for variable in data.variables.values():
         numbers = variable.dtype.kind in "fiub" and variable.ndim
         variable.encoding = {"zlib": True, "complevel": 9, "shuffle": True} if numbers else {}

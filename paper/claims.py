@@ -26,21 +26,26 @@ from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
 from vehiclemor.registry import component
 from vehiclemor.report.comparison import PAPER, at_published_start
-from vehiclemor.report.findings import INDISTINGUISHABLE, VERDICTS, at_point, judged
 from vehiclemor.report.labels import Column
-from vehiclemor.report.printed_numbers import (
+from vehiclemor.report.printing import Table
+from vehiclemor.report.published import (
+    INDISTINGUISHABLE,
     TIMING,
     VARIANTS,
+    VERDICTS,
     Finding,
+    Model,
+    Printed,
     Results,
     case_of,
     judge_rms_error,
+    judged,
+    load_published,
     printed_errors_and_savings,
     time_saved,
     timing_scatter,
 )
-from vehiclemor.report.printing import Table
-from vehiclemor.report.published import Model, Printed, load_published
+from vehiclemor.report.results import at_point
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build
 from vehiclemor.study.plans.loading import load_studies
@@ -127,6 +132,19 @@ def criterion(
     return register
 
 
+def below(value: float, bound: float, *, valid: bool = True, **about: Any) -> Finding:
+    """A value that must stay below its bound; a run that has failed is not `valid`.
+
+    `about` are further fields.
+    """
+    return Finding(value, bound, valid and value < bound, **about)
+
+
+def above(value: float, bound: float, *, valid: bool = True, **about: Any) -> Finding:
+    """As `below`, of a value that must exceed its bound."""
+    return Finding(value, bound, valid and value > bound, **about)
+
+
 def claims() -> dict[str, Claim]:
     """Id -> claim, in the order of the file."""
     return {claim.id: claim for claim in read_toml(FILE, ClaimFile).claim}
@@ -163,7 +181,7 @@ def not_visible(point: xr.Dataset, outputs: tuple[str, ...], bound: float = VISI
     status = str(point["status"].item())
     seen = f"of {where}" if status == "ok" else f"{status}: {point['message'].item()}"
     text = "largest deviation of an output, as a share of its range"
-    return Finding.below(worst, bound, measure=text, reason=seen, valid=status == "ok")
+    return below(worst, bound, measure=text, reason=seen, valid=status == "ok")
 
 
 def worst_of(values: Mapping[str, float]) -> tuple[float, str]:
@@ -201,7 +219,7 @@ def three_states_suffice(results: Results, label: str) -> Finding:
     shares = chosen["floor_rms_error"] / chosen["signal_range"]
     worst, where = worst_of({output: float(shares.sel(output=output)) for output in OUTPUTS})
     text = "RMS error of the best approximation of an output, as a share of its range"
-    return Finding.below(worst, VISIBLE, measure=text, reason=f"of {where}")
+    return below(worst, VISIBLE, measure=text, reason=f"of {where}")
 
 
 @criterion("gv_control_periods_sharpen_basis")
@@ -216,7 +234,7 @@ def shorter_periods_sharpen_basis(results: Results, label: str) -> Finding:
         "worse of pitch and yaw"
     )
     better = f"the better: {float(ratios.min()):.2g}"
-    return Finding.below(worst, bound, measure=text, reason=better)
+    return below(worst, bound, measure=text, reason=better)
 
 
 @criterion("gv_longer_period_saves_time", bound=1.0 - SUBSTANTIAL)
@@ -232,7 +250,7 @@ def longer_periods_save_time(results: Results, label: str, bound: float) -> Find
     seen = f"the yaw error grows {float(ratio['rms_error']):.2g} times"
     if not finished:
         seen = "a run diverges"
-    return Finding.below(calls, bound, measure=text, reason=seen, valid=finished)
+    return below(calls, bound, measure=text, reason=seen, valid=finished)
 
 
 # The suspension.
@@ -248,7 +266,7 @@ def angle_diverges_at_end(results: Results, label: str) -> Finding:
     before = float(error.sel(time=slice(0.0, end)).max())
     text = "largest deviation of the angle, as a share of its range"
     seen = f"at t = {moment:.2f} s; before {end:g} s it stays below {before:.2g}"
-    return Finding.above(largest, VISIBLE, measure=text, reason=seen, valid=moment > end)
+    return above(largest, VISIBLE, measure=text, reason=seen, valid=moment > end)
 
 
 @criterion("dw_fig11_shorter_period_reduces_deviation")
@@ -263,7 +281,7 @@ def shorter_period_reduces_deviation(results: Results, label: str) -> Finding:
     value, bound = float(errors[PERIOD]), 1.0 - SMALLEST_CHANGE
     text = f"RMS error of the angle with {PERIOD:g} s as a multiple of that with 5 s"
     seen = f"{others}; iterations: {iterations}"
-    return Finding.below(value, bound, measure=text, reason=seen)
+    return below(value, bound, measure=text, reason=seen)
 
 
 @criterion("dw_fig12_basis_insensitive_to_amplitude", OF_SUBSPACES)
@@ -281,7 +299,7 @@ def basis_insensitive_to_amplitude(*_: object) -> Finding:
         "at the larger amplitude"
     )
     seen = f"for frequency +20 % it is {angle(1.2, 1.0):.2g}"
-    return Finding.below(largest, SIMILAR_SUBSPACES, measure=text, reason=seen)
+    return below(largest, SIMILAR_SUBSPACES, measure=text, reason=seen)
 
 
 def trained(frequency: float, amplitude: float) -> AlgebraicProjection:
@@ -312,7 +330,7 @@ def not_monotone(results: Results, label: str, quantity: str) -> Finding:
     largest = max(falls.values())
     text = "largest fall of an RMS error over a step away from the nominal input, as a share of it"
     seen = f"displacement {falls[DISPLACEMENT]:.2g}, angle {falls[ANGLE]:.2g}"
-    return Finding.above(largest, SMALLEST_CHANGE, measure=text, reason=seen)
+    return above(largest, SMALLEST_CHANGE, measure=text, reason=seen)
 
 
 def _relative(results: Results, label: str) -> list[xr.DataArray]:
@@ -334,7 +352,7 @@ def angle_more_sensitive(results: Results, label: str) -> Finding:
     text = (
         "share of perturbations at which the angle's RMS error / range exceeds the displacement's"
     )
-    return Finding.above(share, 0.5, measure=text)
+    return above(share, 0.5, measure=text)
 
 
 @criterion("dw_more_robust_to_amplitude")
@@ -344,7 +362,7 @@ def more_robust_to_amplitude(results: Results, label: str) -> Finding:
     smaller = (amplitude < frequency)[{"factor": amplitude["factor"].values != 1.0}]
     share = float(smaller.mean())
     text = "share of the pairs of equal perturbations at which amplitude hurts less"
-    return Finding.above(share, 0.5, measure=text, reason=f"{smaller.size} pairs")
+    return above(share, 0.5, measure=text, reason=f"{smaller.size} pairs")
 
 
 @criterion("dw_fig14_three_states_fail", measure=DEVIATION)
@@ -352,7 +370,7 @@ def more_robust_to_amplitude(results: Results, label: str) -> Finding:
 def leaves_full_model(results: Results, label: str, measure: str) -> Finding:
     """Figure 14: at frequency +100 % the angle deviates visibly with r = 3."""
     largest = largest_deviation(at_point(results["figure-14"], label, rank=3), ANGLE)
-    return Finding.above(largest, VISIBLE, measure=measure)
+    return above(largest, VISIBLE, measure=measure)
 
 
 @criterion("dw_fig14_dropped_modes_excited", OF_SUBSPACES)
@@ -369,7 +387,7 @@ def dropped_modes_excited(*_: object) -> Finding:
     share, more = 1.0 - left_out[1], left_out[1] / left_out[0]
     text = "share of the energy of the run at twice the frequency that three modes hold"
     seen = f"they leave out {left_out[1]:.2g} of it, {more:.2g} times as much as of the nominal run"
-    return Finding.below(share, 0.5, measure=text, reason=seen)
+    return below(share, 0.5, measure=text, reason=seen)
 
 
 @criterion("dw_fig14_six_states_follow", UNCUT)
@@ -390,7 +408,7 @@ def six_states_follow(results: Results, label: str) -> Finding:
     seen = f"least {six.min():.2g}; r = 4: {four.max():.2g}"
     if diverged:
         seen = f"{diverged} of {len(six)} diverged"
-    return Finding.below(worst, VISIBLE, measure=text, reason=seen)
+    return below(worst, VISIBLE, measure=text, reason=seen)
 
 
 # All three models.
@@ -420,7 +438,7 @@ def precisely_followed(results: Results, label: str) -> Finding:
     text = "largest deviation of an output in any nominal run, as a share of its range"
     seen = f"{study}: {findings[study].reason}"
     valid = all(finding.within for finding in findings.values())
-    return Finding.below(worst, VISIBLE, measure=text, reason=seen, valid=valid)
+    return below(worst, VISIBLE, measure=text, reason=seen, valid=valid)
 
 
 # Times.
@@ -430,7 +448,7 @@ def precisely_followed(results: Results, label: str) -> Finding:
 def six_slower(results: Results, label: str) -> Finding:
     """Figure 14: six states take more time than three, but less than the full model."""
     timing = results[TIMING["double_wishbone"]]
-    numbers = load_published().numbers
+    numbers = load_published()
     few, many = (case_of(numbers[f"dw_time_reduction_{n}"], label) for n in (3, 6))
     row = timing.sel(case=many)
     slower = float(row["seconds"] / timing["seconds"].sel(case=few))

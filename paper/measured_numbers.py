@@ -36,7 +36,7 @@ from numbers_by_name import FILE, load, names_in, render
 
 from vehiclemor.files import write_text
 from vehiclemor.registry import component, names
-from vehiclemor.report.printed_numbers import TIMING
+from vehiclemor.report.published import TIMING
 
 ROOT = FILE.parents[1]
 # Last part of a name -> its unit; an error has that of its output.

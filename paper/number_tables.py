@@ -18,9 +18,8 @@ from mesh_sizes import size_rows
 
 import vehiclemor as vm
 from vehiclemor.registry import names
-from vehiclemor.report.frames import frame
-from vehiclemor.report.printed_numbers import number_rows
-from vehiclemor.report.published import load_published, rms_numbers
+from vehiclemor.report.published import load_published, number_rows, rms_numbers
+from vehiclemor.report.results import frame
 from vehiclemor.report.unseen import count_rows, protocol_rows
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
@@ -136,7 +135,7 @@ def perturbed(prefix: str, dataset: xr.Dataset) -> Iterator[Entry]:
 
 def spread(prefix: str, dataset: xr.Dataset) -> Iterator[Entry]:
     """Number of runs, smallest and largest errors, by method and rank."""
-    table: Frame = frame(dataset, ["status", "rms_error"])
+    table: Frame = frame(dataset[["status", "rms_error"]])
     table["rank"] = "r" + table["rank"].astype(str)
     several_ranks = dataset.sizes.get("rank", 1) > 1
     groups = table.groupby(["label", "rank"] if several_ranks else ["label"])
@@ -161,7 +160,7 @@ def settings(model: str, dataset: xr.Dataset) -> Iterator[Entry]:
     """Formulations and inner products, from both starts, at the default number of snapshots."""
     head, pair = f"settings.{model}", ["formulation", "inner_product"]
     wanted = ["status", "growth_rate", "rms_error", "rhs_calls"]
-    table: Frame = frame(dataset.sel(label=["pod"]), wanted)
+    table: Frame = frame(dataset.sel(label=["pod"])[wanted])
     table["failed"], table["runs"] = table["status"] != "ok", 1
     yield from cells(head, table.groupby(pair)[["runs", "failed"]].sum())
     growth = {"growth_rate": "growth_largest"}
@@ -218,7 +217,7 @@ def comparison(results: Path) -> Iterator[Entry]:
 
 def published() -> Iterator[Entry]:
     """What the paper prints."""
-    for key, number in load_published().numbers.items():
+    for key, number in load_published().items():
         yield slug("published", key), number.value, number.unit
 
 

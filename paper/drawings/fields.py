@@ -11,7 +11,7 @@ from mesh_sizes import FULL, KINDS, growth, size_rows
 from drawings import look
 from vehiclemor.report.figures.theme import THIN, Style, panels, tick_decades
 from vehiclemor.report.labels import declared, raised
-from vehiclemor.report.unseen import method_rows, protocol_of
+from vehiclemor.report.unseen import method_rows
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 MODELS = {
@@ -30,7 +30,7 @@ def figure_pareto(results: look.Results) -> Figure:
         for study in (f"contenders-{model}", f"predictive-{model}"):
             data = results[study]
             # Times of the protocol's study count where both have a row.
-            for row in method_rows(data, protocol_of(data)):
+            for row in method_rows(data):
                 methods[row["method"], row["label"]] = row
         rows = [r for r in methods.values() if r["seconds"] > 0.0 and np.isfinite(r["score"])]
         full = _least((r["score"], r["seconds"]) for r in rows if r["role"] == FULL_ORDER)

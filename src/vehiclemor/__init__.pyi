@@ -22,9 +22,9 @@ from .reduction.reduced_model import load as load
 from .reduction.reduced_model import rom as rom
 from .report.comparison import compare as compare
 from .report.figures.animation import animate as animate
-from .report.figures.catalogue import figures as figures
-from .report.frames import convert as convert
+from .report.figures.result_plot import figures as figures
 from .report.page import write_report as write_report
+from .report.results import convert as convert
 from .simulation.batches import simulate_many as simulate_many
 from .study.outside_methods import dataset as dataset
 from .study.outside_methods import judge as judge

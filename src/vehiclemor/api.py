@@ -380,7 +380,7 @@ def plot(
     import xarray as xr
 
     from vehiclemor.report.figures.result_plot import plot_result
-    from vehiclemor.report.result_selection import dataset_of, select_point, stored_result
+    from vehiclemor.report.results import dataset_of, select_point, stored_result
     from vehiclemor.simulation.trajectory import Trajectory
 
     if isinstance(result, str | Path):

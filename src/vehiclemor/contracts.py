@@ -11,7 +11,7 @@ import numpy as np
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.multibody.definition import STATE_KINDS, ModelDefinition
+from vehiclemor.multibody.definition import STATE_KINDS
 from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import checked_run, fitted, validated
@@ -20,15 +20,7 @@ from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.build import build, check_equations
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.structures.model import StructuralModel, wrong_matrices
-from vehiclemor.simulation.trajectory import FINISHED
-
-
-def _definition(name: str) -> ModelDefinition:
-    return component("model", name)
-
-
-def _nominal(model: Model) -> Excitation:
-    return component("maneuver", _definition(model.name).maneuver)
+from vehiclemor.simulation.trajectory import FINISHED, Trajectory
 
 
 def check_model(name: str) -> None:
@@ -38,7 +30,7 @@ def check_model(name: str) -> None:
     dynamic model has finite derivatives; a structure has symmetric matrices of fitting sizes and
     stands, and the derivatives of its port forces are theirs.
     """
-    model, definition = build(name), _definition(name)
+    model, definition = build(name), component("model", name)
     for kind in (*STATE_KINDS, "inputs", "outputs", "ports"):
         quantities = getattr(definition, kind)
         assert all(q.unit and q.long_name for q in quantities), f"{name}: unit or meaning missing"
@@ -47,7 +39,7 @@ def check_model(name: str) -> None:
     except InputError as error:
         raise AssertionError(str(error)) from None
     assert model.evaluations in model.counts, f"{name}: {model.evaluations} is not counted"
-    maneuver = _nominal(model)
+    maneuver = component("maneuver", definition.maneuver)
     inputs = tuple(quantity.name for quantity in definition.inputs)
     assert maneuver.inputs == inputs, f"{name}: its maneuver gives other inputs"
     if isinstance(model, AlgebraicModel):
@@ -60,8 +52,7 @@ def check_model(name: str) -> None:
 
 def _check_algebraic(model: AlgebraicModel, maneuver: Excitation) -> None:
     name = model.name
-    trajectory = model.simulate(maneuver)
-    assert np.isfinite(trajectory.coordinates).all(), f"{name}: coordinates are not finite"
+    trajectory = _finite_run(model, maneuver)
     q, u = trajectory.coordinates[len(trajectory.times) // 3], trajectory.inputs[0]
     jacobian, step = model.jacobian(q, u), 1e-6
     # Residuals and their rounding errors are as large as the Jacobian.
@@ -79,34 +70,30 @@ def _check_algebraic(model: AlgebraicModel, maneuver: Excitation) -> None:
 
 
 def _check_dynamic(model: Any, maneuver: Excitation) -> None:
-    name = model.name
-    size = len(model.definition.states)
     u = maneuver.at(maneuver.times)[0]
     for start in model.starts:
         derivative = model.rhs(model.start(start), u)
-        assert derivative.shape == (size,), f"{name}: the derivative has a wrong shape"
-        assert np.isfinite(derivative).all(), f"{name}: derivative at {start!r} is not finite"
-    trajectory = model.simulate(maneuver)
-    assert trajectory.status == "ok", f"{name}: the nominal run is {trajectory.status}"
-    assert trajectory.states.shape == (len(trajectory.times), size), (
-        f"{name}: wrong shape of states"
-    )
-    for history in (trajectory.states, trajectory.outputs):
-        assert np.isfinite(history).all(), f"{name}: the nominal run is not finite"
+        assert np.isfinite(derivative).all(), f"{model.name}: derivative at {start!r} is not finite"
+    _finite_run(model, maneuver)
+
+
+def _finite_run(model: Model, maneuver: Excitation) -> Trajectory:
+    run = model.simulate(maneuver)
+    assert run.status == "ok", f"{model.name}: the nominal run is {run.status}"
+    for history in (run.states, run.outputs):
+        assert np.isfinite(history).all(), f"{model.name}: the nominal run is not finite"
+    return run
 
 
 def _check_structural(model: StructuralModel, maneuver: Excitation) -> None:
     name, structure = model.name, model.system.structure
-    p, k = len(model.definition.ports), len(model.outputs)
-    assert not wrong_matrices(structure, p, k), f"{name}: {wrong_matrices(structure, p, k)}"
-    law = model.system.law
+    p, law = len(model.definition.ports), model.system.law
+    wrong = wrong_matrices(structure, p, len(model.outputs))
+    assert not wrong, f"{name}: {wrong}"
     assert np.isfinite(law.static).all(), f"{name}: its static state is not finite"
-    trajectory = model.simulate(maneuver)
-    assert trajectory.status == "ok", f"{name}: the nominal run is {trajectory.status}"
-    assert trajectory.outputs.shape == (len(trajectory.times), k), f"{name}: wrong shape of outputs"
-    assert np.isfinite(trajectory.outputs).all(), f"{name}: the nominal run is not finite"
+    u = _finite_run(model, maneuver).inputs[-1]
     # Near the static state, and where no force has a kink at rest.
-    w, rates, u = 1e-3 * np.cos(np.arange(p)), 0.1 + 0.01 * np.arange(p), trajectory.inputs[-1]
+    w, rates = 1e-3 * np.cos(np.arange(p)), 0.1 + 0.01 * np.arange(p)
     steps = {1: (1e-7, 0.0), 2: (0.0, 1e-7)}
     forces = law.at(w, rates, u)
     for column, (moved, quicker) in steps.items():
@@ -132,7 +119,7 @@ def check_method(name: str, model_name: str) -> None:
         return
     for setting in method.settings[model.kind].model_fields.values():
         assert setting.description, f"{name}: a setting is not described"
-    maneuver = _nominal(model)
+    maneuver = component("maneuver", model.definition.maneuver)
     for preset in method.presets_of(model.kind):
         settings = validated(method, model.kind, {}, preset, len(model.coordinates))
         method.check(model, settings)

@@ -1,7 +1,6 @@
 """Errors that a user can mend: each carries one clear line."""
 
 import difflib
-import dis
 import errno
 from collections.abc import Iterable
 from contextlib import suppress
@@ -11,8 +10,6 @@ from typing import Any
 
 # Names of which all are listed where none is near, and characters of their list.
 MANY, MOST_LISTED = 40, 450
-# Likeness of near names, how many are offered, and letters of a text that is looked for in others.
-NEAR, NEAREST, SHORTEST = 0.7, 3, 3
 # What of the system's errors is the machine's doing, whoever has asked for it.
 MACHINE_ERRORS = {
     getattr(errno, name)
@@ -53,10 +50,7 @@ class FileError(VehiclemorError):
 class CorruptError(FileError):
     """A stored result is damaged, or another than expected: it is computed again.
 
-    Attributes
-    ----------
-    reason
-        Without the path.
+    `reason` is the message without the path.
     """
 
     def __init__(self, reason: str, path: object = "", mend: str = "") -> None:
@@ -82,10 +76,7 @@ class UnreachableError(VehiclemorError):
 class ConvergenceError(VehiclemorError):
     """An iteration did not converge, or met a value that is not finite.
 
-    Attributes
-    ----------
-    trajectory
-        The run as far as it went, with its counts; None if there is none.
+    `trajectory` is the run as far as it went, with its counts; None if there is none.
     """
 
     def __init__(self, message: str, trajectory: Any = None) -> None:
@@ -113,14 +104,11 @@ def one_line(error: BaseException) -> str:
 def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
     """What to raise for an error of a plug-in's code: one line with file and line.
 
-    Parameters
-    ----------
-    code
-        The function, class or object that was used, or the name of a module.
+    `code` is the function, class or object that was used, or the name of a module.
     """
     of = code if isinstance(code, str) else getattr(code, "__module__", type(code).__module__)
     package = of.partition(".")[0]
-    if isinstance(error, KeyboardInterrupt) and not _is_raised(error, package):
+    if isinstance(error, KeyboardInterrupt):
         raise error
     lines = [
         f" ({frame.f_code.co_filename}:{line})"
@@ -131,13 +119,6 @@ def blame(whose: str, code: Any, error: BaseException) -> VehiclemorError:
     if reason := machine_reason(error):
         return MachineError(f"{whose}: {reason}{where}")
     return PlugInError(f"{whose}: {one_line(error)}{where}")
-
-
-def _is_raised(error: BaseException, package: str) -> bool:
-    """Whether a `raise` of a package raises an error; Ctrl-C strikes at other instructions."""
-    *_, (frame, _) = walk_tb(error.__traceback__)
-    module, instruction = frame.f_globals.get("__name__", ""), frame.f_code.co_code[frame.f_lasti]
-    return module.partition(".")[0] == package and instruction == dis.opmap["RAISE_VARARGS"]
 
 
 class blamed:  # noqa: N801
@@ -160,10 +141,10 @@ class blamed:  # noqa: N801
 def did_you_mean(name: object, known: Iterable[str]) -> str:
     """What is meant: near names, or such as contain it; else all known ones, or how to see them."""
     name, known = name if isinstance(name, str) else "", sorted(set(known))
-    near = difflib.get_close_matches(name, known, n=NEAREST, cutoff=NEAR)
-    if not near and len(name) >= SHORTEST:
+    near = difflib.get_close_matches(name, known, cutoff=0.7)
+    if not near and len(name) > 2:
         longer = [other for other in known if name in other]
-        near = difflib.get_close_matches(name, longer, n=NEAREST, cutoff=0.0)
+        near = difflib.get_close_matches(name, longer, cutoff=0.0)
     if near:
         return f"did you mean {' or '.join(near)}?"
     if len(known) > MANY:

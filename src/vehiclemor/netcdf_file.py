@@ -69,20 +69,18 @@ def write_dataset(dataset: xr.Dataset, path: Path) -> None:
         raise FileError(f"{path}: can't be written ({error})") from None
 
 
-def read_dataset(path: Path, attribute: str, expected: str, stored: bool = False) -> xr.Dataset:
-    """A result file of this package, whose global `attribute` has the `expected` value.
+def read_dataset(path: Path, stored: bool = False) -> xr.Dataset:
+    """A result file of this package, which is `stored` if it is a results folder's.
 
-    It is `stored` if it is a results folder's.  `FileError` if it is missing; `CorruptError` if it
-    is corrupt, or not the expected one.
+    `FileError` if it is missing; `CorruptError` if it is corrupt, or of others.
     """
     import xarray as xr
     from xarray.backends import NetCDF4DataStore
 
     mend = "; move it away and run again"
     with opened(path, "result file", mend, stored) as file:
-        if getattr(file, attribute, None) != expected:
-            reason = f"not the result that belongs here ({attribute} is not {expected})"
-            raise CorruptError(reason, path, mend)
+        if getattr(file, "source", None) != "vehiclemor":
+            raise CorruptError("not a result of vehiclemor", path, mend)
         file.set_auto_maskandscale(True)
         return xr.open_dataset(NetCDF4DataStore(file)).load()
 

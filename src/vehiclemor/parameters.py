@@ -142,28 +142,16 @@ def load_parameters(
         if name not in in_file:
             raise FileError(f"{path}: parameters.{name} is not a parameter of {model}")
     entries = {name: content.parameters[name] for name in in_file}
-    for name, declared in in_file.items():
-        entry = entries[name]
-        where = f"{path}: parameters.{name}"
+    for name, entry in entries.items():
+        declared, where = in_file[name], f"{path}: parameters.{name}"
         if entry.unit != declared.unit:
             raise FileError(f"{where}.unit: {entry.unit!r} is not the SI unit {declared.unit!r}")
         if entry.source not in content.sources:
             raise FileError(f"{where}.source: {entry.source!r} is not listed under sources")
         if complaint := _complaint(entry.value, declared):
             raise FileError(f"{where}: {complaint}")
-    given = {} if overrides is None else overrides
-    return with_entries(ParameterSet(model, entries), expected, given)
-
-
-def with_entries(
-    parameters: ParameterSet, expected: Mapping[str, Declared], overrides: Mapping[str, object]
-) -> ParameterSet:
-    """What is expected of the parameters, optional inputs at defaults, with values replaced."""
-    entries = {
-        name: parameters.entries.get(name) or _optional_input(name, declared)
-        for name, declared in expected.items()
-    }
-    return overridden(ParameterSet(parameters.model, entries), expected, overrides)
+    parameters = ParameterSet(model, entries)
+    return overridden(parameters, expected, {} if overrides is None else overrides)
 
 
 def _optional_input(name: str, declared: Declared) -> Parameter:
@@ -181,8 +169,15 @@ def _optional_input(name: str, declared: Declared) -> Parameter:
 def overridden(
     parameters: ParameterSet, expected: Mapping[str, Declared], overrides: Mapping[str, object]
 ) -> ParameterSet:
-    """Parameters with some values replaced; `InputError` if a name, shape or value is wrong."""
-    model, entries = parameters.model, dict(parameters.entries)
+    """The expected parameters, those that are missing at defaults, with some values replaced.
+
+    `InputError` if a name, shape or value is wrong.
+    """
+    model = parameters.model
+    entries = {
+        name: parameters.entries.get(name) or _optional_input(name, declared)
+        for name, declared in expected.items()
+    }
     for given, value in overrides.items():
         name, axis = parameter_and_axis(model, expected, given)
         number = _number_or_list(value, given)

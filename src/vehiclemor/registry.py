@@ -58,7 +58,6 @@ def component(kind: str, name: str) -> Any:
 
 
 def _member(kind: str, base: str, number: str) -> Any:
-    """Member of a family of components."""
     family, name = component(kind, base), f"{base}:{number}"
     make = getattr(family, "member", None)
     if not callable(make):

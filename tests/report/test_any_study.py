@@ -14,13 +14,12 @@ from tests.report.figure_texts import checked
 from vehiclemor.cli import main
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import component, names
-from vehiclemor.report import default_studies
-from vehiclemor.report.comparison import study_comparison
-from vehiclemor.report.default_studies import nominal, unseen
+from vehiclemor.report import comparison
+from vehiclemor.report.comparison import nominal, study_comparison, unseen
 from vehiclemor.report.figures.result_plot import draw, pictures_of, plot_result
 from vehiclemor.report.figures.theme import styled
-from vehiclemor.report.frames import ERRORS, grid_rows
 from vehiclemor.report.labels import tabled_outputs
+from vehiclemor.report.results import ERRORS, grid_rows
 from vehiclemor.study.run import run_studies
 
 pytestmark = pytest.mark.usefixtures("plug_in_package")
@@ -87,7 +86,7 @@ def test_a_study_is_compared_by_method_start_and_output(place, said):
     assert "start dropped: tire force, N" in text
     status, text = said("compare", place / "mine.toml", "--json")
     rows = {(r["label"], r["start"], r["output"]): r for r in json.loads(text)}
-    data = read_dataset(place / "results" / "studies" / "mine.nc", "study", "mine")
+    data = read_dataset(place / "results" / "studies" / "mine.nc")
     assert len(rows) == 3 * 2 * data.sizes["output"]
     for (method, start, output), row in rows.items():
         errors = data["rms_error"].sel({"label": method, "start": start, "output": output})
@@ -104,7 +103,7 @@ def test_a_study_is_compared_by_method_start_and_output(place, said):
 
 def test_failed_runs_are_counted_and_have_no_part_in_the_errors(place, said):
     said("compare", place / "mine.toml")
-    data = read_dataset(place / "results" / "studies" / "mine.nc", "study", "mine")
+    data = read_dataset(place / "results" / "studies" / "mine.nc")
     data["status"] = data["status"].astype(object)
     there = {"label": "mine", "start": "dropped", "frequency_factor": 1.3, "fastest": 20.0}
     before = {(r["label"], r["start"], r["output"]): r for r in grid_rows(data)}
@@ -170,12 +169,15 @@ FEW = ("fixed_basis", "full_order", "mine", "path_map", "pod", "quarter_car_mode
 
 @pytest.fixture(autouse=True)
 def few_methods(monkeypatch):
-    monkeypatch.setattr(default_studies, "names", lambda k: [n for n in names(k) if n in FEW])
+    def few(kind):
+        return [name for name in names(kind) if kind != "method" or name in FEW]
+
+    monkeypatch.setattr(comparison, "names", few)
 
 
 def test_a_model_is_compared_by_every_method_and_output(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(default_studies, "FACTORS", (0.8, 1.0, 1.2))
-    monkeypatch.setitem(default_studies.POINTS, "test", [[0.9, 1.0], [1.3, 1.0]])
+    monkeypatch.setattr(comparison, "FACTORS", (0.8, 1.0, 1.2))
+    monkeypatch.setitem(comparison.POINTS, "test", [[0.9, 1.0], [1.3, 1.0]])
     assert main(["compare", CAR, "--results", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
     assert main(["compare", CAR, "--json", "--results", str(tmp_path)]) == 0
@@ -200,7 +202,7 @@ def test_a_model_is_compared_by_every_method_and_output(tmp_path, capsys, monkey
     assert scores[1] < scores[0]
     known = {"nominal": ["errors", "histories"], "perturbed": ["errors"]}
     for name, kinds in known.items():
-        data = read_dataset(tmp_path / "studies" / f"{CAR}-{name}.nc", "study", f"{CAR}-{name}")
+        data = read_dataset(tmp_path / "studies" / f"{CAR}-{name}.nc")
         assert pictures_of(data) == kinds
 
 

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 from claims import CRITERIA, claim_rows, stored_results
 
+import vehiclemor as vm
 from tests.models import MODELS, VEHICLES
 from vehiclemor.cli import main
-from vehiclemor.report import comparison
 from vehiclemor.report.comparison import at_published_start, cost_table, paper_comparison, timing_of
-from vehiclemor.report.findings import LARGEST_SPREAD, judged
-from vehiclemor.report.printed_numbers import TIMING, time_saved
-from vehiclemor.report.published import load_published
+from vehiclemor.report.published import LARGEST_SPREAD, TIMING, judged, load_published, time_saved
 from vehiclemor.study.run import run_studies
 
 
@@ -23,7 +21,7 @@ def rows(results_folder):
 
 def test_every_published_number_has_a_row(rows):
     published = load_published()
-    compared = {n.id for n in published.number if n.kind in ("rms_error", "time_reduction")}
+    compared = {n.id for n in published.values() if n.kind in ("rms_error", "time_reduction")}
     assert set(rows["id"]) == compared
     assert set(rows["model"]) == {*MODELS}
 
@@ -65,7 +63,7 @@ def saving(timings, **changes):
     data = timings[name].copy(deep=True)
     for variable, (value, place) in changes.items():
         data[variable].loc[place] = value
-    return time_saved(load_published().numbers["hfv_time_reduction"], {name: data}, "pod")
+    return time_saved(load_published()["hfv_time_reduction"], {name: data}, "pod")
 
 
 def verdict_of(timings, **changes):
@@ -139,7 +137,7 @@ def test_break_even_is_the_training_over_what_a_run_saves(results_folder, model)
 @pytest.fixture
 def said(results_folder, capsys, monkeypatch, rows):
     """Run `compare` on the stored rows: exit status and what it prints."""
-    monkeypatch.setattr(comparison, "compare", lambda *_: rows)
+    monkeypatch.setattr(vm, "compare", lambda *_: rows)
     monkeypatch.setenv("COLUMNS", "80")
 
     def run(*arguments):

@@ -63,7 +63,7 @@ def folder(tmp_path_factory):
 
 
 def stored(folder, name):
-    return read_dataset(folder / "studies" / f"{name}.nc", "source", "vehiclemor")
+    return read_dataset(folder / "studies" / f"{name}.nc")
 
 
 def said(figure):

@@ -9,7 +9,8 @@ from matplotlib.image import imread
 from tests.report.figure_texts import checked, varied
 from vehiclemor.exceptions import InputError
 from vehiclemor.report.figures.errors import figure_errors, figure_pareto
-from vehiclemor.report.figures.result_plot import draw, pictures_of, shown_outputs
+from vehiclemor.report.figures.result_plot import draw, pictures_of
+from vehiclemor.report.figures.runs import shown_outputs
 from vehiclemor.report.figures.theme import panels, save_figure, styled
 from vehiclemor.study.run import run_studies
 
@@ -46,7 +47,7 @@ def drawn(results, unseen_travels):
         figures = {}
         for study, dataset in results.items():
             figures |= {f"{study}-{kind}": draw(dataset, kind) for kind in pictures_of(dataset)}
-        figures["grid"] = figure_errors(grid_of("pod", "replay"), outputs=OUTPUTS)
+        figures["grid"] = figure_errors(grid_of("pod", "replay"))
         figures["pareto"] = figure_pareto(unseen_travels)
         return {name: checked(figure) for name, figure in figures.items()}
 

@@ -10,7 +10,7 @@ import vehiclemor as vm
 from vehiclemor.cli import main
 from vehiclemor.exceptions import InputError
 from vehiclemor.netcdf_file import read_dataset
-from vehiclemor.report.unseen import method_rows, protocol_of
+from vehiclemor.report.unseen import method_rows
 
 HOSTILE = "</title></script><script>alert(1)</script> & \"x\" 'y' --> <!-- ${z} {{ 1 + 1 }}"
 STUDY = f"""
@@ -63,7 +63,7 @@ def read(made):
 
 
 def dataset_of(folder, name):
-    return read_dataset(folder / "studies" / f"{name}.nc", "source", "vehiclemor")
+    return read_dataset(folder / "studies" / f"{name}.nc")
 
 
 def test_the_file_is_whole_and_loads_nothing(read):
@@ -106,7 +106,7 @@ def test_provenance_and_settings_stand_there(made, read):
 
 def test_a_protocol_shows_its_methods_and_targets(made, read):
     dataset = dataset_of(made[0], "unseen")
-    expected = {row["label"]: row for row in method_rows(dataset, protocol_of(dataset))}
+    expected = {row["label"]: row for row in method_rows(dataset)}
     row = expected["fixed basis"]
     label = "fixed basis (chosen)"
     (errors,) = (own for own in table(read, "worst error") if own["method"] == label)

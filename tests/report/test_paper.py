@@ -167,8 +167,8 @@ def test_an_archive_is_the_results_folder_again(tmp_path, capsys):
     archive.main(results, out)
     with zipfile.ZipFile(out) as file:
         file.extractall(unpacked)
-    again = read_dataset(unpacked / "studies" / "mine.nc", "source", "vehiclemor")
-    assert again.identical(read_dataset(results / "studies" / "mine.nc", "source", "vehiclemor"))
+    again = read_dataset(unpacked / "studies" / "mine.nc")
+    assert again.identical(read_dataset(results / "studies" / "mine.nc"))
     sums = dict(
         line.split()[::-1] for line in (unpacked / "SHA256SUMS.txt").read_text().splitlines()
     )

@@ -137,7 +137,7 @@ def test_a_speed_up_is_judged_only_where_the_rounds_agree(done, scatter, verdict
     )
     targets = [SpeedTarget(against="within bounds", ratio=1e-9)]
     protocol = protocol_of(dataset).model_copy(update={"targets": targets})
-    row = target_rows(dataset, protocol, method_rows(dataset, protocol))[-1]
+    row = target_rows(dataset, protocol, method_rows(dataset))[-1]
     assert (row["item"], row["verdict"]) == ("speed-up, within bounds", verdict)
 
 
@@ -146,7 +146,7 @@ def test_a_study_without_full_order_says_so(done):
     alone = dataset.sel(label=["fixed basis"])
     targets = [SpeedTarget(against="equal accuracy", ratio=1.0)]
     protocol = protocol_of(dataset).model_copy(update={"targets": targets})
-    row = target_rows(alone, protocol, method_rows(alone, protocol))[-1]
+    row = target_rows(alone, protocol, method_rows(alone))[-1]
     assert row["reason"].endswith("`rows` takes no full order")
 
 

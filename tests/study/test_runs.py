@@ -29,7 +29,7 @@ from vehiclemor.files import TEMPORARY, temporary_path
 from vehiclemor.netcdf_file import write_dataset
 from vehiclemor.progress import listening
 from vehiclemor.reduction.methods import pod
-from vehiclemor.report.frames import counted_ends
+from vehiclemor.report.results import counted_ends
 from vehiclemor.simulation.run_timer import one_thread
 from vehiclemor.study import evaluate, store, timing, workers
 from vehiclemor.study.plans.grid import expand

@@ -16,7 +16,7 @@ from tests.study.small import TIMED, small_study
 from vehiclemor import netcdf_file
 from vehiclemor.exceptions import CorruptError, InputError
 from vehiclemor.netcdf_file import read_dataset, write_dataset
-from vehiclemor.report.result_selection import stored_result
+from vehiclemor.report.results import stored_result
 from vehiclemor.study import store, workers
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.store import QUARANTINE, decoded, encoded
@@ -139,7 +139,7 @@ def run(study, out):
 
 def reread(place):
     path = place / "out" / "studies" / "small.nc"
-    return read_dataset(path, "source", "vehiclemor").drop_vars(TIMED)
+    return read_dataset(path).drop_vars(TIMED)
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ def test_a_combined_dataset_with_any_damage_is_made_again(done, place, computed,
     for number, content in enumerate(damaged, start=1):
         path.write_bytes(content)
         with pytest.raises(CorruptError):
-            read_dataset(path, "source", "vehiclemor")
+            read_dataset(path)
         xr.testing.assert_identical(run(study, place / "out"), reread(done))
         xr.testing.assert_identical(reread(place), reread(done))
         aside = sorted((path.parent / QUARANTINE).iterdir())
@@ -201,7 +201,7 @@ def test_a_combined_dataset_with_any_damage_is_made_again(done, place, computed,
     write_dataset(xr.Dataset(attrs={"title": "mine"}), path)
     run(study, place / "out")
     found = sorted((path.parent / QUARANTINE).iterdir(), key=lambda file: file.stat().st_mtime_ns)
-    assert read_dataset(found[-1], "title", "mine").attrs == {"title": "mine"}
+    assert xr.load_dataset(found[-1]).attrs == {"title": "mine"}
     assert computed == []
 
 
@@ -215,9 +215,9 @@ def test_files_of_others_are_read_if_the_library_can_and_ours_by_others(tmp_path
     with netCDF4.Dataset(path, "a") as file:
         file.title = "another"
     with pytest.raises(CorruptError):
-        read_dataset(path, "source", "vehiclemor")
+        read_dataset(path)
     dataset.to_netcdf(path)
-    xr.testing.assert_identical(read_dataset(path, "source", "vehiclemor"), dataset)
+    xr.testing.assert_identical(read_dataset(path), dataset)
     monkeypatch.setattr(netcdf_file, "LIMIT", 1.0)
     monkeypatch.setattr(netcdf_file, "_KNOWN", set())
     sealed = tmp_path / "sealed.nc"
@@ -227,9 +227,9 @@ def test_files_of_others_are_read_if_the_library_can_and_ours_by_others(tmp_path
         # Anybody can write the hash of a file.
         for other in (path, sealed):
             with pytest.raises(CorruptError, match=str(other)):
-                read_dataset(other, "source", "vehiclemor")
+                read_dataset(other)
         assert not netcdf_file.is_result(sealed)
-    xr.testing.assert_identical(read_dataset(sealed, "source", "vehiclemor", stored=True), dataset)
+    xr.testing.assert_identical(read_dataset(sealed, stored=True), dataset)
 
 
 # Whose results these are

@@ -32,11 +32,11 @@ NUMBERS = {
 def test_numbers_are_as_printed_and_all_of_them_are_tested() -> None:
     published = load_published()
     kinds = ("rms_error", "time_reduction")
-    assert {n.id for n in published.number if n.kind in kinds} == set(NUMBERS)
+    assert {n.id for n in published.values() if n.kind in kinds} == set(NUMBERS)
     for name, expected in NUMBERS.items():
-        n = published.numbers[name]
+        n = published[name]
         behind = n.states, n.control_period, n.snapshots
         assert (n.value, n.unit, n.quantity, n.page, n.figure, *behind) == expected, name
         assert n.kind == ("rms_error" if "_rms_" in name else "time_reduction"), name
-    for entry in (*published.number, *claims().values()):
+    for entry in (*published.values(), *claims().values()):
         assert entry.model == PREFIXES[entry.id.partition("_")[0]]

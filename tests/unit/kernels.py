@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Callable, Sequence
 
-from vehiclemor.codegen.operations import Kernel, Listing, Value, function
+from vehiclemor.codegen.operations import Kernel, Listing, Value
 
 
 class Argument:
@@ -21,8 +21,7 @@ class Argument:
 
     def sums(self, first: int, targets: int, factors: Sequence[Value | float]) -> list[Value]:
         """Sums of factors with weights from a place on."""
-        values = [f if isinstance(f, Value) else self.listing.number(f) for f in factors]
-        return self.listing.sums(self.name, first, targets, values)
+        return self.listing.sums(self.name, first, targets, factors)
 
 
 def kernel(body: Callable[..., None], columns: int = 0) -> Kernel:
@@ -31,6 +30,11 @@ def kernel(body: Callable[..., None], columns: int = 0) -> Kernel:
     listing = Listing()
     body(*(Argument(listing, name, columns) for name in names))
     return listing.kernel(body.__name__.strip("_"), names, columns)
+
+
+def function(kind: str, *values: Value) -> Value:
+    """A function of values."""
+    return values[0].listing.new(kind, *values)
 
 
 def sincos(angle: Value) -> list[Value]:

@@ -38,7 +38,7 @@ def function_of(
 def run(program: Program, name: str, values: Mapping[sp.Symbol, float]) -> np.ndarray:
     """Result of one function of a program, in plain Python."""
     constants = _computed(program.constants, {p: values[p] for p in program.parameters})
-    known = dict(zip(program.constant_symbols, constants, strict=True))
+    known = dict(zip(program.constants.results, constants, strict=True))
     given = {s: values[s] for symbols in program.arguments.values() for s in symbols}
     function = program.functions[name]
     return _computed(function, given | known).reshape(function.shape)

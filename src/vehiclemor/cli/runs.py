@@ -199,7 +199,7 @@ def metrics(
     """
     import pandas as pd
 
-    from vehiclemor.report.comparison import handling_rows
+    from vehiclemor.handling.metrics import handling_rows
     from vehiclemor.report.labels import Column
     from vehiclemor.report.printing import Table, json_text
 
@@ -244,7 +244,7 @@ def plot(
     """
     picture = picture_file("--out", out or Path(f"{Path(result).stem}-{kind}.png"))
     from vehiclemor.report.figures.result_plot import plot_result
-    from vehiclemor.report.result_selection import select_point, stored_result
+    from vehiclemor.report.results import select_point, stored_result
 
     stored, chosen = stored_result(result, results), key_values("--select", select)
     dataset, point = select_point(stored, kind, chosen)

@@ -47,7 +47,7 @@ def run(
     scheduler
         Address of a dask scheduler whose workers compute.
     """
-    from vehiclemor.report.frames import counted_ends
+    from vehiclemor.report.results import counted_ends
     from vehiclemor.report.unseen import count_rows
     from vehiclemor.study.run import run_studies
 

@@ -26,8 +26,7 @@ from numba.core.registry import CPUDispatcher, CPUTarget, cpu_target
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
-from vehiclemor.codegen.llvm_arithmetic import DOUBLE, FLAGS, constant
-from vehiclemor.codegen.llvm_vectors import spread
+from vehiclemor.codegen.instructions import DOUBLE, FLAGS, constant, spread
 from vehiclemor.codegen.loop_types import declared_arguments
 from vehiclemor.codegen.operations import LANES
 

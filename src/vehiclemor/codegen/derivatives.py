@@ -33,7 +33,6 @@ from vehiclemor.codegen.operations import (
     Listing,
     Operation,
     Value,
-    function,
     uses,
 )
 from vehiclemor.codegen.sources import source_digest
@@ -43,6 +42,8 @@ from vehiclemor.short_repr import ShortRepr
 DIRECTIONS = 16
 # Up to this number, directions are computed one by one: code for many takes longer to compile.
 FEW = 4
+# So are all directions of a result of more floats: a mass matrix would take half a minute.
+LARGE = 100
 # Depth of the longest expression without a named value inside.
 SHALLOW = 12
 # Function -> its derivative at the argument x, where the function has the value v.
@@ -50,18 +51,18 @@ SLOPES: dict[str, Callable[[Value, Value], Value]] = {
     # Finite at zero: a norm that is zero, whose square has the slope zero, has the slope zero too.
     # A choice would become a branch, and branches break up what is one long block.
     "sqrt": lambda _, v: 0.5 / (v + 1e-300),
-    "sin": lambda x, _: function("cos", x),
-    "cos": lambda x, _: -function("sin", x),
+    "sin": lambda x, _: np.cos(x),
+    "cos": lambda x, _: -np.sin(x),
     "tan": lambda _, v: 1.0 + v * v,
-    "asin": lambda x, _: 1.0 / function("sqrt", 1.0 - x * x),
-    "acos": lambda x, _: -1.0 / function("sqrt", 1.0 - x * x),
+    "asin": lambda x, _: 1.0 / np.sqrt(1.0 - x * x),
+    "acos": lambda x, _: -1.0 / np.sqrt(1.0 - x * x),
     "atan": lambda x, _: 1.0 / (1.0 + x * x),
     "exp": lambda _, v: v,
     "log": lambda x, _: 1.0 / x,
-    "sinh": lambda x, _: function("cosh", x),
-    "cosh": lambda x, _: function("sinh", x),
+    "sinh": lambda x, _: np.cosh(x),
+    "cosh": lambda x, _: np.sinh(x),
     "tanh": lambda _, v: 1.0 - v * v,
-    "abs": lambda x, _: x.listing.new("select", x.listing.new(">=", x, 0.0), 1.0, -1.0),
+    "abs": lambda x, _: x.listing.new("select", x >= 0.0, 1.0, -1.0),
 }
 # Operations without a tangent: they are constant between jumps, or their parts have the tangents.
 WITHOUT_TANGENT = ("sincos", "batch", "floor", *COMPARISONS)
@@ -106,7 +107,6 @@ class _ForwardMode(Listing):
         # By number of the kernel's operation.
         self._values: list[Value] = []
         self._tangents: list[Tangent] = []
-        self._seeds: dict[tuple[str, int], Value] = {}
 
     def add(self, operation: Operation) -> None:
         """Write the next operation of the kernel and its tangent."""
@@ -134,7 +134,7 @@ class _ForwardMode(Listing):
     def _tangent(self, operation: Operation, value: Value, tangents: Sequence[Tangent]) -> Tangent:
         kind, arguments, detail = operation
         if kind == "entry" and detail[0] in self._seeded:
-            return self._seed(*detail)
+            return self.entry(SEED + detail[0], detail[1])
         if kind == "part":
             return self._part_tangent(arguments[0], value, detail)
         if kind == "sums" and detail[0] in self._seeded:
@@ -144,11 +144,6 @@ class _ForwardMode(Listing):
         if kind == "sums":
             return self.new("sums", *map(_or_zero, tangents), detail=detail)
         return _by_rule(kind, value, [self._values[n] for n in arguments], tangents)
-
-    def _seed(self, array: str, index: int) -> Value:
-        if (array, index) not in self._seeds:
-            self._seeds[array, index] = self.entry(SEED + array, index)
-        return self._seeds[array, index]
 
     def _part_tangent(self, number: int, value: Value, index: int) -> Tangent:
         """Tangent of one of several results of an operation, by the operation's number."""
@@ -193,7 +188,7 @@ def _by_rule(
         case "power":
             if db is not None:
                 raise ValueError("a varying exponent has no derivative: write exp(b log(a))")
-            return _product(da, b * function("power", a, b - 1.0))
+            return _product(da, b * a ** (b - 1.0))
         case "select":
             return a.listing.new("select", a, _or_zero(tangents[1]), _or_zero(tangents[2]))
         case "atan2":
@@ -267,7 +262,7 @@ class JacobianProduct(ShortRepr):
 
     def _products(self, arrays: Sequence[np.ndarray], seeds: np.ndarray) -> np.ndarray:
         rows = len(seeds)
-        lanes = 1 if rows <= FEW else DIRECTIONS
+        lanes = 1 if rows <= FEW or self.size > LARGE else DIRECTIONS
         result = np.empty((rows, self.size))
         arguments = [*arrays, seeds[0], result[0]]
         for array, size in zip(arguments, self.kernel.sizes, strict=True):

@@ -13,7 +13,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 
-from vehiclemor.codegen.operations import Listing, Operation, Value, function
+import numpy as np
+
+from vehiclemor.codegen.operations import Listing, Operation, Value
 
 # Cody-Waite splitting of pi/2.
 HALF_PI_1 = 1.57079625129699707031
@@ -41,7 +43,7 @@ def sincos(angle: Value) -> list[Value]:
 
     Not a number where the angle is not finite.
     """
-    quadrant = floor(angle * TWO_OVER_PI + 0.5)
+    quadrant = np.floor(angle * TWO_OVER_PI + 0.5)
     y = ((angle - quadrant * HALF_PI_1) - quadrant * HALF_PI_2) - quadrant * HALF_PI_3
     z = y * y
     zz = z * z
@@ -56,11 +58,11 @@ def sincos(angle: Value) -> list[Value]:
     c = (4.16666666666665929218e-2 - z * 1.38888888888730564116e-3) + zz * c
     c = (1.0 - 0.5 * z) + zz * c
     half = quadrant * 0.5
-    odd = function("!=", half, floor(half))
-    quarter = floor(half) * 0.5
-    minus_sine = function("!=", quarter, floor(quarter))
-    quarter = floor((quadrant + 1.0) * 0.5) * 0.5
-    minus_cosine = function("!=", quarter, floor(quarter))
+    odd = np.not_equal(half, np.floor(half))
+    quarter = np.floor(half) * 0.5
+    minus_sine = np.not_equal(quarter, np.floor(quarter))
+    quarter = np.floor((quadrant + 1.0) * 0.5) * 0.5
+    minus_cosine = np.not_equal(quarter, np.floor(quarter))
     sine, cosine = select(odd, c, s), select(odd, s, c)
     return [select(minus_sine, -sine, sine), select(minus_cosine, -cosine, cosine)]
 
@@ -68,8 +70,7 @@ def sincos(angle: Value) -> list[Value]:
 def atan(x: Value) -> list[Value]:
     """Arctangent in rad, within 2.3e-16 relative; not a number where x is none."""
     size = abs(x)
-    large = size.listing.new(">", size, TAN_3_PI_8)
-    middle = size.listing.new(">", size, 0.66)
+    large, middle = size > TAN_3_PI_8, size > 0.66
     # Two reductions of the argument.
     above = select(large, -1.0, select(middle, size - 1.0, size))
     below = select(large, size, select(middle, size + 1.0, 1.0))
@@ -88,14 +89,14 @@ def atan(x: Value) -> list[Value]:
     q = 4.853903996359136964868e2 + z * q
     q = 1.945506571482613964425e2 + z * q
     value = offset + (y + (y * (z * p / q) + rest))
-    return [select(x.listing.new("<", x, 0.0), -value, value)]
+    return [select(x < 0.0, -value, value)]
 
 
 def exp(x: Value) -> list[Value]:
     """Exponential function, within 2.5e-16 relative; not a number where x is none."""
-    x = select(x.listing.new(">", x, LARGEST), LARGEST, x)
-    x = select(x.listing.new("<", x, SMALLEST), SMALLEST, x)
-    power = floor(x * ONE_OVER_LOG_2 + 0.5)
+    x = select(x > LARGEST, LARGEST, x)
+    x = select(x < SMALLEST, SMALLEST, x)
+    power = np.floor(x * ONE_OVER_LOG_2 + 0.5)
     y = (x - power * LOG_2_1) - power * LOG_2_2
     z = y * y
     p = 3.02994407707441961300e-2 + z * 1.26177193074810590878e-4
@@ -104,13 +105,9 @@ def exp(x: Value) -> list[Value]:
     q = 2.00000000000000000005 + z * (2.27265548208155028766e-1 + z * q)
     y = 1.0 + 2.0 * (p / (q - p))
     # In two factors, so that neither overflows where the result does not.
-    half = floor(0.5 * power)
-    return [(y * function("power_of_two", half)) * function("power_of_two", power - half)]
-
-
-def floor(x: Value) -> Value:
-    """The largest integer that is not above x."""
-    return function("floor", x)
+    half = np.floor(0.5 * power)
+    part = y * x.listing.new("power_of_two", half)
+    return [part * x.listing.new("power_of_two", power - half)]
 
 
 def select(test: Value, then: Value | float, other: Value | float) -> Value:

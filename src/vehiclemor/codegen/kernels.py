@@ -11,7 +11,7 @@ import ctypes
 import json
 from collections.abc import Callable, Iterable
 from ctypes import addressof, c_char
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import cached_property, lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -27,7 +27,6 @@ from vehiclemor.codegen.cache import (
 )
 from vehiclemor.codegen.operations import Kernel
 from vehiclemor.codegen.sources import plug_in_digest, source_digest
-from vehiclemor.short_repr import ShortRepr
 
 if TYPE_CHECKING:
     from vehiclemor.symbolic.program import Program
@@ -91,6 +90,28 @@ class Kernels:
         kernel = self.sources[name]
         function = _machine(kernel, 1)[1]
         function(*[_checked(kernel, k, array) for k, array in enumerate(arrays)])
+
+    # Of those that are derived from a program:
+
+    @cached_property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Function -> shape of its result."""
+        return {name: k.shape for name, k in self.sources.items() if name not in BESIDE}
+
+    @property
+    def constants(self) -> int:
+        """Number of hoisted constants, which the kernel `constants` computes from parameters."""
+        return self.sources["constants"].shape[0]
+
+    @property
+    def source(self) -> str:
+        """All kernels, in one line each."""
+        return "\n".join(map(repr, self.sources.values()))
+
+    @cached_property
+    def operations(self) -> dict[str, dict[str, int]]:
+        """Function -> exact counts of its operations, see `Kernel.counts`."""
+        return {name: self.sources[name].counts for name in ("constants", *self.shapes)}
 
 
 def _checked(kernel: Kernel, index: int, array: Any) -> int:
@@ -157,7 +178,7 @@ def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
         from vehiclemor.codegen.compiler import compiled_module
         from vehiclemor.codegen.llvm_kernels import kernel_module
 
-        return compiled_module(kernel_module([kernel], lanes))
+        return compiled_module(kernel_module(kernel, lanes))
 
     code = MachineCode(from_cache(f"kernels/{kernel.name}-{digest_of(parts)}.o", make))
     address = code.address(kernel.name)
@@ -166,40 +187,8 @@ def _machine(kernel: Kernel, lanes: int = 1) -> tuple[int, Any, MachineCode]:
     return address, ctypes.PYFUNCTYPE(None, *pointers)(address), code
 
 
-@dataclass(frozen=True, eq=False)
-class Derivation(ShortRepr):
-    """Kernels of a program by name; `constants` computes constants from the parameters."""
-
-    sources: dict[str, Kernel]
-
-    @cached_property
-    def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Function -> shape of its result."""
-        return {name: k.shape for name, k in self.sources.items() if name not in BESIDE}
-
-    @property
-    def constants(self) -> int:
-        """Number of hoisted constants."""
-        return self.sources["constants"].shape[0]
-
-    @property
-    def source(self) -> str:
-        """All kernels, in one line each."""
-        return "\n".join(map(repr, self.sources.values()))
-
-    @cached_property
-    def operations(self) -> dict[str, dict[str, int]]:
-        """Function -> exact counts of its operations, see `Kernel.counts`."""
-        return {name: self.sources[name].counts for name in ("constants", *self.shapes)}
-
-    @cached_property
-    def kernels(self) -> Kernels:
-        """The kernels, each compiled at its first use."""
-        return Kernels(self.sources.values())
-
-
-def derivation(name: str, derive: Callable[[], Program], choice: str = "") -> Derivation:
-    """The derivation of a model: from disk, or by `derive` and then written there.
+def derivation(name: str, derive: Callable[[], Program], choice: str = "") -> Kernels:
+    """The kernels of a model: from disk, or by `derive` and then written there.
 
     Choice tells apart what one function derives for other arguments.
     """
@@ -226,6 +215,5 @@ def _file(name: str, derive: Callable[[], Program], choice: str) -> str:
 
 # A derivation does not change under its digest.
 @lru_cache(maxsize=8)
-def _read(content: bytes) -> Derivation:
-    kernels = map(Kernel.read, json.loads(content))
-    return Derivation({kernel.name: kernel for kernel in kernels})
+def _read(content: bytes) -> Kernels:
+    return Kernels(map(Kernel.read, json.loads(content)))

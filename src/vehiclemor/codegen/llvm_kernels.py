@@ -6,20 +6,13 @@ which they receive at run time: loops are compiled once for all models.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from llvmlite import ir
 
-from vehiclemor.codegen import llvm_vectors
+from vehiclemor.codegen import instructions
 from vehiclemor.codegen.elementary import ELEMENTARY
-from vehiclemor.codegen.llvm_arithmetic import (
-    DOUBLE,
-    LANE,
-    VECTOR,
-    arithmetic,
-    constant,
-    elementary,
-)
+from vehiclemor.codegen.instructions import DOUBLE, LANE, POINTER, VECTOR
 from vehiclemor.codegen.operations import (
     LANES,
     SEED,
@@ -30,49 +23,46 @@ from vehiclemor.codegen.operations import (
     is_entry,
 )
 
-POINTER = DOUBLE.as_pointer()
 
-
-def kernel_module(kernels: Sequence[Kernel], lanes: int = 1) -> ir.Module:
-    """LLVM module of kernels, each a C function of pointers to floats by the kernel's name.
+def kernel_module(kernel: Kernel, lanes: int = 1) -> ir.Module:
+    """LLVM module of a kernel: a C function of pointers to floats by the kernel's name.
 
     With several lanes it computes so many samples at once: the arguments in `Kernel.by_row` are
     matrices with a row for each, and further arguments are the distances of their rows in floats.
     Values that don't depend on the row are computed once.
     """
     module = ir.Module("kernels")
-    for kernel in kernels:
-        strided = kernel.by_row if lanes > 1 else []
-        kinds = [POINTER] * len(kernel.arguments) + [ir.IntType(64)] * len(strided)
-        function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), kernel.name)
-        function.attributes.add("nounwind")
-        if any(name.startswith(SEED) for name in kernel.arguments):
-            # Keeps LLVM from a long search for statements to pack (SLP), which gains nothing here.
-            function.attributes.add("noimplicitfloat")
-        builder = ir.IRBuilder(function.append_basic_block())
-        pointers = dict(zip(kernel.arguments, function.args, strict=False))
-        strides = dict(zip(strided, function.args[len(pointers) :], strict=True))
-        rows = {name: Rows(pointers[name], strides.get(name)) for name in pointers}
-        writer = _Writer(kernel, builder, rows, lanes)
-        for number in kernel.named:
-            writer.value(number)
-        builder.ret_void()
+    strided = kernel.by_row if lanes > 1 else []
+    kinds = [POINTER] * len(kernel.arguments) + [ir.IntType(64)] * len(strided)
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), kernel.name)
+    function.attributes.add("nounwind")
+    if any(name.startswith(SEED) for name in kernel.arguments):
+        # Keeps LLVM from a long search for statements to pack (SLP), which gains nothing here.
+        function.attributes.add("noimplicitfloat")
+    builder = ir.IRBuilder(function.append_basic_block())
+    pointers = dict(zip(kernel.arguments, function.args, strict=False))
+    strides = dict(zip(strided, function.args[len(pointers) :], strict=True))
+    writer = _Writer(kernel, builder, pointers, strides, lanes)
+    for number in kernel.named:
+        writer.value(number)
+    builder.ret_void()
     return module
-
-
-class Rows(NamedTuple):
-    """Address of an argument: its first float, and the distance of its rows in floats."""
-
-    first: Any
-    stride: Any = None
 
 
 class _Writer:
     """Writes the operations of a kernel, each when a named one first needs it."""
 
-    def __init__(self, kernel: Kernel, builder: Any, rows: Mapping[str, Rows], lanes: int) -> None:
+    def __init__(
+        self,
+        kernel: Kernel,
+        builder: Any,
+        # Of the arguments: addresses of their first floats, and distances of their rows in floats.
+        pointers: Mapping[str, Any],
+        strides: Mapping[str, Any],
+        lanes: int,
+    ) -> None:
         self._operations, self._builder = kernel.operations, builder
-        self._rows, self._lanes = rows, lanes
+        self._pointers, self._strides, self._lanes = pointers, strides, lanes
         self._values: dict[int, Any] = {}
         # Entries without a name are loaded again for each use: registers are few.
         entries = {n for n, op in enumerate(kernel.operations) if op.kind == "entry"}
@@ -106,7 +96,7 @@ class _Writer:
 
     def _spread(self, value: Any, width: int) -> Any:
         # A condition may stay one for all lanes.
-        return llvm_vectors.spread(self._builder, value, width) if value.type == DOUBLE else value
+        return instructions.spread(self._builder, value, width) if value.type == DOUBLE else value
 
     def _written(self, operation: Operation) -> Any:
         kind, arguments, detail = operation
@@ -115,8 +105,9 @@ class _Writer:
         values = [self._values[number] for number in arguments]
         match kind:
             case "number":
-                count = 1 if self._mixed else self._lanes
-                return constant(DOUBLE if count == 1 else ir.VectorType(DOUBLE, count), detail)
+                single = self._mixed or self._lanes == 1
+                of = DOUBLE if single else ir.VectorType(DOUBLE, self._lanes)
+                return instructions.constant(of, detail)
             case "entry":
                 return self._load(*detail)
             case "store":
@@ -127,11 +118,11 @@ class _Writer:
                 return values[0][detail]
             case _ if kind in VECTOR_STATEMENTS:
                 parts = [self._address(*d) if is_entry(d) else d for d in detail]
-                return llvm_vectors.write(kind, self._builder, parts, values)
+                return instructions.write(kind, self._builder, parts, values)
             case _ if kind in ELEMENTARY:
-                results = elementary(self._builder, kind, *values)
+                results = instructions.elementary(self._builder, kind, *values)
                 return results if kind == "sincos" else results[0]
-        return arithmetic(self._builder, kind, self._alike(values))
+        return instructions.arithmetic(self._builder, kind, self._alike(values))
 
     def _sums(self, arguments: Sequence[int], array: str, first: int, targets: int) -> list[Any]:
         # A generator: each factor is used as soon as it is computed, since registers are few.
@@ -140,8 +131,8 @@ class _Writer:
         if self._lanes > 1:
             factors = self._alike(list(factors))
             if factors[0].type != DOUBLE:
-                return llvm_vectors.sums_of_lanes(self._builder, address, factors, targets)
-        return llvm_vectors.weighted_sums(self._builder, address, factors, targets)
+                return instructions.sums_of_lanes(self._builder, address, factors, targets)
+        return instructions.weighted_sums(self._builder, address, factors, targets)
 
     def _load(self, name: str, index: int) -> Any:
         builder = self._builder
@@ -168,22 +159,22 @@ class _Writer:
         offset = ir.Constant(ir.IntType(64), index)
         if lane:
             stride = ir.Constant(ir.IntType(64), lane)
-            offset = self._builder.add(self._builder.mul(self._rows[name].stride, stride), offset)
-        return self._builder.gep(self._rows[name].first, [offset])
+            offset = self._builder.add(self._builder.mul(self._strides[name], stride), offset)
+        return self._builder.gep(self._pointers[name], [offset])
 
     def _batch(self, name: str, arguments: Sequence[Any]) -> list[Any]:
         """Results of an elementary function for a batch of arguments, one function first."""
         builder, arguments = self._builder, self._alike(arguments)
         if arguments[0].type != DOUBLE:
             # The arguments are vectors of samples already.
-            results = [elementary(builder, name, argument) for argument in arguments]
+            results = [instructions.elementary(builder, name, argument) for argument in arguments]
             return [value for values in zip(*results, strict=True) for value in values]
         lanes, parts = [LANE(lane) for lane in range(WIDTH)], []
         for first in range(0, LANES, WIDTH):
             vector = ir.Constant(VECTOR, ir.Undefined)
             for k, lane in enumerate(lanes):
                 vector = builder.insert_element(vector, arguments[first + k], lane)
-            parts.append(elementary(builder, name, vector))
+            parts.append(instructions.elementary(builder, name, vector))
         return [
             builder.extract_element(vector, lane)
             for vectors in zip(*parts, strict=True)

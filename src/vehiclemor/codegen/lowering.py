@@ -45,11 +45,11 @@ def kernels_of(program: Program) -> dict[str, Kernel]:
     return kernels
 
 
-def _arguments(program: Program) -> Mapping[str, Sequence[sp.Symbol]]:
-    return program.arguments | {"constants": program.constant_symbols}
+def _arguments(program: Program) -> Mapping[str, Sequence[sp.Expr]]:
+    return program.arguments | {"constants": program.constants.results}
 
 
-def _kernel(name: str, arguments: Mapping[str, Sequence[sp.Symbol]], function: Function) -> Kernel:
+def _kernel(name: str, arguments: Mapping[str, Sequence[sp.Expr]], function: Function) -> Kernel:
     lowering = _Lowering()
     expressions = [e for _, e in function.assignments] + list(function.results)
     used = set().union(*(e.free_symbols for e in expressions))

@@ -8,10 +8,10 @@ other; each has a kind, numbers of earlier operations whose values it takes, and
     add ... >=        arithmetic, comparisons and functions, see `KINDS`
     sincos            sine and cosine of a value
     batch             `sincos` or `atan` of `LANES` values at once: its name
-    sums              (array, first, targets): see `llvm_vectors`
+    sums              (array, first, targets): see `instructions`
     part              index of one of several results of these three
     store             index of the result, row by row
-    combine ...       statements on whole vectors, see `llvm_vectors`
+    combine ...       statements on whole vectors, see `instructions`
 
 Named operations run in order; the others are inlined where used.
 """
@@ -50,6 +50,7 @@ KINDS = {
 }
 # Operations to which NumPy gives other names.
 OPERATORS = {"negative": "negate", "absolute": "abs"}
+OPERATORS |= {"greater": ">", "greater_equal": ">=", "less": "<", "not_equal": "!="}
 VECTOR_STATEMENTS = ("combine", "product", "execute")
 # No value depends on these; they are always named.
 EFFECTS = ("store", *VECTOR_STATEMENTS)
@@ -73,7 +74,7 @@ class Value(NDArrayOperatorsMixin):
     number: int
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *arguments: Value | float) -> Value:
-        """Arithmetic with operators, also of numbers of NumPy."""
+        """Arithmetic with operators and functions of NumPy, also of its numbers."""
         del method
         return self.listing.new(OPERATORS.get(ufunc.__name__, ufunc.__name__), *arguments)
 
@@ -112,7 +113,7 @@ class Listing:
         return [self.new("part", value, detail=index) for index in range(count)]
 
     def sums(self, array: str, first: int, targets: int, factors: Sequence[Value]) -> list[Value]:
-        """Sums of factors times weights from index `first` of an array on, see `llvm_vectors`."""
+        """Sums of factors times weights from index `first` of an array on, see `instructions`."""
         sums = self.new("sums", *factors, detail=(array, first, targets))
         return self.parts(sums, targets)
 
@@ -148,11 +149,6 @@ def _reaches(kind: str, factors: int, detail: Any) -> list[tuple[str, int]]:
     if kind in VECTOR_STATEMENTS:
         return [(part[0], part[1] + 1) for part in detail if is_entry(part)]
     return []
-
-
-def function(kind: str, *values: Value) -> Value:
-    """A function of values, as `function("floor", x)`."""
-    return values[0].listing.new(kind, *values)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from jinja2 import Environment, FileSystemLoader
 
 from vehiclemor.codegen.operations import COMPARISONS, uses
 from vehiclemor.exporting.ros2 import solve_function
-from vehiclemor.exporting.straight_line import FUNCTIONS, StraightLine
-from vehiclemor.exporting.systems import SIGNATURES, TANGENTS, TOOL, CSettings, ExportedSystem
+from vehiclemor.exporting.straight_line import FUNCTIONS, SIGNATURES, StraightLine
+from vehiclemor.exporting.systems import TANGENTS, TOOL, CSettings, ExportedSystem
 
 SOURCES = Path(__file__).parent / "c_sources"
 SELECT = """\
@@ -72,6 +72,13 @@ def c_files(system: ExportedSystem, settings: CSettings) -> dict[str, str]:
         MODEL: _source(system, "its functions", values, functions, suffix),
         TANGENT: _source(system, "derivatives of its functions", [], tangents, suffix),
     } | shipped
+
+
+def write_folder(texts: Mapping[str, str], folder: Path) -> None:
+    """Write files into a new folder."""
+    folder.mkdir()
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def written(template: str, **values: object) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from vehiclemor.arguments import file_path, flag, number, quoted, within
 from vehiclemor.exceptions import InputError
-from vehiclemor.files import begins_with, make_folder, replaceable, write_whole
+from vehiclemor.files import begins_with, replaceable, write_whole
 from vehiclemor.inputs.columns import listed
 from vehiclemor.registry import choice
 
@@ -99,16 +99,14 @@ def export(
         If an argument is wrong, the method can't be exported, something is there already, a package
         is missing, or the C compiler fails.  Then nothing is written.
     """
-    from vehiclemor.exporting.systems import CSettings
-
-    step = _checked_step(to, step, integrator, precision)
+    settings = _checked_settings(to, step, integrator, precision)
     if out is not None and to not in ENDINGS:
         raise InputError(f"out: an export to {to} is an object, no file")
     if isinstance(model, str):
         from vehiclemor.simulation.build import build
 
         model = build(model)
-    system = system_of(_with_inputs(model, listed(inputs)))
+    system = system_of(model, listed(inputs))
     if outputs is not None:
         system = system.with_outputs(listed(outputs, "outputs"))
     path: Any = None
@@ -116,12 +114,13 @@ def export(
         path = destination(system.name, to, out, overwrite)
     if len(system.table) and to == "casadi":
         raise InputError(f"{system.name} reads a table, which is no expression: not for {to}")
-    settings = CSettings(step, integrator, precision)
     return _exported(system, to, path, settings)
 
 
-def _checked_step(to: str, step: Any, integrator: str, precision: str) -> float:
-    """The step in s; `InputError` if it or what goes with it is wrong."""
+def _checked_settings(to: str, step: Any, integrator: str, precision: str) -> CSettings:
+    """How it is written; `InputError` if a choice is wrong, or none for the target."""
+    from vehiclemor.exporting.systems import CSettings
+
     choice("target", to, TARGETS)
     choice("integrator", integrator, Integrator.__args__)
     choice("precision", precision, Precision.__args__)
@@ -129,15 +128,16 @@ def _checked_step(to: str, step: Any, integrator: str, precision: str) -> float:
         raise InputError(f"integrator is a choice for {', '.join(STEPPED)}, not for {to}")
     if to not in FILES and precision != "double":
         raise InputError(f"precision is a choice for {', '.join(FILES)}, not for {to}")
-    return within("step", number("step", step), STEPS, " s")
+    return CSettings(within("step", number("step", step), STEPS, " s"), integrator, precision)
 
 
 def _exported(system: ExportedSystem, to: str, path: Any, settings: CSettings) -> Any:
     """What is written to a path, or the object."""
     if to == "c":
-        from vehiclemor.exporting.c import c_files
+        from vehiclemor.exporting.c import c_files, write_folder
 
-        return _write_folder(path, c_files(system, settings))
+        texts = c_files(system, settings)
+        return write_whole(path, lambda temporary: write_folder(texts, temporary))
     if to == "fmu":
         from vehiclemor.exporting.fmu import fmu_files, write_archive
 
@@ -153,21 +153,6 @@ def _exported(system: ExportedSystem, to: str, path: Any, settings: CSettings) -
     if path is None:
         return exported
     return write_whole(path, lambda temporary: exported.save(str(temporary)))
-
-
-def _with_inputs(
-    model: Model | ReducedOrderModel, names: Sequence[str]
-) -> Model | ReducedOrderModel:
-    """A model with these inputs; `InputError` if it can't have one of them."""
-    from vehiclemor.simulation.model import Model
-
-    if not names or not isinstance(full := getattr(model, "model", model), Model):
-        return model
-    # A reduced model has the inputs of its training.
-    optional = full.definition.optional_inputs if full is model else ()
-    for name in names:
-        choice("input", name, (*full.inputs, *(quantity.name for quantity in optional)))
-    return full.driving(names) if full is model else model
 
 
 def destination(name: str, to: str, out: str | Path | None, overwrite: bool) -> Path:
@@ -189,25 +174,17 @@ def name_of(model: str, method: str | None) -> str:
     return f"_{word}" if word[:1].isdigit() else word
 
 
-def system_of(model: Model | ReducedOrderModel) -> ExportedSystem:
-    """The system that a model is exported as."""
+def system_of(model: Model | ReducedOrderModel, inputs: Sequence[str] = ()) -> ExportedSystem:
+    """The system that a model is exported as; `InputError` if it can't have one of the inputs."""
     from vehiclemor.exporting.systems import exported_system
     from vehiclemor.reduction.reduced_model import ReducedOrderModel
     from vehiclemor.simulation.model import Model
 
     if isinstance(model, ReducedOrderModel):
+        # It has the inputs of its training.
+        for name in inputs:
+            choice("input", name, model.inputs)
         return exported_system(model.reduced, name_of(model.model.name, model.method))
     if not isinstance(model, Model):
         raise InputError(f"model: {quoted(model)} is neither a name nor a full or reduced model")
-    return exported_system(model, name_of(model.name, None))
-
-
-def _write_folder(path: Path, files: dict[str, str]) -> Path:
-    """Write a folder; it replaces an older one when it is complete."""
-
-    def write(temporary: Path) -> None:
-        make_folder(temporary)
-        for name, text in files.items():
-            (temporary / name).write_text(text, encoding="utf-8")
-
-    return write_whole(path, write)
+    return exported_system(model.driving(inputs), name_of(model.name, None))

@@ -24,8 +24,12 @@ from vehiclemor.codegen.operations import (
     padded,
 )
 
-# Functions of a system.
-NAMES = ("constants", "derivative", "outputs")
+# Function of a system -> names of its arguments, in order, and of its result.
+SIGNATURES = {
+    "constants": ("p", "c"),
+    "derivative": ("x", "u", "c", "dx"),
+    "outputs": ("x", "u", "c", "y"),
+}
 # Functions that other systems must have.
 FUNCTIONS = (
     *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
@@ -86,7 +90,7 @@ class Lines(Listing):
     def functions(self, results: Mapping[str, Sequence[Value]]) -> dict[str, StraightLine]:
         """Name -> function; one without results is a function too."""
         by_name = {}
-        for name in NAMES:
+        for name in SIGNATURES:
             numbers = [value.number for value in results.get(name, ())]
             by_name[name] = StraightLine(self.operations, numbers)
         return by_name

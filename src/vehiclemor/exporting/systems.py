@@ -13,14 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vehiclemor.codegen.operations import Kernel, Value, padded
+from vehiclemor.codegen.operations import Value, padded
 from vehiclemor.exceptions import InputError
-from vehiclemor.exporting.straight_line import Lines, StraightLine
+from vehiclemor.exporting.straight_line import SIGNATURES, Lines, StraightLine
 from vehiclemor.multibody.quantities import Quantity
 from vehiclemor.reduction.fallback import FallbackModel
 from vehiclemor.reduction.methods.full_order import FullOrder
 from vehiclemor.reduction.methods.path_map import PathMapModel, map_kernel
-from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
@@ -30,12 +29,6 @@ from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.system import System
 
 TOOL = f"vehiclemor {version('vehiclemor')}"
-# Function -> names of its arguments, in order, and of its result.
-SIGNATURES = {
-    "constants": ("p", "c"),
-    "derivative": ("x", "u", "c", "dx"),
-    "outputs": ("x", "u", "c", "y"),
-}
 # Derivatives along seeds of the arguments: what the results change by.
 SEED = "_seed"
 TANGENTS = {}
@@ -58,7 +51,7 @@ class CSettings(NamedTuple):
     precision: str = "double"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ExportedSystem(ShortRepr):
     """A system x' = f(x, u, c(p)), y = g(x, u, c(p))."""
 
@@ -67,18 +60,18 @@ class ExportedSystem(ShortRepr):
     # Of the model, or of the model and the method; one line.
     name: str
     summary: str
-    # Quantities in order; of a reduced model nothing is a parameter, its numbers are in the code.
-    states: tuple[Quantity, ...]
     inputs: tuple[Quantity, ...]
     outputs: tuple[Quantity, ...]
-    parameters: tuple[Quantity, ...]
-    values: np.ndarray  # Of the parameters.
-    starts: Mapping[str, np.ndarray]  # Name -> state; the default first.
     # `constants` of the array `p`, `derivative` and `outputs` of the arrays `x`, `u` and `c`.
     functions: Mapping[str, StraightLine]
     # Gives the derivatives of these functions, by the same names, see `TANGENTS`.
     tangents: Callable[[], Mapping[str, StraightLine]]
-    # Numbers that `entry(row, offset)` reads, at row + offset; may be empty.
+    starts: Mapping[str, np.ndarray]  # Name -> state; the default first.
+    states: tuple[Quantity, ...] = ()
+    # Of a reduced model nothing is a parameter, its numbers are in the code.
+    parameters: tuple[Quantity, ...] = ()
+    values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # Of the parameters.
+    # Numbers that `entry(row, offset)` reads, at row + offset.
     table: np.ndarray = field(default_factory=lambda: np.zeros(0))
     # Has the Jacobian of an implicit step; none without states.
     dynamics: System | None = None
@@ -135,10 +128,7 @@ def exported_system(what: Any, name: str) -> ExportedSystem:
         case PathMapModel():
             return map_system(what, name)
         case ReducedVehicle():
-            return reduced_system(what, name, what.decoder.kernel)
-        case ReducedSystem() if what.spaces.formulation == "full":
-            if what.states == what.model.definition.states:
-                return reduced_system(what, name, None)
+            return reduced_system(what, name)
     raise InputError(f"{name} can't be exported: its equations are no straight-line program")
 
 
@@ -155,17 +145,18 @@ def full_system(model: DynamicModel, name: str) -> ExportedSystem:
             changes[function] = lines.derivative(sources[function], arrays, seeds)
         return lines.functions(changes)
 
+    functions = {function: lines.include(sources[function], arrays) for function in SIGNATURES}
     return ExportedSystem(
-        name,
-        model.summary,
-        definition.state_quantities,
-        definition.inputs,
-        definition.outputs,
-        parameter_quantities(model),
-        model.parameter_values,
-        model.initial,
-        lines.functions({name: lines.include(sources[name], arrays) for name in SIGNATURES}),
-        tangents,
+        name=name,
+        summary=model.summary,
+        states=definition.state_quantities,
+        inputs=definition.inputs,
+        outputs=definition.outputs,
+        parameters=parameter_quantities(model),
+        values=model.parameter_values,
+        starts=model.initial,
+        functions=lines.functions(functions),
+        tangents=tangents,
         dynamics=model.system,
     )
 
@@ -189,25 +180,21 @@ def mechanism_system(model: AlgebraicModel, name: str) -> ExportedSystem:
         q_changes = [-change for change in step_changes]
         outputs = lines.derivative(sources["outputs"], solved, seeds | {"_q": q_changes})
         constants = lines.derivative(sources["constants"], arrays, seeds)
-        correction = lines.numbers([0.0])
-        return lines.functions({"constants": constants, "outputs": [*outputs, *correction]})
+        outputs.append(lines.number(0.0))
+        return lines.functions({"constants": constants, "outputs": outputs})
 
+    constants = lines.include(sources["constants"], arrays)
+    outputs.append(lines.largest(correction))
     return ExportedSystem(
-        name,
-        model.summary,
-        (),
-        definition.inputs,
-        (*definition.outputs, CORRECTION),
-        parameter_quantities(model),
-        model.parameter_values,
-        {model.starts[0]: np.zeros(0)},
-        lines.functions(
-            {
-                "constants": lines.include(sources["constants"], arrays),
-                "outputs": [*outputs, lines.largest(correction)],
-            }
-        ),
-        tangents,
+        name=name,
+        summary=model.summary,
+        inputs=definition.inputs,
+        outputs=(*definition.outputs, CORRECTION),
+        parameters=parameter_quantities(model),
+        values=model.parameter_values,
+        starts={model.starts[0]: np.zeros(0)},
+        functions=lines.functions({"constants": constants, "outputs": outputs}),
+        tangents=tangents,
     )
 
 
@@ -236,13 +223,10 @@ def parameter_quantities(model: Model) -> tuple[Quantity, ...]:
     return tuple(quantities)
 
 
-def reduced_system(
-    reduced: ReducedSystem, name: str, decoder: tuple[Kernel, np.ndarray] | None
-) -> ExportedSystem:
-    """A reduced system: its states are decoded, then the model's outputs follow from them.
+def reduced_system(reduced: ReducedVehicle, name: str) -> ExportedSystem:
+    """A reduced vehicle: its states are decoded, then the model's outputs follow from them.
 
-    The decoder is the kernel that gives full states, and after them trust indicators, with its
-    constants; none where the states are the model's.
+    The decoder gives full states, and after them trust indicators.
     """
     model, system = reduced.model, reduced.system
     definition, full = model.definition, len(model.definition.states)
@@ -253,10 +237,9 @@ def reduced_system(
     }
     rates, source = system.kernels.sources["derivative"], model.kernels.sources["outputs"]
     rate_arrays = arrays | {"_constants": lines.numbers(system.constants)}
-    decoded, decoder_arrays = arrays["_x"], arrays
-    if decoder is not None:
-        decoder_arrays = arrays | {"_constants": lines.numbers(decoder[1])}
-        decoded = lines.include(decoder[0], decoder_arrays)
+    decoder, decoder_constants = reduced.decoder.kernel
+    decoder_arrays = arrays | {"_constants": lines.numbers(decoder_constants)}
+    decoded = lines.include(decoder, decoder_arrays)
     output_arrays = {
         "_x": decoded,
         "_u": arrays["_u"],
@@ -266,9 +249,7 @@ def reduced_system(
 
     def tangents() -> dict[str, StraightLine]:
         seeds = seeds_of(lines, arrays)
-        state_changes = seeds["_x"]
-        if decoder is not None:
-            state_changes = lines.derivative(decoder[0], decoder_arrays, seeds)
+        state_changes = lines.derivative(decoder, decoder_arrays, seeds)
         changes = lines.derivative(source, output_arrays, seeds | {"_x": state_changes})
         if trust:
             changes.append(lines.largest_derivative(trust, state_changes[full:]))
@@ -284,16 +265,14 @@ def reduced_system(
     states = [of_model.get(n, Quantity(n, "1", "reduced coordinate")) for n in reduced.states]
     at_rest = np.zeros(system.inputs)
     return ExportedSystem(
-        name,
-        f"reduced model of: {model.summary}",
-        tuple(states),
-        definition.inputs,
-        quantities,
-        (),
-        np.zeros(0),
-        {key: reduced.begin(key, at_rest) for key in model.starts},
-        lines.functions({"derivative": derivative, "outputs": outputs}),
-        tangents,
+        name=name,
+        summary=f"reduced model of: {model.summary}",
+        states=tuple(states),
+        inputs=definition.inputs,
+        outputs=quantities,
+        starts={key: reduced.begin(key, at_rest) for key in model.starts},
+        functions=lines.functions({"derivative": derivative, "outputs": outputs}),
+        tangents=tangents,
         dynamics=system,
     )
 
@@ -302,13 +281,12 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
     """Outputs as polynomials in cells of the inputs; a table has their coefficients."""
     definition, coefficients = reduced.model.definition, reduced.cells.coefficients
     columns = reduced.columns[len(definition.coordinates) :]
-    exported = sorted(set(columns))
+    exported, table_columns = np.unique(columns, return_inverse=True)
     table = np.zeros((*coefficients.shape[:2], padded(len(exported))))
     table[:, :, : len(exported)] = coefficients[:, :, exported]
     lines, size, n = Lines(), table[0].size, len(definition.inputs)
     in_cell, row, in_box = _cell(lines, reduced, size)
-    table_columns = tuple(exported.index(column) for column in columns)
-    kernel = map_kernel(reduced.moving, reduced.degree, table_columns)
+    kernel = map_kernel(reduced.moving, reduced.degree, tuple(table_columns.tolist()))
     arrays = {
         "_x": in_cell,
         "_coefficients": [lines.new("table", row, detail=offset) for offset in range(size)],
@@ -325,17 +303,14 @@ def map_system(reduced: PathMapModel, name: str) -> ExportedSystem:
         return lines.functions({"outputs": output_changes})
 
     return ExportedSystem(
-        name,
-        f"reduced model of: {reduced.model.summary}",
-        (),
-        definition.inputs,
-        (*definition.outputs, TRUST),
-        (),
-        np.zeros(0),
-        {reduced.model.starts[0]: np.zeros(0)},
-        lines.functions({"outputs": [*outputs, lines.largest(in_box)]}),
-        tangents,
-        table.ravel(),
+        name=name,
+        summary=f"reduced model of: {reduced.model.summary}",
+        inputs=definition.inputs,
+        outputs=(*definition.outputs, TRUST),
+        starts={reduced.model.starts[0]: np.zeros(0)},
+        functions=lines.functions({"outputs": [*outputs, lines.largest(in_box)]}),
+        tangents=tangents,
+        table=table.ravel(),
     )
 
 

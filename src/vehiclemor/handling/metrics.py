@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +12,12 @@ from vehiclemor.arguments import quoted, real_array
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import data_folder
 from vehiclemor.handling import open_loop_tests
-from vehiclemor.handling.motion import Motion
-from vehiclemor.registry import choice
+from vehiclemor.handling.open_loop_tests import Motion
+from vehiclemor.inputs.maneuver import registered
+from vehiclemor.reduction.reduced_model import ReducedOrderModel
+from vehiclemor.registry import choice, names
 from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.toml_files import FileSchema, Line, read_toml
+from vehiclemor.toml_files import toml_content
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 HIGH_PASS, LOW_PASS, TRANSITION, STEP = 0.4, 100.0, 12.5, (2.37, 3.35)
 # Resonant quality factors.
 BUTTERWORTH, TRANSITION_QUALITY, STEP_QUALITY = 0.5**0.5, 0.63, 0.91
+# Hz: frequencies of a response that are printed.
+PRINTED = (0.5, 1.0)
 # Maneuvers of the rack are those of the steering angle.
 RACK = "rack_"
 # Maneuver -> its numbers by name.
@@ -42,17 +46,10 @@ TESTS: dict[str, Callable[[Motion], Mapping[str, Any]]] = {
 }
 
 
-class MetricsFile(FileSchema):
-    """Schema of `data/handling/metrics.toml`: standard, and number -> [unit, definition]."""
-
-    standards: dict[str, Line]
-    numbers: dict[str, dict[str, list[Line]]]
-
-
 @cache
-def declared() -> MetricsFile:
-    """Standards and definitions."""
-    return read_toml(data_folder() / "handling" / "metrics.toml", MetricsFile)
+def declared() -> dict[str, dict[str, Any]]:
+    """Standards of the maneuvers, and of their numbers [unit, definition]."""
+    return toml_content(data_folder() / "handling" / "metrics.toml")
 
 
 def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
@@ -91,11 +88,11 @@ def metrics(run: Trajectory, maneuver: str | None = None) -> xr.Dataset:
     if not isinstance(run, Trajectory):
         raise InputError(f"run is {quoted(run)}, not a run as `simulate` gives it")
     test = test_of(run.maneuver if maneuver is None else maneuver)
-    motion, standard = motion_of(run), declared().standards[test]
+    motion, standard = motion_of(run), declared()["standards"][test]
     variables: dict[str, tuple] = {}
     coordinates: dict[str, tuple] = {}
     for name, value in TESTS[test](motion).items():
-        unit, definition = declared().numbers[test][name]
+        unit, definition = declared()["numbers"][test][name]
         attributes = {"units": unit, "long_name": definition, "standard": standard}
         variables[name] = ("frequency" if np.ndim(value) else (), value, attributes)
         if np.ndim(value):
@@ -175,3 +172,62 @@ def _weighting(hertz: np.ndarray) -> np.ndarray:
     transition = (1.0 + s / TRANSITION) / resonance(TRANSITION, TRANSITION_QUALITY)
     step = (low / high) ** 2 * resonance(low, STEP_QUALITY) / resonance(high, STEP_QUALITY)
     return limits * transition * step
+
+
+# Full and reduced models side by side.
+
+
+def maneuvers_of(full: ReducedOrderModel, reduced: Iterable[ReducedOrderModel]) -> list[str]:
+    """Registered maneuvers with numbers, whose inputs all models have, in the order of the tests.
+
+    The full model has its optional inputs too.  `InputError` if there are none.
+    """
+    definition = full.model.definition
+    every = (*definition.inputs, *definition.optional_inputs)
+    shared = {quantity.name for quantity in every}.intersection(*(r.inputs for r in reduced))
+    known = {*names("maneuver")}
+    wanted = [name for test in TESTS for name in (test, RACK + test) if name in known]
+    fitting = [name for name in wanted if shared.issuperset(registered(name).inputs)]
+    if not fitting:
+        raise InputError(f"{definition.name} is no vehicle of the tests: {', '.join(TESTS)}")
+    return fitting
+
+
+def handling_rows(
+    models: Mapping[str, ReducedOrderModel], maneuvers: Iterable[str], amplitude: float
+) -> list[dict[str, Any]]:
+    """A row for each number, with a column for each model by its name.
+
+    The first model is the full one: all runs start from its state, and by default all maneuvers are
+    taken whose inputs all models have.
+    """
+    first, *reduced = models.values()
+    start, speed = first.model.start(), first.parameters.get("initial_speed", np.nan)
+    chosen = list(maneuvers) or maneuvers_of(first, reduced)
+    standards = {name: declared()["standards"][test_of(name)] for name in chosen}
+    rows: list[dict[str, Any]] = []
+    for name, standard in standards.items():
+        maneuver = registered(name).perturbed(amplitude=amplitude)
+        runs = {key: model.simulate(maneuver, start) for key, model in models.items()}
+        remarks = [f"{key}: {run.message}" for key, run in runs.items() if run.message]
+        test = "; ".join([f"{name} ({standard}), {speed:.4g} m/s", *remarks])
+        values = {key: _values(run) for key, run in runs.items() if run.finished}
+        # Names and units, in the order of the first run that has come to its end.
+        for number, unit in next(iter(values.values()), [("no numbers", "")]):
+            columns = {key: values.get(key, {}).get((number, unit), np.nan) for key in models}
+            rows.append({"test": test, "number": number, "unit": unit} | columns)
+    return rows
+
+
+def _values(run: Trajectory) -> dict[tuple[str, str], float]:
+    """Name, with its frequency if there is one, and unit of a number -> value."""
+    values: dict[tuple[str, str], float] = {}
+    for key, number in metrics(run).drop_vars("speed").data_vars.items():
+        name, unit = str(key).replace("_", " "), str(number.attrs["units"])
+        if not number.dims:
+            values[name, unit] = float(number)
+            continue
+        for hertz in PRINTED:
+            at = number.sel(frequency=hertz, method="nearest")
+            values[f"{name} at {hertz:g} Hz", unit] = float(at)
+    return values

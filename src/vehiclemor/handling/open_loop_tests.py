@@ -1,10 +1,18 @@
-"""Numbers of open-loop tests: of steering, then with brakes, drive and roads."""
+"""Motion of a vehicle by the terms of ISO 8855, and its numbers in open-loop tests.
+
+Tests of steering, then with brakes, drive and roads.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from vehiclemor.exceptions import InputError
-from vehiclemor.handling.motion import Motion, first_time, slope
 
+NEEDED = ("longitudinal_position", "lateral_position", "yaw", "roll")
+NEEDED += ("longitudinal_speed", "lateral_speed", "yaw_rate")
 RESPONSES = ("yaw_rate", "lateral_acceleration")
 # m/s^2: gradients of a steady turn are those between these lateral accelerations.
 LINEAR_RANGE = (1.0, 3.0)
@@ -33,6 +41,96 @@ RATIO_TIMES = {"early_yaw_rate_ratio": 1.0, "late_yaw_rate_ratio": 1.75}
 DISPLACEMENT_TIME = 1.07
 # Time (s) after the beginning of the braking at which a turn is compared with what it was.
 AFTER = 1.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Inputs and outputs (samples,) of a run by name, at times (samples,) in s; wheelbase in m.
+
+    Position, speed, sideslip and lateral acceleration are those of the sprung body's centre of
+    mass, along chassis axes: the horizontal ones of ISO 8855 differ by the cosine of the roll
+    angle, 0.2 % at 0.06 rad.
+    """
+
+    times: np.ndarray
+    histories: Mapping[str, np.ndarray]
+    wheelbase: float = np.nan
+
+    def __post_init__(self) -> None:
+        """Refuse what is no run of a vehicle, or one that has not come to its end."""
+        if missing := [name for name in NEEDED if name not in self.histories]:
+            raise InputError(f"the run is of no vehicle, or without outputs {', '.join(missing)}")
+        if len(self.times) < 2:
+            raise InputError("the run has one output time, too few for numbers of a maneuver")
+        if not np.isfinite([self[name] for name in NEEDED]).all():
+            raise InputError("the run has not come to its end: it has no numbers of a maneuver")
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """History (samples,) of an input or output, or of what follows from them."""
+        return self.histories[name] if name in self.histories else getattr(self, name)
+
+    def of_wheels(self, quantity: str) -> np.ndarray:
+        """Histories (wheels, samples) of a quantity of each wheel; not numbers without any."""
+        wheels = [each for name, each in self.histories.items() if name.startswith(f"{quantity}_")]
+        return np.array(wheels or [np.full(len(self.times), np.nan)])
+
+    def at(self, name: str, time: float) -> float:
+        """Value at a time in s, linear between the samples; not a number after the run."""
+        return float(np.interp(time, self.times, self[name], right=np.nan))
+
+    def moved(self, begin: float, end: float) -> complex:
+        """Way from one time in s to another: x + 1j y in m."""
+        x, y = (self.at(name, end) - self.at(name, begin) for name in NEEDED[:2])
+        return complex(x, y)
+
+    @property
+    def steering(self) -> np.ndarray:
+        """What the driver moves: angle of the front wheels in rad or displacement of the rack."""
+        nothing = np.zeros(len(self.times))
+        return self.histories.get("delta", self.histories.get("s", nothing))
+
+    @property
+    def wheel_angle(self) -> np.ndarray:
+        """Mean angle of the front wheels in rad."""
+        return (
+            self.of_wheels("steer").mean(axis=0) if "steer_FL" in self.histories else self.steering
+        )
+
+    @property
+    def speed(self) -> np.ndarray:
+        """Magnitude of the velocity in m/s."""
+        return np.hypot(self["longitudinal_speed"], self["lateral_speed"])
+
+    @property
+    def sideslip(self) -> np.ndarray:
+        """Angle in rad from the longitudinal axis to the velocity."""
+        return np.arctan2(self["lateral_speed"], self["longitudinal_speed"])
+
+    @cached_property
+    def lateral_acceleration(self) -> np.ndarray:
+        """Rate of the lateral speed, plus yaw rate times longitudinal speed, in m/s^2."""
+        from scipy.interpolate import CubicSpline
+
+        rate = CubicSpline(self.times, self["lateral_speed"])(self.times, 1)
+        return rate + self["yaw_rate"] * self["longitudinal_speed"]
+
+
+def first_time(times: np.ndarray, signal: np.ndarray, level: float) -> float:
+    """First time in s at which a signal (samples,) has risen to a level, linear between samples.
+
+    Not a number if it never has.
+    """
+    k = int(np.argmax(signal >= level))
+    if signal[k] < level:
+        return np.nan
+    if k == 0:
+        return float(times[0])
+    return float(np.interp(level, signal[k - 1 : k + 1], times[k - 1 : k + 1]))
+
+
+def slope(x: np.ndarray, y: np.ndarray) -> float:
+    """Slope of the straight line through points (n,), by least squares; of one there is none."""
+    return float(np.polyfit(x, y, 1)[0]) if len(x) > 1 and np.ptp(x) > 0.0 else np.nan
 
 
 def _require(fits: object, otherwise: str, test: str) -> None:
@@ -139,25 +237,19 @@ def _at_zero(steering: np.ndarray, response: np.ndarray) -> float:
     return float(crossed.mean()) if len(k) else np.nan
 
 
-def steering_interval(motion: Motion) -> tuple[float, float]:
-    """Times in s at which a sine of steering begins and ends: at `BEGUN` of its largest value."""
-    times, size = motion.times, abs(motion.steering)
-    begin, back = (
-        first_time(t, s, BEGUN * size.max()) for t, s in ((times, size), (-times[::-1], size[::-1]))
-    )
-    return begin, -back
-
-
 def sine_with_dwell(motion: Motion) -> dict[str, float]:
     """Ratios of the yaw rate after the steering, displacement after its beginning."""
-    begin, end = steering_interval(motion)
-    parts = motion.steering / (abs(motion.steering).max() or 1.0)
+    times, size = motion.times, abs(motion.steering)
+    level = BEGUN * size.max()
+    begin = first_time(times, size, level)
+    end = -first_time(-times[::-1], size[::-1], level)
+    parts = motion.steering / (size.max() or 1.0)
     sides = np.sign(parts[abs(parts) > BEGUN])
     once = np.count_nonzero(np.diff(sides)) == 1 and abs(parts[-1]) <= BEGUN
     _require(once, "the steering does not change its side once, and end", "sine with dwell")
     side = np.sign(motion.at("wheel_angle", begin))
     reversed_steering = motion.steering * np.sign(motion.at("steering", begin)) < 0.0
-    turned_back = reversed_steering & (motion.times <= end)
+    turned_back = reversed_steering & (times <= end)
     peak = np.max(-side * motion["yaw_rate"], where=turned_back, initial=0.0) or np.nan
     numbers = {
         name: -side * motion.at("yaw_rate", end + after) / peak

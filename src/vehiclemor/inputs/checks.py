@@ -36,10 +36,8 @@ def completed(maneuver: Excitation, definition: ModelDefinition) -> Excitation:
     """
     names = tuple(quantity.name for quantity in definition.inputs)
     needed = f"{definition.name} needs {', '.join(names)}"
-    further = [name for name in maneuver.inputs if name not in names]
-    optional = {quantity.name for quantity in definition.optional_inputs} if further else ()
-    for name in further:
-        if name in optional:
+    for name in maneuver.inputs:
+        if name not in names and any(name == q.name for q in definition.optional_inputs):
             alone = f"alone: it is reduced from runs without {name}"
             raise InputError(f"{maneuver} gives input {name}, {needed} {alone}")
     complete = maneuver.for_inputs(names, tuple(q.default or 0.0 for q in definition.inputs))
@@ -68,29 +66,22 @@ def _limits(definition: ModelDefinition) -> np.ndarray | None:
 def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
     if (limits := _limits(definition)) is None:
         return
+    # A road has too many waves to be taken between output times.
+    extent = _sampled_extent if definition.kind == "structural" else Excitation.extent
     low, high = limits
-    if definition.kind == "structural":
-        # A road has too many waves to be taken between output times.
-        times, values = maneuver.recorded_inputs
-        beyond = (values < low) | (values > high)
-        outside, since = np.flatnonzero(beyond.any(axis=0)), times[beyond.argmax(axis=0)]
-    else:
-        extent = maneuver.extent
-        if (extent.low >= low).all() and (extent.high <= high).all():
-            return
-        rounding = ROUNDING * extent.largest
-        outside = np.flatnonzero((extent.low < low - rounding) | (extent.high > high + rounding))
-        limits = np.vstack([low - rounding, high + rounding])
-        since = maneuver.first_beyond(limits) if len(outside) else low
-    if len(outside):
-        j = outside[since[outside].argmin()]
+    smallest, largest, _ = extent(maneuver, limits)
+    if (smallest >= low).all() and (largest <= high).all():
+        return
+    rounding = ROUNDING * np.maximum(-smallest, largest)
+    since = extent(maneuver, np.array([low - rounding, high + rounding]))[2]
+    j = since.argmin()
+    if np.isfinite(since[j]):
         quantity, value = definition.inputs[j], maneuver.at(since[j : j + 1])[0, j]
         unit = "" if quantity.unit == "1" else f" {quantity.unit}"
         said = f"is {value:.4g}{unit} at t = {since[j]:.6g} s"
         if low[j] <= value <= high[j]:
             # It only just leaves there.
-            extent = maneuver.extent
-            value = extent.low[j] if extent.low[j] < low[j] else extent.high[j]
+            value = smallest[j] if smallest[j] < low[j] else largest[j]
             said = f"reaches {value:.4g}{unit} after t = {since[j]:.6g} s"
         cubic = isinstance(maneuver, Signal) and maneuver.hold == "cubic"
         hint = "; a cubic hold overshoots its samples, a linear one does not" if cubic else ""
@@ -98,6 +89,14 @@ def _check_bounds(maneuver: Excitation, definition: ModelDefinition) -> None:
             f"{maneuver}: input {quantity.name} {said}; "
             f"{definition.name} holds from {low[j]:g} to {high[j]:g}{unit}{hint}"
         )
+
+
+def _sampled_extent(maneuver: Excitation, limits: np.ndarray) -> np.ndarray:
+    """As `Excitation.extent`, at the output times alone."""
+    times, values = maneuver.recorded_inputs
+    beyond = (values < limits[0]) | (values > limits[1])
+    since = np.where(beyond.any(axis=0), times[beyond.argmax(axis=0)], np.inf)
+    return np.array([values.min(axis=0), values.max(axis=0), since])
 
 
 @cached

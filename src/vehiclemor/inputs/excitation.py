@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 
-from vehiclemor.arguments import number, quoted, real_array, within
+from vehiclemor.arguments import loop_array, number, quoted, real_array, within
 from vehiclemor.codegen.loops import Loop, Ready, loops, ready
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.polynomial_loops import Pieces
@@ -21,9 +21,6 @@ from vehiclemor.short_repr import ShortRepr
 FACTORS = {"frequency": (1e-3, 1e3), "amplitude": (-1e6, 1e6)}
 LONGEST_DURATION = 1e5
 MOST_SAMPLES = 10_000_000
-
-# Limits that no input passes.
-ANYTHING = np.array([[-np.inf], [np.inf]])
 
 Result = TypeVar("Result")
 
@@ -39,18 +36,6 @@ def cached(compute: Callable[..., Result]) -> Callable[..., Result]:
         return excitation.results[key]
 
     return result
-
-
-class Extent(NamedTuple):
-    """Smallest and largest values of the inputs of a run (inputs,)."""
-
-    low: np.ndarray
-    high: np.ndarray
-
-    @property
-    def largest(self) -> np.ndarray:
-        """Largest magnitudes (inputs,)."""
-        return np.maximum(-self.low, self.high)
 
 
 class Jumps(NamedTuple):
@@ -147,26 +132,13 @@ class Excitation(ShortRepr):
         sizes = coefficients[after, 0] - coefficients[after - 1].sum(axis=1)
         return Jumps(edges[1:-1], np.zeros(len(after)), sizes)
 
-    @property
-    @cached
-    def extent(self) -> Extent:
-        """Extremes of the inputs, between output times too."""
-        low, high, _ = self._extent(ANYTHING)
-        return Extent(low, high)
+    def extent(self, limits: np.ndarray) -> np.ndarray:
+        """Smallest and largest inputs, also between output times, and when limits are passed.
 
-    def first_beyond(self, limits: np.ndarray) -> np.ndarray:
-        """Times (inputs,) in s at which limits (2, inputs), low and high ones, are passed.
-
-        Infinite of inputs that stay within their limits.
+        Times are in s, infinite of inputs that stay within their limits (2, inputs).
         """
-        return self._extent(limits)[2]
-
-    def _extent(self, limits: np.ndarray) -> np.ndarray:
-        """Result (3, inputs) of `polynomial_loops.extent`."""
-        inputs = self.pieces.coefficients.shape[2]
-        bounds, result = np.empty((2, inputs)), np.empty((3, inputs))
-        bounds[:] = limits
-        polynomial_loops()["extent"](self.packed_pieces, bounds, result)
+        result = np.empty((3, self.pieces.coefficients.shape[2]))
+        polynomial_loops()["extent"](self.packed_pieces, loop_array(limits), result)
         return result
 
 
@@ -199,7 +171,4 @@ def checked_times(times: Any) -> np.ndarray:
 
 def checked_factor(name: str, value: object) -> float:
     """A factor on the frequency or amplitude; `InputError` if it is none, or out of bounds."""
-    factor = number(f"{name} factor", value)
-    if name == "frequency" and factor <= 0.0:
-        raise InputError(f"{name} factor: {factor:g} is not positive")
-    return within(f"{name} factor", factor, FACTORS[name])
+    return within(f"{name} factor", number(f"{name} factor", value), FACTORS[name])

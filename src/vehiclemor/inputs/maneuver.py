@@ -12,6 +12,7 @@ import numpy as np
 
 from vehiclemor.arguments import count, line_of_text, loop_array, number, quoted, real_array, within
 from vehiclemor.exceptions import InputError, PlugInError, blamed
+from vehiclemor.inputs.columns import listed
 from vehiclemor.inputs.excitation import (
     FACTORS,
     LONGEST_DURATION,
@@ -27,6 +28,7 @@ from vehiclemor.multibody.quantities import integral_of
 from vehiclemor.registry import component
 
 MOST_CORNERS = 10_000
+MOST_SEED = 999_999
 # Maneuvers with cached results: more than the sampled runs of a protocol, over which all rows go.
 CACHED = 512
 
@@ -80,10 +82,7 @@ class Maneuver(Excitation):
         for name, function in functions.items():
             if not callable(function):
                 raise InputError(f"{self}: {name} is not a function")
-        if isinstance(self.inputs, list):
-            object.__setattr__(self, "inputs", tuple(self.inputs))
-        if not (isinstance(self.inputs, tuple) and all(isinstance(i, str) for i in self.inputs)):
-            raise InputError(f"{self}: inputs is {quoted(self.inputs)}, not a tuple of names")
+        object.__setattr__(self, "inputs", listed(self.inputs, f"{self}: inputs"))
         if number(f"{self}: duration", self.duration) <= 0.0:
             raise InputError(f"{self}: duration is {self.duration:g} s, not positive")
         within(f"{self}: duration", self.duration, (0.0, LONGEST_DURATION), " s")
@@ -139,7 +138,7 @@ class Maneuver(Excitation):
         if self.inputs == names or derived or not {*self.inputs} <= {*names}:
             return self
         values = tuple(defaults) or (0.0,) * len(names)
-        signal = _completed(self.signal, self.inputs, names, values)
+        signal = _Completed(self.signal, tuple(map(names.index, self.inputs)), values)
         at_zero = not any(dict(zip(names, values, strict=True))[name] for name in lacking)
         linear = self.linear_in_amplitude and at_zero
         return replace(self, inputs=names, signal=signal, linear_in_amplitude=linear)
@@ -172,29 +171,18 @@ class Maneuver(Excitation):
         return unit if _is_linear(unit) else None
 
 
-# One function for equal arguments: maneuvers with the same functions are equal.
-@lru_cache(maxsize=CACHED)
-def _completed(
-    signal: Callable[..., np.ndarray],
-    given: tuple[str, ...],
-    names: tuple[str, ...],
-    defaults: tuple[float, ...],
-) -> Callable[..., np.ndarray]:
-    """A signal with a column for each of the names, constant where it has none."""
-    columns = tuple(names.index(name) for name in given)
-    return partial(_filled, signal, columns, defaults)
+@dataclass(frozen=True)
+class _Completed:
+    """A signal with a column for every input of a model, constant where it has none."""
 
+    signal: Callable[..., np.ndarray]
+    columns: tuple[int, ...]
+    defaults: tuple[float, ...]
 
-def _filled(
-    signal: Callable[..., np.ndarray],
-    columns: tuple[int, ...],
-    defaults: tuple[float, ...],
-    times: np.ndarray,
-    *factors: float,
-) -> np.ndarray:
-    values = np.tile(np.array(defaults), (len(times), 1))
-    values[:, columns] = signal(times, *factors)
-    return values
+    def __call__(self, times: np.ndarray, *factors: float) -> np.ndarray:
+        values = np.tile(np.array(self.defaults), (len(times), 1))
+        values[:, self.columns] = self.signal(times, *factors)
+        return values
 
 
 @lru_cache(maxsize=CACHED)
@@ -207,6 +195,20 @@ def _is_linear(unit: Maneuver) -> bool:
     """Whether it is proportional as it declares: a copy with another signal may not be."""
     doubled = unit.perturbed(unit.frequency_factor, 2.0).at(unit.times)
     return bool(np.array_equal(doubled, 2.0 * unit.at(unit.times)))
+
+
+def family(first: Maneuver) -> Maneuver:
+    """The maneuver as a family: the number of a member is the seed of its signal."""
+    return replace(first, member=partial(_member, first))
+
+
+@lru_cache(maxsize=4096)
+def _member(first: Maneuver, seed: int) -> Maneuver:
+    count(f"seed of {first.name}", seed, least=0, most=MOST_SEED)
+    of_first: Any = first.signal
+    signal = replace(of_first, seed=seed)
+    corners = getattr(signal, "corners", first.corners)
+    return replace(first, name=f"{first.name}:{seed}", signal=signal, corners=corners)
 
 
 def smooth(frequency: float) -> tuple[float, ...]:

@@ -90,13 +90,8 @@ def sampled(signal: Pieces, times: Vector, inputs: Matrix) -> Int:
 def extent(signal: Pieces, limits: Matrix, result: Matrix) -> Int:
     """Smallest and largest values of inputs over a run, between samples too.
 
-    Parameters
-    ----------
-    limits
-        By input (2, inputs): smallest and largest value.
-    result
-        The same of the inputs, and the time in s at which a limit is passed first; infinite if none
-        is (3, inputs).
+    Limits (2, inputs) are such values by input.  The result (3, inputs) is the same of the inputs,
+    and the time in s at which a limit is passed first; infinite if none is.
     """
     edges, first, starts, coefficients = signal
     degree, pieces, segments = coefficients.shape[1] - 1, len(coefficients), len(edges) - 1

@@ -133,25 +133,30 @@ def _values(coefficients: np.ndarray, parts: np.ndarray) -> np.ndarray:
 # --- of samples -----------------------------------------------------------------------------------
 
 
-def interpolants(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
+def interpolants(
+    times: np.ndarray, samples: np.ndarray, hold: str, names: Sequence[str]
+) -> list[Pieces]:
     """Polynomials of each run through samples (runs, n, inputs) by one of `HOLDS`.
 
     One piece for each interval; segments end at kinks, at jumps, and at the ends of rests.
-    `InputError` if times (n,) don't increase, or a number isn't finite.
+    `InputError` if times (n,) don't increase, a number isn't finite, or a rate is wrong.
     """
     _check(times, samples)
     runs = []
     for first in range(0, len(samples), TOGETHER):
-        runs += _interpolants(times, samples[first : first + TOGETHER], hold)
+        runs += _interpolants(times, samples[first : first + TOGETHER], hold, names)
     return runs
 
 
-def _interpolants(times: np.ndarray, samples: np.ndarray, hold: str) -> list[Pieces]:
+def _interpolants(
+    times: np.ndarray, samples: np.ndarray, hold: str, names: Sequence[str]
+) -> list[Pieces]:
     """The same; runs with the same segments share all arrays but their coefficients."""
     lengths = np.diff(times)
     with np.errstate(over="ignore", invalid="ignore"):
         rises = np.diff(samples, axis=1)
         coefficients = _coefficients(times, samples, rises, hold)
+        check_rates(coefficients, names)
         breaks = np.zeros(samples.shape[:2], dtype=bool)
         if hold == "zero":
             breaks[:, 1:-1] = (rises[:, :-1] != 0.0).any(axis=2)
@@ -267,17 +272,19 @@ def mark_rests(
         breaks[:, 1:] |= swings
 
 
-def check_rates(pieces: Pieces, names: Sequence[str]) -> None:
-    """Raise `InputError` if an input moves between samples, but what is named its rate is zero."""
-    coefficients = pieces.coefficients
+def check_rates(coefficients: np.ndarray, names: Sequence[str]) -> None:
+    """Raise `InputError` if an input moves between samples, but what is named its rate is zero.
+
+    Coefficients are (runs, pieces, degree + 1, inputs).  How well rates fit that are not zero can't
+    be told from samples that are far apart.
+    """
     for column, name in enumerate(names):
-        # How well rates fit that are not zero can't be told from samples that are far apart.
         lower = integral_of(name)
-        if lower not in names or coefficients[:, :, column].any():
-            continue
         # A rate that jumps may have the rate zero.
-        is_rate = integral_of(lower) in names
-        if not is_rate and coefficients[:, 1:, names.index(lower)].any():
+        if lower not in names or integral_of(lower) in names:
+            continue
+        moves = coefficients[:, :, 1:, names.index(lower)].any(axis=(1, 2))
+        if (moves & ~coefficients[..., column].any(axis=(1, 2))).any():
             raise InputError(
                 f"{lower} moves, but its rate {name} is 0; left out, it follows by a cubic hold"
             )

@@ -11,20 +11,17 @@ The factors are those of the steering alone.  At an amplitude factor of 1 its an
 size of the lane change.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
-from typing import Any, NamedTuple
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.arguments import count
 from vehiclemor.inputs.driving import FRONT_SHARE, MASS, RADIUS
-from vehiclemor.inputs.maneuver import Maneuver
+from vehiclemor.inputs.maneuver import Maneuver, family
 from vehiclemor.inputs.steering import DURATION, LANE_CHANGE_AMPLITUDE, RACK_AMPLITUDE, RATE, ramp
 from vehiclemor.multibody.quantities import WHEELS
 
-MOST_SEED = 999_999
 # More than begin in a run of four times the frequency.
 CORRECTIONS, DEMANDS = 96, 12
 # s: shortest and longest correction, shortest one of unit size, time to the next one, and pause
@@ -68,9 +65,6 @@ class RandomSteering:
     seed: int
     rack: bool = False
 
-    def __post_init__(self) -> None:
-        count("seed of random steering", self.seed, least=0, most=MOST_SEED)
-
     def __call__(self, times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         """Inputs (n, 1) or (n, 3) at the times (n,) in s."""
         steering = total(corrections(self.seed), times, frequency)
@@ -110,20 +104,18 @@ class RandomDriving(RandomSteering):
 @lru_cache(maxsize=4096)
 def corrections(seed: int) -> tuple[Change, ...]:
     """Corrections of unit steering."""
-    return tuple(_corrections(_random(seed, 0, CORRECTIONS)))
-
-
-def _corrections(random: np.ndarray) -> Iterator[Change]:
-    time, angle = 0.5 * random[0, 0], 0.0
+    random = _random(seed, 0, CORRECTIONS)
+    changes, time, angle = [], 0.5 * random[0, 0], 0.0
     for quick, pause, wait, side in random[:, 1:].tolist():
-        target = (
-            0.0 if side < STRAIGHT else _within((-1.0, 1.0), (side - STRAIGHT) / (1 - STRAIGHT))
-        )
+        target = 0.0
+        if side >= STRAIGHT:
+            target = _within((-1.0, 1.0), (side - STRAIGHT) / (1 - STRAIGHT))
         drawn = LENGTHS[0] * (LENGTHS[1] / LENGTHS[0]) ** quick
         length = max(drawn, QUICKEST * abs(target - angle))
-        yield Change(time, length, target - angle)
+        changes.append(Change(time, length, target - angle))
         angle = target
         time += length + _within(PAUSES, wait) if pause < PAUSED else _within(GAPS, wait)
+    return tuple(changes)
 
 
 @lru_cache(maxsize=4096)
@@ -169,14 +161,6 @@ def corners_of(changes: tuple[Change, ...], frequency: float = 1.0) -> tuple[flo
     return tuple(sorted(time / frequency for time in ends if time / frequency < DURATION))
 
 
-@lru_cache(maxsize=4096)
-def _member(family: Maneuver, seed: int) -> Maneuver:
-    of_family: Any = family.signal
-    signal = replace(of_family, seed=seed)
-    name = f"{family.name}:{seed}"
-    return replace(family, name=name, signal=signal, corners=signal.corners, member=None)
-
-
 def _family(signal: RandomSteering, name: str, summary: str) -> Maneuver:
     inputs: tuple[str, ...] = ("delta",)
     if signal.rack:
@@ -186,9 +170,8 @@ def _family(signal: RandomSteering, name: str, summary: str) -> Maneuver:
         inputs += (*DRIVE_TORQUES, *BRAKE_TORQUES, *FRICTIONS)
     summary = f"{summary}, 10 s; {name}:SEED is another one"
     samples = round(DURATION * RATE) + 1
-    family = Maneuver(name, summary, signal, inputs, DURATION, samples, signal.corners)
-    family = replace(family, linear_in_amplitude=not driven)
-    return replace(family, member=partial(_member, family))
+    first = Maneuver(name, summary, signal, inputs, DURATION, samples, signal.corners)
+    return family(replace(first, linear_in_amplitude=not driven))
 
 
 STEERING = "corrections of the steering to random angles, with pauses"

@@ -18,12 +18,12 @@ exp(i difference) is g: so both tracks have the density exactly.
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 
 from vehiclemor.arguments import count, number, within
-from vehiclemor.inputs.maneuver import Maneuver, smooth
+from vehiclemor.inputs.maneuver import MOST_SEED, Maneuver, family, smooth
 from vehiclemor.inputs.steering import ramp
 from vehiclemor.registry import choice, component
 
@@ -39,7 +39,6 @@ SPEED, SPEEDS = 20.0, (1.0, 40.0)
 TRACK, WHEELBASE = 2.07, 4.5
 # Length (s) of the ramp at which the road sets in.
 ONSET = 0.5
-MOST_SEED = 999_999
 # Cells of a Taylor series each, and its order: exact to 1e-15 of the shortest wave's height.
 CELLS, ORDER = 4096, 17
 
@@ -53,9 +52,6 @@ class Road:
 
     seed: int
     travel: bool = False
-
-    def __post_init__(self) -> None:
-        count("seed of a road", self.seed, least=0, most=MOST_SEED)
 
     def __call__(self, times: np.ndarray, frequency: float, amplitude: float) -> np.ndarray:
         """Inputs (n, 8) or (n, 2) at the times (n,) in s."""
@@ -113,15 +109,8 @@ def tracks(seed: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return height, slope * (STEP * CELLS)
 
 
-@lru_cache(maxsize=4096)
-def _member(family: str, seed: int) -> Maneuver:
-    of = road_travel if family == "road_travel" else roads
-    signal = Road(seed, travel=of is road_travel)
-    return replace(of, name=f"{family}:{seed}", signal=signal, member=None)
-
-
 _heights = tuple(f"road_{wheel}" for wheel in ("FL", "FR", "RL", "RR"))
-roads = Maneuver(
+_roads = Maneuver(
     "road",
     "random road of ISO 8608 class C at 20 m/s, 10 s; road:SEED is another one",
     Road(1),
@@ -130,16 +119,15 @@ roads = Maneuver(
     samples=1001,
     corners=smooth,
     linear_in_amplitude=True,
-    member=partial(_member, "road"),
 )
-road_travel = replace(
-    roads,
+_travel = replace(
+    _roads,
     name="road_travel",
     summary="wheel travel on a random road of ISO 8608 class C at 20 m/s, rack fixed, 10 s",
     signal=Road(1, travel=True),
     inputs=("z", "s0"),
-    member=partial(_member, "road_travel"),
 )
+roads, road_travel = family(_roads), family(_travel)
 
 
 def road(road_class: str = "C", seed: int = 1, speed: float = SPEED) -> Maneuver:
@@ -152,4 +140,5 @@ def road(road_class: str = "C", seed: int = 1, speed: float = SPEED) -> Maneuver
     """
     amplitude = CLASSES[choice("road class", road_class, CLASSES)]
     frequency = within("speed", number("speed", speed), SPEEDS, " m/s") / SPEED
-    return component("maneuver", f"road:{Road(seed).seed}").perturbed(frequency, amplitude)
+    seed = count("seed of road", seed, least=0, most=MOST_SEED)
+    return component("maneuver", f"road:{seed}").perturbed(frequency, amplitude)

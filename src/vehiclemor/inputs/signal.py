@@ -226,7 +226,7 @@ class Signal(Excitation):
         needed = ", ".join(names)
         if not self.inputs:
             if columns == len(names):
-                check_rates(self.nominal_pieces, names)
+                check_rates(self.nominal_pieces.coefficients[None], names)
                 return replace(self, inputs=names)
             raise InputError(
                 f"{self} has {columns} columns without names, the model needs {needed}: "
@@ -372,9 +372,7 @@ def many_signals(
     names = column_names(inputs, values.shape[2])
     if not line_of_text("name", name):
         raise InputError("name is empty")
-    runs = interpolants(times, values, hold)
-    for pieces in runs:
-        check_rates(pieces, names)
+    runs = interpolants(times, values, hold, names)
     duration = within("duration of a signal", float(times[-1]), (0.0, LONGEST_DURATION), " s")
     about = name, f"{len(times)} samples, {hold} hold", names, duration
     output_samples = _output_samples(duration, output_step)

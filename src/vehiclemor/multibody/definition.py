@@ -248,41 +248,31 @@ class ModelDefinition(ShortRepr):
         """Refuse what contradicts itself, so that a plug-in's author reads one clear line."""
         for text in ("name", "summary"):
             line_of_text(f"{text} of a model", getattr(self, text))
-        if self.kind not in KINDS:
-            raise InputError(
-                f"model {self.name!r} is of kind {self.kind!r}; allowed: {', '.join(KINDS)}"
-            )
+        self._require(self.kind in KINDS, f" is of kind {self.kind!r}; allowed: {', '.join(KINDS)}")
         for kind in (*STATE_KINDS, "inputs", "optional_inputs", "outputs"):
             quantities = getattr(self, kind)
-            if not all(isinstance(quantity, Quantity) for quantity in quantities):
-                raise InputError(f"model {self.name!r}: {kind} must be quantities with units")
+            have_units = all(isinstance(quantity, Quantity) for quantity in quantities)
+            self._require(have_units, f": {kind} must be quantities with units")
             names = [quantity.name for quantity in quantities]
             optional = kind in ("speeds", "further_states", "optional_inputs") or (
                 kind == "coordinates" and self.kind == "structural"
             )
-            if len(set(names)) != len(names) or not (names or optional):
-                raise InputError(f"model {self.name!r}: {kind} are missing or named twice: {names}")
+            complete = len(set(names)) == len(names) and bool(names or optional)
+            self._require(complete, f": {kind} are missing or named twice: {names}")
         self._check_optional_inputs()
         for name, declared in self.parameters.items():
-            if not isinstance(declared, Declared):
-                raise InputError(
-                    f"model {self.name!r}: parameter {name!r} is not declared by a unit"
-                )
+            has_unit = isinstance(declared, Declared)
+            self._require(has_unit, f": parameter {name!r} is not declared by a unit")
+        of_kind, n, speeds = f" of kind {self.kind}", len(self.coordinates), len(self.speeds)
         needed = {"ae": "design_coordinates", "structural": "structure"}.get(self.kind, "starts")
-        if getattr(self, needed) is _unset:
-            raise InputError(f"model {self.name!r} of kind {self.kind} declares no {needed}")
-        expected = 0 if self.kind == "ae" else len(self.coordinates)
-        if len(self.speeds) != expected:
-            raise InputError(
-                f"model {self.name!r} of kind {self.kind} has {len(self.coordinates)} coordinates "
-                f"and {len(self.speeds)} speeds, not {expected}"
-            )
-        if self.further_states and self.kind != "ode":
-            raise InputError(
-                f"model {self.name!r} of kind {self.kind} has further_states; only kind ode has any"
-            )
-        if self.heading_pairs and len(self.planar) != 3:
-            raise InputError(f"model {self.name!r} has heading_pairs, but no heading in planar")
+        self._require(getattr(self, needed) is not _unset, f"{of_kind} declares no {needed}")
+        expected = 0 if self.kind == "ae" else n
+        counts = f"{n} coordinates and {speeds} speeds, not {expected}"
+        self._require(speeds == expected, f"{of_kind} has {counts}")
+        allowed = self.kind == "ode" or not self.further_states
+        self._require(allowed, f"{of_kind} has further_states; only kind ode has any")
+        has_heading = len(self.planar) == 3 or not self.heading_pairs
+        self._require(has_heading, " has heading_pairs, but no heading in planar")
         outputs = {q.name for q in self.outputs}
         self._known("stops", self.stops, (q.name for q in self.coordinates))
         self._known("cyclic", self.cyclic, self.states)
@@ -301,21 +291,13 @@ class ModelDefinition(ShortRepr):
 
     def _check_optional_inputs(self) -> None:
         """Refuse optional inputs without a default, and names that stand for something else."""
-        driven = {*self.choice.driven}
-        taken = {*self.parameters, *(q.name for q in self.inputs)} - {
-            *driven,
-            *self.choice.constant,
-        }
-        for quantity in self.optional_inputs:
-            if quantity.default is None or not math.isfinite(quantity.default):
-                raise InputError(
-                    f"model {self.name!r}: the optional input {quantity.name!r} has no default"
-                )
-            if quantity.name in taken:
-                raise InputError(
-                    f"model {self.name!r}: {quantity.name!r} is an optional input and another one, "
-                    "or a parameter"
-                )
+        chosen = {*self.choice.driven, *self.choice.constant}
+        taken = {*self.parameters, *(q.name for q in self.inputs)} - chosen
+        for name, default in ((q.name, q.default) for q in self.optional_inputs):
+            has_default = default is not None and math.isfinite(default)
+            self._require(has_default, f": the optional input {name!r} has no default")
+            twice = f": {name!r} is an optional input and another one, or a parameter"
+            self._require(name not in taken, twice)
 
     def _known(self, where: str, names: Iterable[str], known: Iterable[str]) -> None:
         allowed = set(known)
@@ -323,6 +305,10 @@ class ModelDefinition(ShortRepr):
             if name not in allowed:
                 hint = did_you_mean(name, allowed)
                 raise InputError(f"model {self.name!r}: {where} names {name!r}; {hint}")
+
+    def _require(self, fits: bool, what: str) -> None:
+        if not fits:
+            raise InputError(f"model {self.name!r}{what}")
 
 
 # --- optional inputs: which ones a run drives, which ones are parameters instead ------------------
@@ -336,8 +322,7 @@ def driving(definition: ModelDefinition, names: Iterable[str]) -> ModelDefinitio
     named = {*names}
     driven = {*definition.choice.driven, *named}
     driven |= {q.name for q in definition.optional_inputs if integral_of(q.name) in named}
-    constant = {*definition.choice.constant} - driven
-    return _chosen(definition, _ordered(definition, driven), _ordered(definition, constant))
+    return _with_choice(definition, driven, {*definition.choice.constant} - driven)
 
 
 def with_overrides(definition: ModelDefinition, overrides: Mapping[str, object]) -> ModelDefinition:
@@ -356,21 +341,20 @@ def with_constants(definition: ModelDefinition, names: Iterable[str]) -> ModelDe
             hint = did_you_mean(name, optional)
             raise InputError(f"{name!r} is not an optional input of {definition.name}; {hint}")
     constant = {*definition.choice.constant, *names}
-    driven = (name for name in definition.choice.driven if name not in constant)
-    return _chosen(definition, _ordered(definition, driven), _ordered(definition, constant))
+    return _with_choice(definition, {*definition.choice.driven} - constant, constant)
 
 
-def _ordered(definition: ModelDefinition, names: Iterable[str]) -> tuple[str, ...]:
-    chosen = {*names}
-    return tuple(q.name for q in definition.optional_inputs if q.name in chosen)
+def _with_choice(
+    definition: ModelDefinition, driven: set[str], constant: set[str]
+) -> ModelDefinition:
+    names = [quantity.name for quantity in definition.optional_inputs]
+    ordered = (tuple(n for n in names if n in chosen) for chosen in (driven, constant))
+    return _chosen(definition, InputChoice(*ordered))
 
 
 @lru_cache(maxsize=64)
-def _chosen(
-    definition: ModelDefinition, driven: tuple[str, ...], constant: tuple[str, ...]
-) -> ModelDefinition:
+def _chosen(definition: ModelDefinition, choice: InputChoice) -> ModelDefinition:
     """The declaration of a choice; the same object for the same arguments, as caches need it."""
-    choice = InputChoice(driven, constant)
     if choice == definition.choice:
         return definition
     optional = {quantity.name: quantity for quantity in definition.optional_inputs}
@@ -378,7 +362,7 @@ def _chosen(
     parameters = {
         name: declared for name, declared in definition.parameters.items() if name not in optional
     }
-    for name in constant:
+    for name in choice.constant:
         low, high = definition.validity.get(name, (None, None))
         quantity = optional[name]
         parameters[name] = Declared(
@@ -386,7 +370,7 @@ def _chosen(
         )
     return replace(
         definition,
-        inputs=(*every_run, *(optional[name] for name in driven)),
+        inputs=(*every_run, *(optional[name] for name in choice.driven)),
         parameters=parameters,
         choice=choice,
     )

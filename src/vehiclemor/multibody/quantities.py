@@ -1,7 +1,7 @@
 """Quantities of models and what their parameters share, without any symbols."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -87,15 +87,10 @@ def error_bounds(yaw: float) -> dict[str, ErrorBound]:
 
 # Optional inputs at each wheel: name, unit, meaning, default, range of validity.  Slopes are up to
 # 0.1, which is 5 m/s at 50 m/s; torques beyond these ranges are in another unit.
-_AT_WHEEL = (
+BRAKE = "torque of the brake on the {} wheel, against its spin"
+AT_WHEEL = (
     ("drive_torque_{}", "N m", "torque of the drive on the {} wheel", 0.0, (-2e4, 2e4)),
-    (
-        "brake_torque_{}",
-        "N m",
-        "torque of the brake on the {} wheel, against its spin",
-        0.0,
-        (0, 2e4),
-    ),
+    ("brake_torque_{}", "N m", BRAKE, 0.0, (0, 2e4)),
     ("friction_{}", "1", "factor on the friction of the {} tire", 1.0, (0.05, 1.5)),
     ("road_{}", "m", "height of the road under the {} wheel", 0.0, (-0.5, 0.5)),
     ("road_{}_dot", "m/s", "rate of the height of the road under the {} wheel", 0.0, (-5.0, 5.0)),
@@ -111,16 +106,14 @@ FIALA = (
 ROUNDED = 0.01
 
 
-def _optional_inputs() -> Iterator[tuple[Quantity, tuple[float, float]]]:
-    for name, unit, meaning, default, valid in _AT_WHEEL:
-        for wheel in WHEELS:
-            yield Quantity(name.format(wheel), unit, meaning.format(wheel), default), valid
-    meaning = "force on the sprung body's centre of mass along the chassis, drag is negative"
-    yield Quantity("body_force_x", "N", meaning, 0.0), (-1e5, 1e5)
-
-
 # What drives, brakes and lifts a vehicle, and where these inputs mean anything.
-_RANGES = dict(_optional_inputs())
+_RANGES: dict[Quantity, tuple[float, float]] = {
+    Quantity(name.format(wheel), unit, meaning.format(wheel), default): valid
+    for name, unit, meaning, default, valid in AT_WHEEL
+    for wheel in WHEELS
+}
+PUSH = "force on the sprung body's centre of mass along the chassis, drag is negative"
+_RANGES[Quantity("body_force_x", "N", PUSH, 0.0)] = (-1e5, 1e5)
 OPTIONAL_INPUTS = tuple(_RANGES)
 # What the declarations of all vehicles share.
 VEHICLE: dict[str, Any] = {

@@ -18,16 +18,18 @@ from vehiclemor.reduction.interface import OfflineCost, installed
 from vehiclemor.reduction.learned_samples import (
     Coordinates,
     Samples,
-    States,
+    deviations_of,
     gathered,
     online_inputs,
     principal,
+    shape_of,
     slow,
     thinned,
 )
 from vehiclemor.reduction.settings import Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.reduction.trust import trust_of
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory
@@ -94,6 +96,22 @@ def stepped(step: Step) -> Path:
     return path
 
 
+def paths_in_step(
+    path: Path, starts: Sequence[np.ndarray], inputs: Sequence[np.ndarray]
+) -> list[np.ndarray]:
+    """Coordinates (steps + 1, r) of some runs, from starts (r,) and inputs (steps, 2 inputs).
+
+    All of them go on step by step together: a prediction of many rows takes a library hardly longer
+    than one of a single row.
+    """
+    padded = np.zeros((max(map(len, inputs)), len(inputs), inputs[0].shape[1]))
+    for run, u in enumerate(inputs):
+        padded[: len(u), run] = u
+    with np.errstate(all="ignore"):
+        paths = np.asarray(path(np.stack(starts), padded))
+    return [paths[: len(u) + 1, run] for run, u in enumerate(inputs)]
+
+
 def predicted(*regressors: tuple[Any, Any]) -> Path:
     """A path whose changes in a step are what regressors of scikit-learn predict, times scales."""
 
@@ -115,12 +133,7 @@ class TrainingData:
 
     @classmethod
     def of(
-        cls,
-        model: Any,
-        training: Training,
-        settings: SampledSettings,
-        library: str,
-        coordinates: Callable[[Samples], Coordinates],
+        cls, model: Any, training: Training, settings: Any, library: str = "sklearn"
     ) -> "TrainingData":
         """From training runs; `InputError` if the package of the library is missing."""
         for needed in (library, "sklearn"):
@@ -129,17 +142,17 @@ class TrainingData:
         samples = gathered(model, training, settings.steps, settings.skipped)
         # Samples that another fit has gathered count as if this one had.
         began = time.process_time() - samples.seconds
-        return cls(samples, coordinates(samples), settings.readout, began)
+        return cls(samples, settings.of_samples(samples), settings.readout, began)
 
     @property
     def static(self) -> bool:
         """Whether coordinates follow from the inputs, as of a mechanism: there are no steps."""
-        return self.samples.states.model.kind == "ae"
+        return self.samples.model.kind == "ae"
 
     @property
     def constant(self) -> bool:
         """Whether there are constant terms; a vehicle that is not steered runs straight on."""
-        return self.samples.states.shape is None
+        return self.samples.shape is None
 
     @cached_property
     def input_scale(self) -> np.ndarray:
@@ -209,10 +222,10 @@ class TrainingData:
             linear = LinearRegression(fit_intercept=self.constant)
             readout = make_pipeline(features, linear).fit(arguments, values)
         largest = np.abs(z).max(axis=0)
-        online = inputs[:, len(samples.states.model.inputs) :]
+        online = inputs[:, len(samples.model.inputs) :]
         low, high = np.append(-largest, online.min(axis=0)), np.append(largest, online.max(axis=0))
         return LearnedModel(
-            samples.states,
+            samples.model,
             self.coordinates,
             path,
             readout,
@@ -233,7 +246,7 @@ def both_ends(inputs: np.ndarray) -> np.ndarray:
 class LearnedModel(ShortRepr):
     """What a general learner has learned from training runs, run by the library that fitted it."""
 
-    states: States
+    model: Any  # The full one.
     coordinates: Coordinates
     path: Path
     # `RunSamples.values` per coordinates and standardised inputs; none of a mechanism.
@@ -247,10 +260,10 @@ class LearnedModel(ShortRepr):
     # Inputs and start of a run as bytes -> its path, see `in_step`.
     known: dict[bytes, np.ndarray] = field(default_factory=dict)
 
-    @property
-    def model(self) -> Any:
-        """The full model."""
-        return self.states.model
+    @cached_property
+    def shape(self) -> VehicleShape | None:
+        """Of a vehicle."""
+        return shape_of(self.model)
 
     @property
     def order(self) -> int:
@@ -259,33 +272,23 @@ class LearnedModel(ShortRepr):
 
     def for_model(self, model: Any) -> "LearnedModel":
         """The same for a model whose online parameters are others."""
-        return replace(self, states=States.of_model(model))
+        return replace(self, model=model)
 
     def in_step(self, runs: Sequence[tuple[Any, Excitation, Start]]) -> "LearnedModel":
-        """The same, with the paths of some runs (model, maneuver, start) known.
-
-        All of them go on step by step together: a prediction of many rows takes a library hardly
-        longer than one of a single row.
-        """
-        if self.model.kind == "ae" or not runs:
+        """The same, with the paths of some runs (model, maneuver, start) known."""
+        if self.model.kind == "ae":
             return self
-        begun = []
+        starts, inputs = [], []
         for model, maneuver, start in runs:
             checked = checked_maneuver(maneuver, model.definition)
-            begun.append(self.for_model(model)._begun(checked, model.start(start))[1:])
-        longest = max(len(inputs) for _, inputs in begun)
-        inputs = np.zeros((longest, len(runs), begun[0][1].shape[1]))
-        for run, (_, of_run) in enumerate(begun):
-            inputs[: len(of_run), run] = of_run
-        paths = self._paths(np.stack([z for z, _ in begun]), inputs)
-        known = {
-            _key(z, of_run): paths[: len(of_run) + 1, run] for run, (z, of_run) in enumerate(begun)
-        }
-        return replace(self, known=known)
+            _, z, u = self.for_model(model)._begun(checked, model.start(start))
+            starts.append(z)
+            inputs.append(u)
+        paths = paths_in_step(self.path, starts, inputs)
+        return replace(self, known=dict(zip(map(_key, starts, inputs), paths, strict=True)))
 
     def best_approximation(self, states: np.ndarray) -> None:
         """States are no linear function of the coordinates: there is no subspace."""
-        del states
 
     def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """A run at the maneuver's output times, between steps by cubic splines."""
@@ -324,7 +327,7 @@ class LearnedModel(ShortRepr):
         times, z, inputs = self._begun(maneuver, state)
         path = self.known.get(_key(z, inputs))
         if path is None:
-            path = self._paths(z[None], inputs[:, None])[:, 0]
+            (path,) = paths_in_step(self.path, [z], [inputs])
         with np.errstate(invalid="ignore"):
             sound = (np.abs(path) < LARGEST).all(axis=1)
         return times, path[: len(path) if sound.all() else max(int(np.argmin(sound)), 1)]
@@ -336,17 +339,13 @@ class LearnedModel(ShortRepr):
         inputs = online_inputs(model, maneuver.at(np.minimum(times, maneuver.duration)))
         z = np.zeros(self.order)
         if model.kind != "structural":
-            z = self.coordinates.of(self.states.of(state[None]), inputs[:1])[0]
+            deviation = deviations_of(model, self.shape, state[None])
+            z = self.coordinates.of(deviation, inputs[:1])[0]
         return times, z, both_ends(inputs / self.input_scale)
-
-    def _paths(self, start: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """See `Path`."""
-        with np.errstate(all="ignore"):
-            return np.asarray(self.path(start, inputs))
 
     def _states(self, times: np.ndarray, values: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Full states (samples, 2 n): heading and position of a vehicle follow by quadratures."""
-        if not (shape := self.states.shape):
+        if not (shape := self.shape):
             states = values + self.model.start()
         else:
             turn, *speeds = (values[:, -3:] + [0.0, shape.speed, 0.0]).T

@@ -39,24 +39,15 @@ def online_inputs(model: Model, inputs: np.ndarray) -> np.ndarray:
     return np.hstack([inputs, np.tile(online, (len(inputs), 1))]) if online else inputs
 
 
-@dataclass(frozen=True, eq=False)
-class States:
-    """States of a model as deviations from its first start."""
+def shape_of(model: Any) -> VehicleShape | None:
+    """Shape of a vehicle that is steered; none of any other model."""
+    steered = model.kind in ("ode", "dae") and not no_steered_vehicle(model)
+    return VehicleShape(model) if steered else None
 
-    model: Any  # The full model.
-    shape: VehicleShape | None  # Of a vehicle.
 
-    @classmethod
-    def of_model(cls, model: Any) -> "States":
-        """The states of a model of any kind."""
-        steered = model.kind in ("ode", "dae") and not no_steered_vehicle(model)
-        return cls(model, VehicleShape(model) if steered else None)
-
-    def of(self, states: np.ndarray) -> np.ndarray:
-        """Deviations (samples, n) of full states from the first start."""
-        if self.shape:
-            return self.shape.of(states) - self.shape.reference
-        return states - self.model.start()
+def deviations_of(model: Any, shape: VehicleShape | None, states: np.ndarray) -> np.ndarray:
+    """Deviations (samples, n) of full states, of a vehicle of its shape, from the first start."""
+    return shape.of(states) - shape.reference if shape else states - model.start()
 
 
 class RunSamples(NamedTuple):
@@ -73,7 +64,8 @@ class RunSamples(NamedTuple):
 class Samples:
     """Samples of all training runs."""
 
-    states: States  # Meaning of the deviations.
+    model: Any  # The full one.
+    shape: VehicleShape | None  # Of a vehicle.
     spacing: float  # Time in s between samples.
     runs: tuple[RunSamples, ...]
     # Of the full model's equations; CPU time of the process.
@@ -107,7 +99,7 @@ def gathered(model: Any, training: Training, steps: int, skipped: float) -> Samp
 def _gathered(model: Any, runs: tuple[Any, ...], steps: int) -> Samples:
     began = time.process_time()
     training = [TrainingRun(*run) for run in runs]
-    states, maneuvers = States.of_model(model), [run.maneuver for run in training]
+    shape, maneuvers = shape_of(model), [run.maneuver for run in training]
     spacings = [maneuver.duration / (maneuver.samples - 1) / steps for maneuver in maneuvers]
     if max(spacings) - min(spacings) > 1e-9 * max(spacings):
         raise InputError(
@@ -117,13 +109,13 @@ def _gathered(model: Any, runs: tuple[Any, ...], steps: int) -> Samples:
     count = sum((maneuver.samples - 1) * steps for maneuver in maneuvers)
     if count < FEWEST:
         raise InputError(f"learned models need at least {FEWEST} samples of training, not {count}")
-    found = [_of_run(states, run, steps) for run in training]
+    found = [_of_run(shape, run, steps) for run in training]
     parts, evaluations = zip(*found, strict=True)
     seconds = time.process_time() - began
-    return Samples(states, spacings[0], parts, sum(evaluations), seconds)
+    return Samples(model, shape, spacings[0], parts, sum(evaluations), seconds)
 
 
-def _of_run(states: States, run: TrainingRun, steps: int) -> tuple[RunSamples, int]:
+def _of_run(shape: VehicleShape | None, run: TrainingRun, steps: int) -> tuple[RunSamples, int]:
     """Samples of a run, and evaluations of its equations."""
     model: Any = run.model
     maneuver = run.maneuver.subdivided(steps)
@@ -135,9 +127,11 @@ def _of_run(states: States, run: TrainingRun, steps: int) -> tuple[RunSamples, i
         deviations, values = np.hstack([full.coordinates, speeds]), full.outputs
     else:
         full = replace(run, maneuver=maneuver).recorded()
-        static = model.kind == "ae"
-        values = deviations = full.coordinates if static else states.of(full.states)
-        if shape := states.shape:
+        deviations = full.coordinates
+        if model.kind != "ae":
+            deviations = deviations_of(model, shape, full.states)
+        values = deviations
+        if shape:
             motion = shape.rates(deviations + shape.reference, full.inputs)[1]
             values = np.hstack([deviations, motion - [0.0, shape.speed, 0.0]])
             further = len(motion)
@@ -181,7 +175,7 @@ def principal(samples: Samples, rank: int) -> Coordinates:
 
 def slow(samples: Samples) -> Coordinates:
     """Coordinates of a vehicle's slow motion, heave, pitch and speed: those of `slow_manifold`."""
-    if not (shape := samples.states.shape):
+    if not (shape := samples.shape):
         raise InputError("coordinates are 'slow'; only vehicles that steer have slow coordinates")
     modes = slow_modes(shape, FASTEST, SYMMETRIC)
     return Coordinates(modes.encoding, modes.input_shift)

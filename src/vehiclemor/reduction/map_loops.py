@@ -46,10 +46,8 @@ class Cells(NamedTuple):
         """Raise `ValueError` if the loop would read beyond the coefficients."""
         numbers, inputs = self.numbers.tolist(), len(self.numbers)
         require(all(type(number) is int and number > 0 for number in numbers), "numbers")
-        check_shapes("cells", (self.centres, inputs), (self.scales, inputs))
-        check_shapes(
-            "cells", (self.coefficients, math.prod(numbers), *self.coefficients.shape[1:3])
-        )
+        coefficients = self.coefficients, math.prod(numbers), *self.coefficients.shape[1:3]
+        check_shapes("cells", (self.centres, inputs), (self.scales, inputs), coefficients)
         # What is no number would be in a cell anywhere.
         require(bool(np.isfinite([self.centres, self.scales]).all()), "cells")
 

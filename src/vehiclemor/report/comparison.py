@@ -1,6 +1,12 @@
-"""Comparisons: with the paper, of every model, of any study; costs, and handling tests."""
+"""Comparisons: with the paper, of every model, of any study; costs.
 
-from collections.abc import Iterable, Mapping, Sequence
+A model is compared by studies of its declaration: nominal, perturbed and unseen inputs, every
+method.  What the package has is taken; else a study file is written beside the results, so that it
+runs, resumes and can be read and changed like any other.
+"""
+
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -8,23 +14,26 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from vehiclemor.arguments import count, file_path
+from vehiclemor.arguments import file_path
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import data_names
-from vehiclemor.handling.metrics import RACK, TESTS, declared, metrics, test_of
-from vehiclemor.inputs.maneuver import registered
-from vehiclemor.reduction.reduced_model import ReducedOrderModel
 from vehiclemor.registry import component, names, unknown
-from vehiclemor.report.default_studies import nominal, perturbed, unseen
-from vehiclemor.report.frames import frame, grid_rows
-from vehiclemor.report.labels import of_kind, timing_cases
-from vehiclemor.report.printed_numbers import TIMING, number_rows, printed_errors_and_savings
-from vehiclemor.report.result_selection import result_kind
+from vehiclemor.report.labels import REDUCED, default_rank, of_kind, tabled_outputs, timing_cases
+from vehiclemor.report.published import (
+    INDISTINGUISHABLE,
+    TIMING,
+    number_rows,
+    printed_errors_and_savings,
+    rms_numbers,
+)
+from vehiclemor.report.results import frame, grid_rows, result_kind
 from vehiclemor.report.unseen import protocol_rows
 from vehiclemor.simulation.build import build
-from vehiclemor.simulation.trajectory import Trajectory
-from vehiclemor.study.experiment import complete_settings, make_experiment
-from vehiclemor.study.plans.loading import is_study
+from vehiclemor.simulation.model import Model
+from vehiclemor.study.experiment import complete_settings, default_settings, make_experiment
+from vehiclemor.study.plans.loading import is_study, write_study
+from vehiclemor.study.plans.protocol import PREFIX, protocol_names
+from vehiclemor.study.plans.study_file import schema_of
 from vehiclemor.study.run import run_studies
 from vehiclemor.study.scenario import Scenario
 from vehiclemor.study.timing import timed_starts
@@ -32,9 +41,21 @@ from vehiclemor.study.timing import timed_starts
 PAPER = "paper"
 # The paper says nothing of another start.
 PUBLISHED_START = "equilibrium"
-# Hz: frequencies of a response that are printed.
-PRINTED = (0.5, 1.0)
 Row = dict[str, Any]
+# Perturbations of the nominal run; and tolerances of the full order in a protocol.
+FACTORS = (0.8, 0.9, 1.0, 1.1, 1.2)
+TOLERANCES = (1e-3, 1e-4, 1e-6, 1e-8)
+# Method and preset of the first rows.
+FIRST = (("full_order", "recommended"), ("full_order", "strongest"), ("replay", "recommended"))
+# Of a protocol; every other method is a contender.
+ROLES = {"full_order": "full order", "replay": "baseline"}
+# Points [frequency factor, amplitude factor] of the sets of a protocol.
+POINTS = {
+    "training": [[1.0, 1.0], [0.7, 0.6]],
+    "validation": [[1.2, 0.8], [0.8, -0.9]],
+    "test": [[0.9, 1.0], [1.3, 1.0], [1.0, 0.5], [1.0, -1.0], [1.0, 0.0]],
+    "outside": [[1.0, 1.2], [1.6, 1.0]],
+}
 
 
 def compare(
@@ -64,12 +85,11 @@ def compare(
     pandas.DataFrame
         Of `paper` a row for each published number and variant of the method (`default`, `literal`:
         the paper's words): its id, model, item, the published number, a `verdict` (`met`, `missed`,
-        `not_comparable`), the columns of `printed_numbers.Finding`, and `replay`, the same number
+        `not_comparable`), the columns of `published.Finding`, and `replay`, the same number
         of the training-trajectory baseline.  The others are described at `model_comparison` and
         `study_comparison` in `vehiclemor.report.comparison`.
     """
     what, folder = str(file_path("what", what)), file_path("results", results)
-    jobs = count("jobs", jobs)
     if seed is not None and (what == PAPER or what in names("model")):
         raise InputError(f"seed: comparison {what!r} samples no test runs of its own")
     if what == PAPER:
@@ -117,8 +137,8 @@ def study_comparison(
     """A study, all members of a collection, or a protocol; what is missing is run first.
 
     `kind` tells what a row is.  `errors`: an output of one method from one start over a study's
-    grid, see `frames.grid_rows`.  `method`, `target`, `bound`: a method of a protocol, and what the
-    one that validation has chosen must and does reach, see `unseen`.  Errors are in SI units.
+    grid, see `results.grid_rows`.  `method`, `target`, `bound`: a method of a protocol, and what
+    the one that validation has chosen must and does reach, see `unseen`.  Errors are in SI units.
     """
     results = run_studies(study, folder, jobs, seed=seed).values()
     return pd.DataFrame([row for dataset in results for row in result_rows(dataset)])
@@ -128,6 +148,9 @@ def result_rows(dataset: xr.Dataset) -> Sequence[Row]:
     """Rows of one study, by what it is."""
     is_protocol = result_kind(dataset) == "protocol"
     return protocol_rows(dataset) if is_protocol else grid_rows(dataset)
+
+
+# Costs.
 
 
 def timing_of(model: str, folder: Path) -> xr.Dataset:
@@ -181,60 +204,87 @@ def break_even(runs: Any, speed_up: str) -> Any:
     return (offline / saved).where((saved > 0.0) & (offline > 0.0))
 
 
-# Handling tests, full and reduced models side by side.
+# Studies of a model.
 
 
-def maneuvers_of(full: ReducedOrderModel, reduced: Iterable[ReducedOrderModel]) -> list[str]:
-    """Registered maneuvers with numbers, whose inputs all models have, in the order of the tests.
+def nominal(name: str, results: Path) -> str:
+    """Study of the nominal run, that the methods are trained on."""
+    return _study(name, "nominal", results, {"start": list(build(name).starts)})
 
-    The full model has its optional inputs too.  `InputError` if there are none.
+
+def perturbed(name: str, results: Path) -> str:
+    """Study over perturbations of both factors, trained on the nominal input."""
+    factors = list(FACTORS)
+    grid = {"frequency_factor": factors, "amplitude_factor": factors}
+    further = {"training": "nominal", "keep": "metrics", "grid": grid}
+    return _study(name, "perturbed", results, further)
+
+
+def unseen(name: str, results: Path) -> str:
+    """Study of inputs that no method has seen: the package's protocol, or one by default."""
+    if name in protocol_names():
+        return protocol_names()[name]
+    model = build(name)
+    entries = [entry for entry in _entries(model) if entry["preset"] != "literal"]
+    for entry in entries:
+        entry["role"] = ROLES.get(entry["method"], "contender")
+        entry["label"] = entry["label"].removeprefix("full_order_").replace("_", " ")
+        if entry["label"] == "full order":
+            entry["candidates"] = [{"tolerance": value} for value in TOLERANCES]
+    inputs = {"maneuver": model.definition.maneuver, "start": list(model.starts)}
+    content = {
+        "title": f"{name}: inputs that a reduced model has not seen",
+        "model": name,
+        "bounds": {o: {"measure": "rms", "bound": bound} for o, bound in bounds(model).items()},
+        "methods": entries,
+        **{purpose: [inputs | {"points": points}] for purpose, points in POINTS.items()},
+    }
+    return _written(results, f"{PREFIX}{name}", content)
+
+
+def _entries(model: Model) -> list[dict[str, Any]]:
+    """Every registered method that accepts the model, at a rank that the model is large enough for.
+
+    A broken plug-in is named by `vehiclemor list`, and harmless here.
     """
-    definition = full.model.definition
-    every = (*definition.inputs, *definition.optional_inputs)
-    shared = {quantity.name for quantity in every}.intersection(*(r.inputs for r in reduced))
-    known = {*names("maneuver")}
-    wanted = [name for test in TESTS for name in (test, RACK + test) if name in known]
-    fitting = [name for name in wanted if shared.issuperset(registered(name).inputs)]
-    if not fitting:
-        raise InputError(f"{definition.name} is no vehicle of the tests: {', '.join(TESTS)}")
-    return fitting
+    known: dict[str, Any] = {}
+    for name in names("method"):
+        with suppress(InputError):
+            known[name] = component("method", name)
+    every = dict.fromkeys([*FIRST, *REDUCED, *((name, "recommended") for name in known)])
+    return [
+        {"method": name, "preset": preset, "settings": smaller_rank(model, name)}
+        | {"label": name if preset == "recommended" else f"{name}_{preset}"}
+        for name, preset in every
+        if name in known
+        and known[name].accepts(model)[0]
+        and preset in known[name].presets_of(model.kind)
+    ]
 
 
-def handling_rows(
-    models: Mapping[str, ReducedOrderModel], maneuvers: Iterable[str], amplitude: float
-) -> list[dict[str, Any]]:
-    """A row for each number, with a column for each model by its name.
-
-    The first model is the full one: all runs start from its state, and by default all maneuvers are
-    taken whose inputs all models have.
-    """
-    first, *reduced = models.values()
-    start, speed = first.model.start(), first.parameters.get("initial_speed", np.nan)
-    chosen = list(maneuvers) or maneuvers_of(first, reduced)
-    standards = {name: declared().standards[test_of(name)] for name in chosen}
-    rows: list[dict[str, Any]] = []
-    for name, standard in standards.items():
-        maneuver = registered(name).perturbed(amplitude=amplitude)
-        runs = {key: model.simulate(maneuver, start) for key, model in models.items()}
-        remarks = [f"{key}: {run.message}" for key, run in runs.items() if run.message]
-        test = "; ".join([f"{name} ({standard}), {speed:.4g} m/s", *remarks])
-        values = {key: _values(run) for key, run in runs.items() if run.finished}
-        # Names and units, in the order of the first run that has come to its end.
-        for number, unit in next(iter(values.values()), [("no numbers", "")]):
-            columns = {key: values.get(key, {}).get((number, unit), np.nan) for key in models}
-            rows.append({"test": test, "number": number, "unit": unit} | columns)
-    return rows
+def bounds(model: Model) -> dict[str, float]:
+    """Largest RMS errors that count as good: published, or a share of the range."""
+    if published := rms_numbers(model.name):
+        return {output: number.value for output, number in published.items()}
+    outputs = model.simulate(component("maneuver", model.definition.maneuver)).outputs
+    ranges = dict(zip(model.outputs, np.ptp(outputs, axis=0), strict=True))
+    shown = [output for output in tabled_outputs(model.definition) if ranges[output] > 0.0]
+    return {output: INDISTINGUISHABLE * float(ranges[output]) for output in shown}
 
 
-def _values(run: Trajectory) -> dict[tuple[str, str], float]:
-    """Name, with its frequency if there is one, and unit of a number -> value."""
-    values: dict[tuple[str, str], float] = {}
-    for key, number in metrics(run).drop_vars("speed").data_vars.items():
-        name, unit = str(key).replace("_", " "), str(number.attrs["units"])
-        if not number.dims:
-            values[name, unit] = float(number)
-            continue
-        for hertz in PRINTED:
-            at = number.sel(frequency=hertz, method="nearest")
-            values[f"{name} at {hertz:g} Hz", unit] = float(at)
-    return values
+def _study(name: str, kind: str, results: Path, further: dict[str, Any]) -> str:
+    """Path of a study file of every method."""
+    head = {"title": f"{name}: {kind} input, every method", "model": name}
+    return _written(results, f"{name}-{kind}", head | {"methods": _entries(build(name))} | further)
+
+
+def _written(results: Path, study: str, content: dict[str, Any]) -> str:
+    path = results / "studies" / f"{study}.toml"
+    return str(write_study(schema_of(content).model_validate(content), path))
+
+
+def smaller_rank(model: Model, method: str) -> dict[str, int]:
+    """The rank of a default row, for a method whose own default the model is too small for."""
+    rank = default_rank(len(model.coordinates))
+    own = default_settings(model, method).get("rank")
+    return {"rank": rank} if isinstance(own, int) and own > rank else {}

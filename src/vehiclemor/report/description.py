@@ -7,7 +7,7 @@ from pydantic import BaseModel
 
 from vehiclemor.files import data_names
 from vehiclemor.inputs.excitation import FACTORS
-from vehiclemor.multibody.definition import DESIGN_START, ModelDefinition
+from vehiclemor.multibody.definition import DESIGN_START, STATE_KINDS, ModelDefinition
 from vehiclemor.parameters import ParameterFile, load_parameters, parameter_path
 from vehiclemor.reduction.interface import never_refused
 from vehiclemor.reduction.model_file import training_of
@@ -34,17 +34,8 @@ KINDS = {
     "structural": "sparse matrices M q'' + D q' + K q, and forces at ports",
 }
 UNKNOWN = "known once the model has been simulated"
-QUANTITIES = (
-    "inputs",
-    "optional_inputs",
-    "outputs",
-    "coordinates",
-    "speeds",
-    "further_states",
-    "equations",
-    "constraints",
-    "ports",
-)
+QUANTITIES = ("inputs", "optional_inputs", "outputs", *STATE_KINDS)
+QUANTITIES += ("equations", "constraints", "ports")
 
 
 def description(name: str) -> Description:

@@ -1,6 +1,6 @@
 """What tables and figures show and how they call it: outputs, columns, cases of the cost table.
 
-The three models of the paper have rows of their own in `data/figures/tables.toml`; every other one
+The three models of the paper have rows of their own in `data/figures/labels.toml`; every other one
 gets rows by its kind of equations.
 """
 
@@ -26,14 +26,10 @@ Kind = Literal["histories", "paths", "errors"]
 Format = Literal["zarr", "parquet", "csv"]
 # What is said of a run that was in its own training, and the mark of it in a legend.
 TRAINED, MARK = "trained on this run", "*"
-# Letters of an axis' label that leave no room for more beside them; of one beside a low panel.
-LONG, LONGEST = 16, 26
 EXPONENT = re.compile(r"\^(-?\d+(?:\.\d+)?)")
 PREFIXES = ((1e3, "m"), (1e6, "µ"), (1e9, "n"))
 # Format of errors: an exact zero is 0, since orders of magnitude are compared.
 ERROR = ".1e"
-MOST_PRINTED = 3
-LARGEST_DEFAULT_RANK = 3
 # Method and preset of the reduced models that are timed where none are listed.
 REDUCED = (("pod", "recommended"), ("pod", "literal"), ("fixed_basis", "recommended"))
 
@@ -64,12 +60,43 @@ class Column(NamedTuple):
     scale: float = 1.0
 
 
+class Case(MethodEntry):
+    """A row of a cost table; identifier and label of a reduced model follow from its settings."""
+
+    id: str = ""
+
+    def named(self) -> Case:
+        """With identifier and label: what differs from the recommended settings."""
+        label = self.label
+        if not label:
+            parts = [self.method.replace("_", " ")]
+            parts += [self.preset] if self.preset != "recommended" else []
+            rest = dict(self.settings)
+            rank, tolerance = rest.pop("rank"), rest.pop("tolerance", None)
+            label = " ".join([*parts, *map(str, rest.values()), f"r={rank}"])
+            label += "" if tolerance is None else f", {tolerance:.0e}".replace("e-0", "e-")
+        name = self.id or label.replace(",", "").replace("=", "").replace(" ", "_")
+        return self.model_copy(update={"id": name, "label": label})
+
+
+class OfKind(FileSchema):
+    """What tables show of all models of a kind."""
+
+    against: list[Line] = Field(min_length=2, max_length=2)
+    cases: list[Case]
+    counts: dict[str, Line]
+
+
 class LabelFile(FileSchema):
     """Schema of `data/figures/labels.toml`."""
 
     outputs: dict[str, Label]
     methods: dict[str, MethodLook]
     columns: dict[str, Column]
+    algebraic: OfKind
+    dynamic: OfKind
+    structural: OfKind
+    reduced: dict[str, list[Case]]
 
 
 @cache
@@ -132,7 +159,7 @@ def readable_unit(largest: float, unit: str) -> tuple[float, str]:
 
 def axis_label(dataset: xr.Dataset, output: str, unit: str = "") -> str:
     """Name, symbol and unit (the output's own by default) of an output."""
-    text = full_label(output, "\n" if len(label_of(output).name) > LONG else " ")
+    text = full_label(output, "\n" if len(label_of(output).name) > 16 else " ")
     return f"{text} ({raised(unit or unit_of(dataset, output))})"
 
 
@@ -141,70 +168,28 @@ def error_label(dataset: xr.Dataset, kind: str, output: str, unit: str = "") -> 
     unit = unit or unit_of(dataset, output)
     symbol = label_of(output).symbol
     letters = len(f"{kind} of {symbol} ({unit})".replace("$", ""))
-    between = " " if letters <= LONGEST else "\n"
+    between = " " if letters <= 26 else "\n"
     return f"{kind} of{between}{symbol} ({raised(unit)})"
 
 
 # What is shown of a model.
 
 
-class Case(MethodEntry):
-    """A row of a cost table; identifier and label of a reduced model follow from its settings."""
-
-    id: str = ""
-
-    def named(self) -> Case:
-        """With identifier and label: what differs from the recommended settings."""
-        label = self.label
-        if not label:
-            parts = [self.method.replace("_", " ")]
-            parts += [self.preset] if self.preset != "recommended" else []
-            rest = dict(self.settings)
-            rank, tolerance = rest.pop("rank"), rest.pop("tolerance", None)
-            label = " ".join([*parts, *map(str, rest.values()), f"r={rank}"])
-            label += "" if tolerance is None else f", {tolerance:.0e}".replace("e-0", "e-")
-        name = self.id or label.replace(",", "").replace("=", "").replace(" ", "_")
-        return self.model_copy(update={"id": name, "label": label})
-
-
-class OfKind(FileSchema):
-    """What tables show of all models of a kind, see `data/figures/tables.toml`."""
-
-    against: list[Line] = Field(min_length=2, max_length=2)
-    cases: list[Case]
-    counts: dict[str, Line]
-
-
-class TablesFile(FileSchema):
-    """Schema of `data/figures/tables.toml`."""
-
-    algebraic: OfKind
-    dynamic: OfKind
-    structural: OfKind
-    reduced: dict[str, list[Case]]
-
-
-@cache
-def tables_file() -> TablesFile:
-    """The package's own file."""
-    return read_toml(data_folder() / "figures" / "tables.toml", TablesFile)
-
-
 def of_kind(kind: str) -> OfKind:
     """What tables show of all models of a kind, one of `KINDS`."""
-    file = tables_file()
+    file = declared()
     return {"ae": file.algebraic, "structural": file.structural}.get(kind, file.dynamic)
 
 
 def default_rank(coordinates: int) -> int:
     """Rank of the reduced models in the default rows: 3, but less than the coordinates."""
-    return max(1, min(LARGEST_DEFAULT_RANK, coordinates - 1))
+    return max(1, min(3, coordinates - 1))
 
 
 def timing_cases(definition: ModelDefinition) -> list[Case]:
     """Rows of a model's cost table: full-order solvers, replay, reduced models."""
     settings: Settings = {"rank": default_rank(len(definition.coordinates))}
-    reduced = tables_file().reduced.get(definition.name) or [
+    reduced = declared().reduced.get(definition.name) or [
         Case.model_validate({"method": method, "preset": preset, "settings": settings})
         for method, preset in REDUCED
         # Those of structures stand among their cases.
@@ -220,4 +205,4 @@ def tabled_outputs(definition: ModelDefinition) -> tuple[str, ...]:
 
 def main_outputs(definition: ModelDefinition) -> tuple[str, ...]:
     """Outputs that are printed and drawn: those that the model declares, or the first three."""
-    return definition.main_outputs or tabled_outputs(definition)[:MOST_PRINTED]
+    return definition.main_outputs or tabled_outputs(definition)[:3]

@@ -12,18 +12,16 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
+from vehiclemor.arguments import file_path, study_names
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import begins_with, replaceable, write_text
 from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import names
-from vehiclemor.report.comparison import paper_comparison, result_rows
-from vehiclemor.report.default_studies import nominal, perturbed, unseen
+from vehiclemor.report.comparison import nominal, paper_comparison, perturbed, result_rows, unseen
 from vehiclemor.report.figures.result_plot import PICTURES, pictures_of, plot_result
 from vehiclemor.report.figures.theme import METADATA, styled
-from vehiclemor.report.frames import counted_ends
-from vehiclemor.report.result_selection import KINDS, select_point
+from vehiclemor.report.results import KINDS, counted_ends, select_point
 from vehiclemor.report.screens import Part, paper_parts, study_parts
 from vehiclemor.study.plans.loading import refuse_doubles
 from vehiclemor.study.run import run_studies
@@ -82,11 +80,7 @@ def write_report(
     studies = study_names("studies", studies)
     left_out: dict[str, str] = {}
     sections: list[Section] = []
-    if studies:
-        jobs = count("jobs", jobs, most=MOST_JOBS)
-        datasets = _run_studies(studies, folder, jobs)
-    else:
-        datasets = _stored(folder, left_out)
+    datasets = _run_studies(studies, folder, jobs) if studies else _stored(folder, left_out)
     if "paper" in studies:
         draw = partial(_paper, folder, jobs)
         sections += attempt_apart("comparison with the paper", left_out, draw)
@@ -113,8 +107,7 @@ def _run_studies(wanted: Sequence[str], folder: Path, jobs: int) -> dict[str, xr
     for name in chosen:
         for dataset in run_studies(name, folder, jobs).values():
             # Two studies may have one name, but not one file.
-            file = Path(dataset.encoding.get("source", dataset.attrs["study"]))
-            datasets[file.stem] = dataset
+            datasets[Path(dataset.encoding["source"]).stem] = dataset
     return datasets
 
 
@@ -123,7 +116,7 @@ def _stored(folder: Path, left_out: dict[str, str]) -> dict[str, xr.Dataset]:
     datasets: dict[str, xr.Dataset] = {}
     for path in sorted((folder / "studies").glob("*.nc")):
         try:
-            dataset = read_dataset(path, "source", "vehiclemor", stored=True)
+            dataset = read_dataset(path, stored=True)
         except FileError as error:
             left_out[str(path)] = str(error).removeprefix(f"{path}: ")
             continue

@@ -20,19 +20,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Rows = Sequence[Mapping[str, Any]]
-# Columns of a line where there is no terminal, and the most that a wide one is given.
-WIDTH, WIDEST = 80, 120
-# A column of texts is never narrower, where its texts are longer.
-NARROWEST = 12
-# Indent of a note.
-NOTE = 4
-# Column that is printed of each output of a simulation -> variable.
-ERRORS = {
-    "rms_error": "rms_error",
-    "floor": "floor_rms_error",
-    "max_error": "max_error",
-    "signal_range": "signal_range",
-}
+# Variable of a simulation -> column that is printed for each output.
+ERRORS = {"rms_error": "rms_error", "floor_rms_error": "floor", "max_error": "max_error"}
+ERRORS |= {"signal_range": "signal_range", "output_unit": "unit"}
 
 
 @dataclass(frozen=True)
@@ -53,13 +43,10 @@ class Table:
     below: str = ""
 
     def _records(self) -> Rows:
-        """Rows, those of a group together."""
-        rows = self.rows
-        records: Rows = rows if isinstance(rows, Sequence) else rows.to_dict("records")  # type: ignore[assignment]
-        if not self.group:
-            return records
-        groups = list(dict.fromkeys(row[self.group] for row in records))
-        return sorted(records, key=lambda row: groups.index(row[self.group]))
+        return self.rows if isinstance(self.rows, Sequence) else self.rows.to_dict("records")  # type: ignore[return-value]
+
+    def _groups(self, records: Rows) -> Mapping[str, Rows]:
+        return grouped(records, self.group) if self.group else {"": records}
 
     def _kinds(self, records: Rows) -> tuple[Mapping[str, Column], str]:
         """How each column is printed, and what the columns mean."""
@@ -69,23 +56,20 @@ class Table:
         meanings = [f"{kind.heading}: {kind.meaning}" for kind in kinds.values() if kind.meaning]
         return kinds, f"({'; '.join(meanings)}.)" if meanings and self.explain else ""
 
-    def _texts(self, row: Mapping[str, Any], kinds: Mapping[str, Column]) -> list[str]:
-        return [format_value(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
-
     def __html__(self) -> str:
         records = self._records()
         kinds, meanings = self._kinds(records)
-        wide, last = f'<tr><td colspan="{len(kinds)}"><div>%s</div></td></tr>', None
+        wide = f'<tr><td colspan="{len(kinds)}"><div>%s</div></td></tr>'
         heads = "".join(f"<th>{escape(kind.heading)}</th>" for kind in kinds.values())
         lines = [f"<tr>{heads}</tr>"]
-        for row in records:
-            if self.group and row[self.group] != last:
-                last = row[self.group]
-                lines.append(wide % f"<b>{escape(str(last))}</b>")
-            cells = (f"<td>{_cell(row.get(name), kind)}</td>" for name, kind in kinds.items())
-            lines.append(f"<tr>{''.join(cells)}</tr>")
-            if self.note and row[self.note]:
-                lines.append(wide % escape(str(row[self.note])))
+        for group, rows in self._groups(records).items():
+            if group:
+                lines.append(wide % f"<b>{escape(group)}</b>")
+            for row in rows:
+                cells = (f"<td>{_cell(row.get(name), kind)}</td>" for name, kind in kinds.items())
+                lines.append(f"<tr>{''.join(cells)}</tr>")
+                if self.note and row[self.note]:
+                    lines.append(wide % escape(row[self.note]))
         caption = f"<h3>{escape(self.title)}</h3>" if self.title else ""
         texts = (f"<p>{escape(text)}</p>" for text in (meanings, self.below) if text)
         return "".join([caption, "<table>", *lines, "</table>", *texts])
@@ -93,21 +77,32 @@ class Table:
     def __str__(self) -> str:
         records = self._records()
         kinds, meanings = self._kinds(records)
-        cells = [self._texts(row, kinds) for row in records]
+        cells = [_texts(row, kinds) for row in records]
         numbers = [_are_numbers(row.get(name) for row in records) for name in kinds]
         heads = [kind.heading for kind in kinds.values()]
-        widths, last = _widths(heads, cells, numbers), None
+        widths = _widths(heads, cells, numbers)
         # Headings stand at the bottom of their lines.
         lines = [wrapped(self.title), *_in_columns(heads, widths, numbers, -1)]
-        for row, line in zip(records, cells, strict=True):
-            if self.group and row[self.group] != last:
-                last = row[self.group]
-                lines.append(wrapped(str(last), 0, 2))
-            lines += _in_columns(line, widths, numbers)
-            if self.note and row[self.note]:
-                lines.append(wrapped(str(row[self.note]), NOTE, NOTE))
+        for group, rows in self._groups(records).items():
+            lines.append(wrapped(group, 0, 2))
+            for row in rows:
+                lines += _in_columns(_texts(row, kinds), widths, numbers)
+                if self.note:
+                    lines.append(wrapped(row[self.note], 4, 4))
         lines += [wrapped(text, 0, 1) for text in (meanings, self.below)]
         return "\n".join(filter(None, lines))
+
+
+def grouped(rows: Rows, key: str) -> dict[Any, list[Any]]:
+    """Rows by the value of a column, in the order of the first of each."""
+    groups: dict[Any, list[Any]] = {}
+    for row in rows:
+        groups.setdefault(row[key], []).append(row)
+    return groups
+
+
+def _texts(row: Mapping[str, Any], kinds: Mapping[str, Column]) -> list[str]:
+    return [format_value(row.get(name), kind.form, kind.scale) for name, kind in kinds.items()]
 
 
 def _are_numbers(values: Iterable[object]) -> bool:
@@ -163,7 +158,7 @@ def _widths(heads: list[str], cells: list[list[str]], numbers: list[bool]) -> li
     texts = [index for index, number in enumerate(numbers) if not number]
     while sum(widths) + len(widths) > width() and texts:
         widest = max(texts, key=lambda index: widths[index])
-        if widths[widest] <= NARROWEST:
+        if widths[widest] <= 12:
             break
         widths[widest] -= 1
     # A heading in one line where there is room for all.
@@ -175,19 +170,13 @@ def simulation_text(dataset: xr.Dataset, shown: Sequence[str], counts: Iterable[
     """Status, a table of the errors of some outputs, solver counts and seconds of a simulation."""
     note = f" ({TRAINED})" if trained_runs(dataset) else ""
     ended = f"{dataset['status'].item()} {dataset['message'].item()}"
-    rows = []
-    for output in shown:
-        errors = dataset.sel(output=output)
-        row: dict[str, object] = {"output": str(output)}
-        for column_name, name in ERRORS.items():
-            row[column_name] = errors[name].item()
-        rows.append(row | {"unit": str(errors["output_unit"].item())})
+    errors = dataset.sel(output=[*shown]).reset_coords()[[*ERRORS]].rename(ERRORS)
     further = dataset.sizes["output"] - len(shown)
     seconds, clock = float(dataset["seconds"]), dataset["seconds"].attrs["clock"]
     parts = [
         wrapped(f"{dataset.attrs['title']}{note}: {ended}"),
         wrapped(str(dataset["remark"].item())),
-        str(Table(rows)),
+        str(Table(errors.to_dataframe().reset_index())),
         f"{further} more outputs: --all-outputs" if further else "",
         wrapped(", ".join(f"{n.replace('_', ' ')} {dataset[n].item()}" for n in counts)),
         f"seconds in the compiled loop {seconds:.3e} ({clock})",
@@ -200,14 +189,8 @@ def json_text(rows: pd.DataFrame) -> str:
 
     (`DataFrame.to_json` rounds to ten places behind the point: errors would lose their digits.)
     """
-
-    def finite(value: object) -> object:
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    def plain(row: Mapping[Any, Any]) -> dict[str, object]:
-        return {key: finite(value) for key, value in row.items()}
-
-    return json.dumps([plain(row) for row in rows.to_dict("records")], indent=2)
+    unknown = rows.isna() | rows.isin([math.inf, -math.inf])
+    return json.dumps(rows.astype(object).mask(unknown, None).to_dict("records"), indent=2)
 
 
 def ends_text(statuses: Iterable[str], warned: int = 0) -> str:
@@ -218,7 +201,7 @@ def ends_text(statuses: Iterable[str], warned: int = 0) -> str:
 
 def width() -> int:
     """Columns of a printed line: the terminal's, but neither below 80 nor too wide to read."""
-    return min(max(shutil.get_terminal_size((WIDTH, 24)).columns, WIDTH), WIDEST)
+    return min(max(shutil.get_terminal_size((80, 24)).columns, 80), 120)
 
 
 def wrapped(text: str, first: int = 0, rest: int = 0) -> str:

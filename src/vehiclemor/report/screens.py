@@ -1,8 +1,7 @@
 """Comparisons as paragraphs and tables, for the terminal and for the page of a report."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from itertools import groupby
+from collections.abc import Callable, Mapping
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -11,10 +10,10 @@ import pandas as pd
 
 from vehiclemor.registry import component, names
 from vehiclemor.report.comparison import PAPER, cost_table, timing_of
-from vehiclemor.report.findings import VERDICTS, counted
-from vehiclemor.report.frames import ERRORS
 from vehiclemor.report.labels import ERROR, Column, column, main_outputs, of_kind
-from vehiclemor.report.printing import Table, format_value, wrapped
+from vehiclemor.report.printing import Table, format_value, grouped, wrapped
+from vehiclemor.report.published import VERDICTS, counted
+from vehiclemor.report.results import ERRORS
 from vehiclemor.study.plans.protocol import FULL_ORDER
 
 Row = dict[str, Any]
@@ -40,14 +39,6 @@ def comparison_text(what: str, rows: pd.DataFrame, folder: Path, show_all: bool 
     return "\n\n".join(map(str, parts))
 
 
-def _groups(rows: Iterable[Row], key: str) -> dict[Any, list[Row]]:
-    """Rows by the value of a column, in the order of the first of each."""
-    table = list(rows)
-    order = list(dict.fromkeys(row[key] for row in table))
-    table.sort(key=lambda row: order.index(row[key]))
-    return {value: list(group) for value, group in groupby(table, itemgetter(key))}
-
-
 # The paper.
 
 
@@ -63,7 +54,7 @@ def paper_parts(rows: pd.DataFrame) -> list[Part]:
 def _printed(rows: list[Row], text: Callable[[Row], str]) -> list[Row]:
     """A line of each printed number: default and literal settings side by side."""
     lines: list[Row] = []
-    for group in _groups(rows, "id").values():
+    for group in grouped(rows, "id").values():
         line = group[0] | {"of": group[0]["model"].replace("_", " ")}
         for row in group:
             line[f"pod_{row['variant']}"] = f"{text(row)} {VERDICTS[row['verdict']]}"
@@ -107,14 +98,13 @@ def cost_text(model: str, folder: Path, brief: bool = False) -> str:
     rows: Any = cost_table(model, folder)
     definition = component("model", model)
     kind = of_kind(definition.kind)
-    rows["spread"] = 50.0 * rows["quartile_spread"]
     rows["from"] = "start " + rows["start"]
     ended = rows["status"].where(rows["status"] != "ok", "")
     rows["label"] += ended.map(lambda status: f" ({status})" if status else "")
     if brief:
         rows = rows[rows["start"] == rows["start"].iloc[0]]
-    times = ["label", "us_per_run", "spread", "speed_up", "speed_up_strongest", "offline_us"]
-    times += ["break_even", "break_even_strongest"]
+    times = ["label", "us_per_run", "quartile_spread", "speed_up", "speed_up_strongest"]
+    times += ["offline_us", "break_even", "break_even_strongest"]
     title = f"Cost on {data.attrs['title'].removeprefix('timing of ')} ({data.attrs['machine']})"
     against = f"same: against {kind.against[0]}; best: against {kind.against[1]}; -: never, or none"
     below = wrapped(against)
@@ -129,8 +119,8 @@ def cost_text(model: str, folder: Path, brief: bool = False) -> str:
 
 def _model_parts(name: str, rows: pd.DataFrame, folder: Path) -> list[Part]:
     """Errors of every method in nominal and perturbed runs, costs, unseen inputs."""
-    kinds = _groups(rows.to_dict("records"), "kind")
-    nominal, perturbed = _groups(kinds[ERRORS], "study").values()
+    kinds = grouped(rows.to_dict("records"), "kind")
+    nominal, perturbed = grouped(kinds[ERRORS], "study").values()
     key = itemgetter("start", "label", "output")
     largest = {key(row): row for row in perturbed}
     lines: list[Row] = []
@@ -165,7 +155,7 @@ def study_parts(rows: pd.DataFrame) -> list[Part]:
     grids = [row for row in records if row["kind"] == ERRORS]
     unseen = [row for row in records if row["kind"] != ERRORS]
     parts: list[Part] = []
-    for group in _groups(grids, "study").values():
+    for group in grouped(grids, "study").values():
         parts += _grid_parts(group)
     if unseen:
         parts += _unseen_parts(unseen)
@@ -179,14 +169,15 @@ def _grid_parts(rows: list[Row]) -> list[Part]:
     outputs = main_outputs(component("model", first["model"]))
     lines: list[Row] = []
     runs: list[Row] = []
-    for start, group in _groups(rows, "start").items():
+    for start, group in grouped(rows, "start").items():
+        by_output = grouped(group, "output")
         for output in outputs:
-            for row in (row for row in group if row["output"] == output):
+            for row in by_output[output]:
                 of = f"start {start}: {output.replace('_', ' ')}, {row['unit']}"
                 lines.append(row | {"of": of})
-                if output == outputs[0]:
-                    ends = {"failures": row["failures"] or "0", "seconds_in_loop": row["seconds"]}
-                    runs.append(row | ends | {"of": f"start {start}"})
+        for row in by_output[outputs[0]]:
+            ends = {"failures": row["failures"] or "0", "seconds_in_loop": row["seconds"]}
+            runs.append(row | ends | {"of": f"start {start}"})
     title = wrapped(f"{first['study']}: {first['title']}") + "\n"
     errors = ("label", "median", "largest", "floor", "failed", "largest_at")
     costs = ["label", "runs", "failures", "warned", "trained", "evaluations", "seconds_in_loop"]
@@ -205,9 +196,9 @@ def _unseen_parts(rows: list[Row]) -> list[Part]:
     title = "Reduced models on inputs that they were not trained on"
     title += f": of their targets {counted(targets)}" if targets else ""
     parts: list[Part] = [wrapped(f"{title}.")]
-    protocols = list(_groups(rows, "study").values())
+    protocols = list(grouped(rows, "study").values())
     for group in protocols:
-        parts += _protocol_parts(_groups(group, "kind"), explain=group is protocols[-1])
+        parts += _protocol_parts(grouped(group, "kind"), explain=group is protocols[-1])
     return parts
 
 

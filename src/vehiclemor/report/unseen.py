@@ -1,10 +1,9 @@
 """Methods on inputs that they were not trained on: errors, times beside full order, targets.
 
-Times of the full order at the error of a method are interpolated on ladders: a ladder is one
-integrator at several tolerances.  Its useful rows form a curve of time over error; between two of
-them it is taken as a power law, which is what an integrator of fixed order gives.  A ladder that
-ends just above the error is continued by the law of its last two rows: else a slower integrator
-would stand in for it.
+Times of the full order at the error of a method are interpolated on work-precision curves, each of
+one integrator at several tolerances.  Between two useful rows a curve is a power law, which is what
+an integrator of fixed order gives.  One that ends just above the error is continued by the law of
+its last two rows: else a slower integrator would stand in for it.
 """
 
 import json
@@ -16,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from vehiclemor.report.findings import NOT_COMPARABLE, judged, scatter
 from vehiclemor.report.labels import unit_of
+from vehiclemor.report.published import NOT_COMPARABLE, judged, scatter
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.choice import errors_by, outcomes
 from vehiclemor.study.plans.protocol import FULL_ORDER
@@ -28,8 +27,6 @@ Row = dict[str, Any]
 OUTSIDE = ("outside", "drawn_outside")
 # Column of seconds -> its ratio to the full order at equal error.
 CLOCKS = {"seconds": "ratio_equal", "loop_seconds": "ratio_equal_loop"}
-# Of the bounds of rates.
-CONFIDENCE = 0.95
 # SI unit of a bounded output -> the unit in which errors are printed, and its factor.
 PRINTED_UNITS = {"m": ("m", 1.0), "rad": ("deg", 180.0 / math.pi)}
 # A work-precision curve is continued to this part of the error of its last row.
@@ -39,7 +36,7 @@ CONTINUED = 0.5
 def protocol_rows(dataset: xr.Dataset) -> list[Row]:
     """Rows of one protocol, by `kind`: `method`, then `target` and `bound` of what was chosen."""
     protocol = protocol_of(dataset)
-    methods = method_rows(dataset, protocol)
+    methods = method_rows(dataset)
     rows = methods + target_rows(dataset, protocol, methods)
     rows += [row for method in methods if method["winner"] for row in bound_rows(protocol, method)]
     head = {"study": str(dataset.attrs["study"]), "model": protocol.model}
@@ -51,7 +48,7 @@ def protocol_of(dataset: xr.Dataset) -> ProtocolFile:
     return ProtocolFile.model_validate_json(dataset.attrs["configuration"])
 
 
-def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
+def method_rows(dataset: xr.Dataset) -> list[Row]:
     """One row for each method, full-order integrators as measures.
 
     `runs` of the `test_set` are judged, `apart` ones more are not: the full order is sensitive
@@ -67,7 +64,7 @@ def method_rows(dataset: xr.Dataset, protocol: ProtocolFile) -> list[Row]:
     score on the rows `equal_rows`, `ratio_within` against `within`, the fastest full-order row
     within the bounds.
     """
-    part = judged_part(dataset)
+    part, protocol = judged_part(dataset), protocol_of(dataset)
     rows = [_method_row(dataset, part, str(label), protocol) for label in part["label"].values]
     full = [row for row in rows if row["role"] == FULL_ORDER and math.isfinite(row["score"])]
     curves = [list(group) for _, group in groupby(full, key=lambda row: row["series"])]
@@ -163,7 +160,6 @@ def _failure(part: xr.Dataset) -> str:
 
 
 def _ratios_to_full_order(row: Row, full: list[Row], curves: list[list[Row]]) -> Row:
-    """Ratios of a row to the full order."""
     within = (other for other in full if other["misses"] == 0)
     best = min(within, key=lambda other: other["seconds"], default=None)
     equal = {clock: at_error(curves, row["score"], clock) for clock in CLOCKS}
@@ -212,14 +208,11 @@ def _on_curve(curve: Sequence[Row], error: float, clock: str) -> Equal:
     # A row that has failed has the error NaN, and is nowhere on a curve.
     if not curve or math.isnan(error):
         return Equal(math.nan)
-    loosest, tightest = curve[0], curve[-1]
-    if error >= loosest["score"]:
-        return Equal(loosest[clock], (loosest["label"],))
-    if error < tightest["score"]:
-        can_continue = len(curve) > 1 and error >= CONTINUED * tightest["score"]
-        return _interpolated(curve[-2], tightest, error, clock) if can_continue else Equal(math.nan)
+    if error >= curve[0]["score"]:
+        return Equal(curve[0][clock], (curve[0]["label"],))
     for loose, tight in pairwise(curve):
-        if error >= tight["score"]:
+        reach = CONTINUED if tight is curve[-1] else 1.0
+        if error >= reach * tight["score"]:
             return _interpolated(loose, tight, error, clock)
     return Equal(math.nan)
 
@@ -243,7 +236,7 @@ def upper_bound(misses: int, runs: int) -> float:
     if runs == 0:
         return 1.0
     test = binomtest(misses, runs, alternative="less")
-    return float(test.proportion_ci(CONFIDENCE, method="exact").high)
+    return float(test.proportion_ci(0.95, method="exact").high)
 
 
 def bound_rows(protocol: ProtocolFile, winner: Row) -> Iterator[Row]:

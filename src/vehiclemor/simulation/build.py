@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vehiclemor.arguments import quoted, real_array
-from vehiclemor.codegen.kernels import Derivation, derivation, is_derived
+from vehiclemor.codegen.kernels import Kernels, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
 from vehiclemor.exceptions import InputError, VehiclemorError, blamed
 from vehiclemor.multibody.definition import (
@@ -22,7 +22,7 @@ from vehiclemor.multibody.definition import (
     with_overrides,
 )
 from vehiclemor.multibody.quantities import DEFAULTS
-from vehiclemor.parameters import ParameterSet, load_parameters, parameter_path, with_entries
+from vehiclemor.parameters import ParameterSet, load_parameters, overridden, parameter_path
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
@@ -80,7 +80,7 @@ def _rebuilt(model: Model, definition: ModelDefinition) -> Model:
 
 def _changed(model: Model, definition: ModelDefinition, overrides: Mapping[str, object]) -> Model:
     """A model with other values, and what another choice of inputs adds or drops."""
-    parameters = with_entries(model.parameters, definition.parameters, overrides)
+    parameters = overridden(model.parameters, definition.parameters, overrides)
     same = definition is model.definition
     with first_use(model.name):
         return _made(definition, parameters, (model.equations, model.kernel_hash) if same else None)
@@ -89,7 +89,7 @@ def _changed(model: Model, definition: ModelDefinition, overrides: Mapping[str, 
 def _made(
     definition: ModelDefinition,
     parameters: ParameterSet,
-    derived: tuple[Derivation, str] | None = None,
+    derived: tuple[Kernels, str] | None = None,
 ) -> Model:
     """A model of equations that may have been derived already, see `compiled`."""
     name, flat, further = definition.name, parameters.flat(), {}
@@ -183,7 +183,7 @@ def build_derived(name: str) -> Model | None:
     return build(name) if is_derived(name, *_derivation(definition)) else None
 
 
-def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
+def check_equations(definition: ModelDefinition, equations: Kernels) -> None:
     """Raise `InputError` if functions that were derived are missing or of another shape."""
     n, constraints = len(definition.coordinates), len(definition.constraints)
     needed: dict[str, tuple[int, ...]] = {"outputs": (len(definition.outputs),)}
@@ -210,7 +210,7 @@ def check_equations(definition: ModelDefinition, equations: Derivation) -> None:
             )
 
 
-def compiled(definition: ModelDefinition) -> tuple[Derivation, str]:
+def compiled(definition: ModelDefinition) -> tuple[Kernels, str]:
     """Derivation of a model, and the hash of its source and of the loops that run it."""
     name, derive = definition.name, definition.derive
     with blamed(f"model {name!r}: its equations can't be derived", derive):

@@ -12,7 +12,7 @@ import numpy as np
 
 from vehiclemor.arguments import quoted
 from vehiclemor.codegen.derivatives import jacobian_product
-from vehiclemor.codegen.kernels import Derivation, Kernels
+from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.exceptions import InputError
@@ -115,17 +115,15 @@ def values_of(definition: ModelDefinition, flat: np.ndarray) -> dict[str, Any]:
     return values
 
 
-def hoisted_constants(
-    equations: Derivation, flat: np.ndarray, solved: Sequence[float]
-) -> np.ndarray:
+def hoisted_constants(equations: Kernels, flat: np.ndarray, solved: Sequence[float]) -> np.ndarray:
     """Hoisted constants of all components of the parameters and of what was solved for."""
     constants = np.empty(equations.constants)
-    equations.kernels.call("constants", np.concatenate([flat, solved]), constants)
+    equations.call("constants", np.concatenate([flat, solved]), constants)
     return constants
 
 
 def solved_parameters(
-    definition: ModelDefinition, flat: np.ndarray, equations: Derivation
+    definition: ModelDefinition, flat: np.ndarray, equations: Kernels
 ) -> dict[str, float]:
     """What a model solves for before it can start, by name; with optional inputs at defaults."""
     if not definition.solved:
@@ -141,7 +139,7 @@ def solved_parameters(
     def derivative(solved: list[float], x: np.ndarray, u: np.ndarray) -> np.ndarray:
         result, inputs = np.empty(len(x)), np.concatenate([u, driven])
         constants = hoisted_constants(equations, parameters, solved)
-        equations.kernels.call("derivative", x, inputs, constants, result)
+        equations.call("derivative", x, inputs, constants, result)
         return result
 
     return definition.solve_equilibrium(values_of(definition, flat), derivative)
@@ -156,7 +154,7 @@ def components(definition: ModelDefinition, name: str) -> range:
 
 
 def constant_derivatives(
-    definition: ModelDefinition, equations: Derivation, values: np.ndarray, numbers: Sequence[int]
+    definition: ModelDefinition, equations: Kernels, values: np.ndarray, numbers: Sequence[int]
 ) -> np.ndarray:
     """Derivatives (numbers, constants) of the hoisted constants by components of the parameters.
 

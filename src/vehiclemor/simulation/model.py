@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from vehiclemor.codegen.kernels import BareKernel, Derivation, Kernels
+from vehiclemor.codegen.kernels import BareKernel, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.columns import listed
 from vehiclemor.inputs.excitation import Excitation
@@ -70,7 +70,7 @@ class Model(ShortRepr):
     reference: ClassVar[tuple[str, float]]  # Solver and tolerance by default.
 
     definition: ModelDefinition
-    equations: Derivation
+    equations: Kernels
     parameters: ParameterSet
     kernel_hash: str
     constants: np.ndarray
@@ -159,7 +159,7 @@ class Model(ShortRepr):
     @property
     def kernels(self) -> Kernels:
         """Kernels of the equations, each compiled when it is first used."""
-        return self.equations.kernels
+        return self.equations
 
     @cached_property
     def _undriven(self) -> frozenset[str]:

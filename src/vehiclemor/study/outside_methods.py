@@ -256,7 +256,7 @@ def judge(file: str | Path, dataset: str | Path, results: str | Path = "results"
     rows = [_row(label, part, bounds)]
     stored = combined_path(file_path("results", results), truth.attrs["study"])
     if stored.exists():
-        other = judged_part(read_dataset(stored, "source", "vehiclemor", stored=True))
+        other = judged_part(read_dataset(stored, stored=True))
         if np.array_equal(other["scenario"].values, truth["label"].values[counts]):
             shown = other["winner"].values | (other["method"].values == "replay")
             names = other["label"].values[shown].tolist()

@@ -272,7 +272,7 @@ def stored(
     there = os.path.lexists(path)
     held = global_attributes(path, stored=True)
     if held.get(attribute) == key and all(source.exists() for source in sources()):
-        dataset = read_dataset(path, "source", "vehiclemor", stored=True)
+        dataset = read_dataset(path, stored=True)
         # What a bug has ended is tried again.
         ended = "status" not in dataset or "error" not in dataset["status"].values
         if ended and not held.get("missing"):

@@ -86,19 +86,16 @@ class MovingFrame:
             bias = g.named(tape, self.angular_velocity.cross(self.velocity))
         return Motion(self.velocity, dict(enumerate(UNIT)), bias)
 
-    def point(self, tape: Tape, position: Vector, relative: Motion | None = None) -> Motion:
+    def point(self, tape: Tape, position: Vector, relative: Motion) -> Motion:
         """Motion of a point at a position in the frame, with its motion relative to the frame."""
         origin, turn = self.origin(tape), self.angular_velocity
-        velocity = self.velocity + turn.cross(position)
+        velocity = self.velocity + turn.cross(position) + relative.value
         columns = dict(origin.columns)
         columns |= {3 + i: UNIT[i].cross(position) for i in range(3)}
+        columns |= relative.columns
         lever = g.named(tape, turn.cross(position))
-        bias = origin.bias + turn.cross(lever)
-        if relative is not None:
-            velocity = velocity + relative.value
-            columns |= relative.columns
-            coriolis = turn.cross(relative.value) * sp.Integer(2)
-            bias = bias + coriolis + relative.bias
+        coriolis = turn.cross(relative.value) * sp.Integer(2)
+        bias = origin.bias + turn.cross(lever) + coriolis + relative.bias
         return Motion(g.named(tape, velocity), columns, g.named(tape, bias))
 
     def angular_velocity_of(self, tape: Tape, relative: Motion) -> Motion:

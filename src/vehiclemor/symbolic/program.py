@@ -37,9 +37,8 @@ class Program:
     parameters
         Symbols of the parameters, the argument of `constants`.
     constants
-        The function that computes the hoisted constants from the parameters.
-    constant_symbols
-        Symbols by which the functions know the hoisted constants.
+        The function that computes the hoisted constants from the parameters; its results are the
+        symbols by which the others know them.
     functions
         Name -> function.
     """
@@ -47,7 +46,6 @@ class Program:
     arguments: dict[str, tuple[sp.Symbol, ...]]
     parameters: tuple[sp.Symbol, ...]
     constants: Function
-    constant_symbols: tuple[sp.Symbol, ...]
     functions: dict[str, Function]
 
 
@@ -123,7 +121,6 @@ def assemble(
         {name: tuple(symbols) for name, symbols in arguments.items()},
         tuple(parameters),
         constants,
-        symbols,
         functions,
     )
 

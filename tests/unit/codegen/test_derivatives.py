@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from tests.oracles import complex_step
-from tests.unit.kernels import batch, kernel, sincos
+from tests.unit.kernels import batch, function, kernel, sincos
 from vehiclemor.codegen.derivatives import derivative, jacobian_product
-from vehiclemor.codegen.operations import function
 
 
 def everything(x, u, constants, result):

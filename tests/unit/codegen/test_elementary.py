@@ -4,10 +4,10 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from tests.unit.kernels import batch, kernel, sincos
+from tests.unit.kernels import batch, function, kernel, sincos
 from vehiclemor.codegen.elementary import TAN_3_PI_8
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.operations import LANES, function
+from vehiclemor.codegen.operations import LANES
 
 # Largest rounding error of sine's polynomials and of the last addition.
 ACCURACY = 1.7e-16

@@ -24,7 +24,7 @@ def compiled(made: Kernel):
 
 def result_of(program: Program, values: dict[sp.Symbol, float]) -> np.ndarray:
     kernels = Kernels(kernels_of(program).values())
-    constants = np.full(len(program.constant_symbols), np.nan)
+    constants = np.full(len(program.constants.results), np.nan)
     kernels.call("constants", np.array([values[s] for s in program.parameters]), constants)
     arguments = [np.array([values[s] for s in symbols]) for symbols in program.arguments.values()]
     result = np.full(program.functions["f"].shape, np.nan)

@@ -50,7 +50,7 @@ def law(w, rates=0.0, u=0.0, **overrides):
     equations, constants = ported(tuple(overrides.items()))
     x, inputs, result = np.zeros((2, 12)), np.zeros(8) + u, np.empty((12, 3))
     x[0], x[1] = w, rates
-    equations.kernels.call("port_forces", x.ravel(), inputs, constants, result)
+    equations.call("port_forces", x.ravel(), inputs, constants, result)
     return result
 
 

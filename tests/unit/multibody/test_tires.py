@@ -33,7 +33,7 @@ def compiled(name: str):
     if name != "magic formula":
         own = exact(dict(zip(FIALA, COEFFICIENTS, strict=True)))
         arguments = (friction,) if name == "brush" else ()
-        forces = getattr(tires, name)(tape, own, load, kappa, slip, *arguments)
+        forces = getattr(tires, name)(tape, own, load, tires.Slip(kappa, slip), *arguments)
     else:
         own = exact(PARAMETERS | {"tire_radius": PARAMETERS["R0"]})
         reference = sp.Float(REFERENCE_LOAD, 17)

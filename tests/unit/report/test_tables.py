@@ -13,7 +13,7 @@ from scipy.stats import binom
 import vehiclemor as vm
 from tests.models import MODELS
 from vehiclemor.registry import component, names
-from vehiclemor.report.default_studies import of_paper, smaller_rank
+from vehiclemor.report.comparison import smaller_rank
 from vehiclemor.report.labels import (
     Column,
     column,
@@ -21,11 +21,10 @@ from vehiclemor.report.labels import (
     method_text,
     of_kind,
     readable_unit,
-    tables_file,
     timing_cases,
 )
 from vehiclemor.report.printing import Table, simulation_text, width
-from vehiclemor.report.published import load_published
+from vehiclemor.report.published import load_published, of_paper
 from vehiclemor.report.unseen import at_error, upper_bound
 from vehiclemor.simulation.build import build
 from vehiclemor.study.experiment import complete_settings
@@ -144,8 +143,8 @@ def test_rows_of_costs_are_named_once_and_their_methods_take_the_settings(name):
 @pytest.mark.parametrize(("name", "nominal"), [*zip(MODELS, NOMINAL, strict=True)])
 def test_settings_of_the_paper_are_the_defaults_of_pod(name, nominal):
     assert of_paper(name) == nominal
-    assert set(tables_file().reduced) == set(MODELS)
-    printed = [n for n in load_published().numbers.values() if n.model == name]
+    assert set(declared().reduced) == set(MODELS)
+    printed = [n for n in load_published().values() if n.model == name]
     model = build(name)
     assert smaller_rank(model, "pod") == {}
     settings = complete_settings(model, "pod")

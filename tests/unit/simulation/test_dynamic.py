@@ -28,8 +28,7 @@ def vehicle() -> DynamicModel:
 @pytest.mark.parametrize("lacking", ["second_order", "speeds"])
 def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
     whole = standard()
-    sources = {k: v for k, v in whole.equations.sources.items() if k != lacking}
-    equations = replace(whole.equations, sources=sources)
+    equations = Kernels(v for k, v in whole.equations.sources.items() if k != lacking)
     model = replace(whole, equations=equations)
     settings = DynamicPodSettings(rank=1, snapshots=2, formulation="state", inner_product="range")
     check_subspace(model, settings)
@@ -48,8 +47,8 @@ def test_a_model_without_a_kernel_refuses_what_needs_it(standard, lacking):
 
 def test_equations_that_lack_a_function_make_no_model(standard):
     model = standard()
-    sources = {k: v for k, v in model.equations.sources.items() if k != "outputs"}
-    lacking = replace(model, equations=replace(model.equations, sources=sources))
+    equations = Kernels(v for k, v in model.equations.sources.items() if k != "outputs")
+    lacking = replace(model, equations=equations)
     with pytest.raises(InputError, match="its equations have no outputs"):
         build.reparametrised(lacking, {})
 

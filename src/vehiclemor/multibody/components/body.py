@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, InputChoice, Quantity
+from vehiclemor.multibody.quantities import AT_WHEEL, OPTIONAL_INPUTS, InputChoice, Quantity
 from vehiclemor.parameters import Declared
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Rotation, Vector
@@ -17,8 +17,6 @@ from vehiclemor.symbolic.tape import Tape
 
 # Spin in rad/s below which a brake fades, so that its torque changes sign smoothly.
 BRAKE_SPEED = sp.Integer(1)
-# Inputs at a wheel in the order of `WheelInputs`.
-AT_WHEEL = "drive_torque_{}", "brake_torque_{}", "friction_{}", "road_{}", "road_{}_dot"
 
 
 def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
@@ -28,21 +26,13 @@ def symbols(quantities: Sequence[Quantity]) -> list[sp.Symbol]:
 
 @dataclass(frozen=True)
 class WheelInputs:
-    """Symbols, or defaults of inputs that are neither driven nor parameters.
+    """Symbols of `AT_WHEEL`, or defaults of inputs that are neither driven nor parameters."""
 
-    Attributes
-    ----------
-    drive, brake
-        Torques in N m: forwards on the wheel; against its spin, not negative.
-    friction
-        Factor on the friction of the tire.
-    road, road_rate
-        Height of the road under the wheel in m, upwards, and its rate in m/s.
-    """
-
+    # Torques in N m: forwards on the wheel; against its spin, not negative.
     drive: sp.Expr
     brake: sp.Expr
-    friction: sp.Expr
+    friction: sp.Expr  # Factor on the friction of the tire.
+    # Height of the road under the wheel in m, upwards, and its rate in m/s.
     road: sp.Expr
     road_rate: sp.Expr
 
@@ -55,23 +45,16 @@ class WheelInputs:
 
 @dataclass(frozen=True)
 class Inputs:
-    """Inputs in the equations.
+    """Inputs in the equations."""
 
-    Attributes
-    ----------
-    values
-        Name -> symbol; the default of an optional input that is neither driven nor a parameter.
-    driven, constant
-        Symbols of the argument `u`, and of parameters behind those that the model declares.
-    """
-
+    # Name -> symbol; the default of an optional input that is neither driven nor a parameter.
     values: dict[str, sp.Expr]
-    driven: list[sp.Symbol]
-    constant: list[sp.Symbol]
+    driven: list[sp.Symbol]  # Symbols of the argument `u`.
+    constant: list[sp.Symbol]  # Symbols of parameters behind those that the model declares.
 
     def at(self, wheel: str) -> WheelInputs:
         """Inputs at one wheel."""
-        return WheelInputs(*(self.values[name.format(wheel)] for name in AT_WHEEL))
+        return WheelInputs(*(self.values[name.format(wheel)] for name, *_ in AT_WHEEL))
 
 
 def inputs(every_run: Sequence[Quantity], choice: InputChoice) -> Inputs:

@@ -36,6 +36,10 @@ class Arm:
         design = g.named(tape, point - self.rear)
         return g.rotate_about_axis(tape, design, axis, self.angle)
 
+    def moved(self, tape: Tape, point: g.Vector) -> g.Vector:
+        """Where a point has moved, given its design position."""
+        return g.named(tape, self.rear + self.lever(tape, point))
+
 
 @dataclass(frozen=True)
 class Linkage:
@@ -61,15 +65,11 @@ class Linkage:
         """Where a point of the carrier has moved, given its design position."""
         return g.named(tape, self.upper_ball_joint + self.carrier_lever(tape, point))
 
-    def on_lower_arm(self, tape: Tape, point: g.Vector) -> g.Vector:
-        """Where a point of the lower arm has moved, given its design position."""
-        return g.named(tape, self.lower.rear + self.lower.lever(tape, point))
-
     def gaps(self, tape: Tape, points: Mapping[str, g.Vector]) -> list[sp.Expr]:
         """The closures (6): lower ball joint, then outer tie-rod joint."""
         ball, outer = points["lower_ball_joint"], points["tie_rod_outer"]
         return [
-            *self.on_carrier(tape, ball) - self.on_lower_arm(tape, ball),
+            *self.on_carrier(tape, ball) - self.lower.moved(tape, ball),
             *self.on_carrier(tape, outer) - g.named(tape, self.rack_end + self.rod),
         ]
 
@@ -91,7 +91,7 @@ def assembled(
 
     upper = arm("upper", theta_u)
     ball = points["upper_ball_joint"]
-    ball_joint = g.named(tape, upper.rear + upper.lever(tape, ball))
+    ball_joint = upper.moved(tape, ball)
     carrier = g.euler_321(tape, zeta, eta, xi)
     inner, outer = points["tie_rod_inner"], points["tie_rod_outer"]
     rod_length = g.length(tape, g.named(tape, outer - inner))

@@ -9,13 +9,12 @@ PAC2002.  Signs are those of ISO 8855 with a slip angle that is positive when th
 slides to the left.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from vehiclemor.multibody.components.body import WheelInputs
-from vehiclemor.multibody.components.slip import SlipLaw
 from vehiclemor.symbolic import geometry as g
 from vehiclemor.symbolic.geometry import Vector
 from vehiclemor.symbolic.mechanics import ZERO, Body, kane
@@ -23,6 +22,63 @@ from vehiclemor.symbolic.tape import Tape
 
 # Keeps 0/0 from a wheel without load and slip; nothing else notices it.
 NOTHING = sp.Float(1e-300)
+# Speed in m/s below which slips are damped, and that damping at standstill in s/m.
+LOW_SPEED, LOW_SPEED_DAMPING = sp.Integer(2), sp.Rational(1, 50)
+
+
+@dataclass(frozen=True)
+class Slip:
+    """Slips of a tire."""
+
+    ratio: sp.Expr  # kappa
+    tangent: sp.Expr  # Of the slip angle; sliding to the left is positive.
+    rates: tuple[sp.Expr, ...] = ()  # Rates of the states that the slips follow from.
+
+
+# Tape, parameters, speed of the wheel along its heading, velocity of the contact point along the
+# heading and to the left (m/s) -> slips.
+SlipLaw = Callable[[Tape, Mapping[str, sp.Expr], sp.Expr, sp.Expr, sp.Expr], Slip]
+
+
+def static_slip(
+    tape: Tape,
+    p: Mapping[str, sp.Expr],
+    forward: sp.Expr,
+    sliding_forward: sp.Expr,
+    sliding_left: sp.Expr,
+) -> Slip:
+    """Slips that follow the sliding without delay."""
+    speed = tape.let(sp.sqrt(tape.let(forward**2 + p["slip_speed"] ** 2)))
+    return Slip(tape.let(-sliding_forward / speed), tape.let(sliding_left / speed))
+
+
+def relaxed_slip(
+    tape: Tape,
+    p: Mapping[str, sp.Expr],
+    forward: sp.Expr,
+    sliding_forward: sp.Expr,
+    sliding_left: sp.Expr,
+    *,
+    deflections: tuple[sp.Expr, sp.Expr],  # Of the contact, along the heading and to the left, m.
+) -> Slip:
+    """Slips by deflections of the contact, which relax over a distance.
+
+    H. B. Pacejka, Tire and Vehicle Dynamics (3rd ed., 2012), chapters 7 and 8: a single contact
+    point, with damping at low speed.  The distance is that of rolling and, at low speed, of
+    sliding too: else a wheel that spins at standstill would wind its contact up without limit.
+    """
+    let = tape.let
+    along, left = deflections
+    ratio = let(along / p["longitudinal_relaxation"])
+    tangent = let(left / p["lateral_relaxation"])
+    slow = let(1 / (1 + let(forward / LOW_SPEED) ** 2))
+    damping = let(LOW_SPEED_DAMPING * slow)
+    slid = let(slow * let(sliding_forward**2 + sliding_left**2))
+    speed = let(sp.sqrt(let(forward**2 + p["slip_speed"] ** 2 + slid)))
+    rates = let(-sliding_forward - speed * ratio), let(sliding_left - speed * tangent)
+    return Slip(
+        let(ratio - damping * sliding_forward), let(tangent + damping * sliding_left), rates
+    )
 
 
 @dataclass(frozen=True)
@@ -50,13 +106,10 @@ class WheelOnRoad:
 
     tire: TireForces
     load: sp.Expr  # Vertical force in N, not negative.
-    # kappa and the tangent of the slip angle (sliding to the left is positive).
-    slip_ratio: sp.Expr
-    tan_slip: sp.Expr
+    slip: Slip
     # Force on the wheel in N and its moment about the wheel centre in N m.
     force: Vector
     moment: Vector
-    slip_rates: tuple[sp.Expr, ...] = ()  # Rates of the states that the slips follow from.
 
 
 @dataclass(frozen=True)
@@ -90,8 +143,8 @@ def tire_outputs(tape: Tape, corners: Sequence[Corner]) -> list[sp.Expr]:
         *(wheel.tire.lateral for wheel in wheels),
         *(wheel.load for wheel in wheels),
         *(wheel.tire.aligning for wheel in wheels),
-        *(wheel.slip_ratio for wheel in wheels),
-        *(tape.let(sp.atan(wheel.tan_slip)) for wheel in wheels),
+        *(wheel.slip.ratio for wheel in wheels),
+        *(tape.let(sp.atan(wheel.slip.tangent)) for wheel in wheels),
     ]
 
 
@@ -163,9 +216,7 @@ def fiala(
     tape: Tape,
     c: Mapping[str, sp.Expr],  # Coefficients `FIALA`.
     load: sp.Expr,  # Vertical force in N.
-    # kappa, and the tangent of the slip angle.
-    slip_ratio: sp.Expr,
-    tan_slip: sp.Expr,
+    slip: Slip,
 ) -> TireForces:
     """Forces of the Fiala model; zero where the load is zero.
 
@@ -173,15 +224,15 @@ def fiala(
     the friction coefficient alone.
     """
     let = tape.let
-    limit = _friction_force(tape, c, load, slip_ratio, tan_slip)
+    limit = _friction_force(tape, c, load, slip)
 
     # With w = kappa / max(|kappa|, kappa*) both cases of the law are one expression.
     critical = let(limit / (2 * c["longitudinal_slip_stiffness"]))
-    inverse = let(1 / (maximum(tape, let(sp.Abs(slip_ratio)), critical) + NOTHING))
-    longitudinal = let(let(limit * let(slip_ratio * inverse)) * let(1 - critical * inverse / 2))
+    inverse = let(1 / (maximum(tape, let(sp.Abs(slip.ratio)), critical) + NOTHING))
+    longitudinal = let(let(limit * let(slip.ratio * inverse)) * let(1 - critical * inverse / 2))
 
     # With y = C tan(alpha) / max(3 U, C |tan(alpha)|) as well; H = 1 - |y|.
-    drive, most = let(c["cornering_stiffness"] * tan_slip), let(3 * limit)
+    drive, most = let(c["cornering_stiffness"] * slip.tangent), let(3 * limit)
     y = let(drive / (maximum(tape, most, let(sp.Abs(drive))) + NOTHING))
     size = let(sp.Abs(y))
     share, left = let(limit * y), let(1 - size)
@@ -194,9 +245,7 @@ def brush(
     tape: Tape,
     c: Mapping[str, sp.Expr],  # Coefficients `FIALA`.
     load: sp.Expr,  # Vertical force in N.
-    # kappa, and the tangent of the slip angle.
-    slip_ratio: sp.Expr,
-    tan_slip: sp.Expr,
+    slip: Slip,
     friction: sp.Expr,  # Factor, not 0.
 ) -> TireForces:
     """Fiala's forces at combined slip: one force, along what the bristles are deflected.
@@ -205,9 +254,9 @@ def brush(
     `fiala`, with both slips the friction is used once.
     """
     let = tape.let
-    limit = let(friction * _friction_force(tape, c, load, slip_ratio, tan_slip))
-    along = let(c["longitudinal_slip_stiffness"] * slip_ratio)
-    across = let(c["cornering_stiffness"] * tan_slip)
+    limit = let(friction * _friction_force(tape, c, load, slip))
+    along = let(c["longitudinal_slip_stiffness"] * slip.ratio)
+    across = let(c["cornering_stiffness"] * slip.tangent)
     # With s = |(X, Y)| and y = min(s / 3 L, 1), F = L (3 y - 3 y^2 + y^3) along (X, Y) / s: what
     # divides by s is written without it.
     size, most = let(sp.sqrt(let(along**2 + across**2))), let(3 * limit)
@@ -221,16 +270,10 @@ def brush(
     )
 
 
-def _friction_force(
-    tape: Tape,
-    c: Mapping[str, sp.Expr],
-    load: sp.Expr,
-    slip_ratio: sp.Expr,
-    tan_slip: sp.Expr,
-) -> sp.Expr:
+def _friction_force(tape: Tape, c: Mapping[str, sp.Expr], load: sp.Expr, slip: Slip) -> sp.Expr:
     """Largest force in N of Fiala's tire, which falls with the combined slip."""
     let = tape.let
-    combined = let(sp.sqrt(let(slip_ratio**2 + tan_slip**2)))
+    combined = let(sp.sqrt(let(slip.ratio**2 + slip.tangent**2)))
     sliding = let(minimum(tape, combined, sp.Integer(1)))
     fall = let(c["largest_friction"] - c["smallest_friction"])
     return let(load * let(c["largest_friction"] - fall * sliding))
@@ -280,7 +323,7 @@ def upright_wheel(
     moment = arm.cross(shear) + up * tire.aligning
     force = g.named(tape, shear + up * load)
     moment = g.named(tape, moment)
-    return WheelOnRoad(tire, load, slip.ratio, slip.tangent, force, moment, slip.rates)
+    return WheelOnRoad(tire, load, slip, force, moment)
 
 
 def tilted_wheel(
@@ -312,14 +355,11 @@ def tilted_wheel(
 
     load = vertical_load(tape, radius, rise * inverse, p)
     per_speed = let(1 / maximum(tape, let(sp.Abs(forward)), p["slip_speed"]))
-    ratio, tan_slip = let(let(spin * radius - forward) * per_speed), let(lateral * per_speed)
-    if combined:
-        tire = brush(tape, p, load, ratio, tan_slip, inputs.friction)
-    else:
-        tire = fiala(tape, p, load, ratio, tan_slip)
+    slip = Slip(let(let(spin * radius - forward) * per_speed), let(lateral * per_speed))
+    tire = brush(tape, p, load, slip, inputs.friction) if combined else fiala(tape, p, load, slip)
     force = g.named(tape, heading * tire.longitudinal + leftward * tire.lateral + up * load)
     moment = g.named(tape, arm.cross(force) + up * tire.aligning)
-    return WheelOnRoad(tire, load, ratio, tan_slip, force, moment)
+    return WheelOnRoad(tire, load, slip, force, moment)
 
 
 def vertical_load(tape: Tape, radius: sp.Expr, rate: sp.Expr, p: Mapping[str, sp.Expr]) -> sp.Expr:

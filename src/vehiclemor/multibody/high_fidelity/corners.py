@@ -135,30 +135,24 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
     """Arms, wheel carrier with its wheel, and tie rod of the left (k = 0) or right (1) corner."""
     frame, points, p, linkage = v.frame, v.points[k], v.p, v.linkages[k]
 
-    def arm(name: str, turn: Motion) -> Body:
-        part = linkage.upper if name == "upper" else linkage.lower
-        lever = part.lever(tape, points[f"{name}_arm_centre"])
-        centre_now = g.named(tape, part.rear + lever)
-        design = _arm_tensor(tape, v, k, part, name)
-        tensor = m.turned_tensor(tape, design, part.axis(tape), part.angle)
-        centre = frame.point(tape, centre_now, carried(tape, STILL, turn, lever))
+    def part(name: str, centre: Vector, moving: Motion, turn: Motion, tensor: Tensor) -> Body:
+        motion = frame.point(tape, centre, moving)
         rotation = m.with_inertia(tape, tensor, frame.angular_velocity_of(tape, turn))
-        return Body(p[f"{name}_arm_mass"], centre, m.ZERO, rotation, tensor)
+        return Body(p[f"{name}_mass"], motion, m.ZERO, rotation, tensor)
+
+    def arm(name: str, arm: links.Arm, turn: Motion) -> Body:
+        lever = arm.lever(tape, points[f"{name}_arm_centre"])
+        centre = g.named(tape, arm.rear + lever)
+        design = _arm_tensor(tape, v, k, arm, name)
+        tensor = m.turned_tensor(tape, design, arm.axis(tape), arm.angle)
+        return part(f"{name}_arm", centre, carried(tape, STILL, turn, lever), turn, tensor)
 
     along_rod, transverse = p["tie_rod_axial_inertia"], p["tie_rod_transverse_inertia"]
     tensor = m.axisymmetric_inertia(along_rod, transverse, g.named(tape, linkage.rod_direction))
     half = g.named(tape, linkage.rod * sp.Rational(1, 2))
-    rod = Body(
-        p["tie_rod_mass"],
-        frame.point(
-            tape,
-            g.named(tape, linkage.rack_end + half),
-            carried(tape, motions.rack_end, motions.rod, half),
-        ),
-        m.ZERO,
-        m.with_inertia(tape, tensor, frame.angular_velocity_of(tape, motions.rod)),
-        tensor,
-    )
+    centre = g.named(tape, linkage.rack_end + half)
+    moving = carried(tape, motions.rack_end, motions.rod, half)
+    rod = part("tie_rod", centre, moving, motions.rod, tensor)
     mass, centre, tensor = _with_wheel(tape, v, k, "carrier", diagonal(p, "carrier_inertia"))
     wheeled = _WheelCarrier(
         mass,
@@ -173,8 +167,9 @@ def front_corner(tape: Tape, v: Vehicle, k: int, motions: links.LinkageMotions) 
     carrier, wheel, shaft = _wheeled_body(tape, v, k, wheeled)
     lever = linkage.lower.lever(tape, points["front_spring_arm_point"])
     moment = _spring(tape, v, k, linkage.lower.rear, lever, motions.lower)
-    bodies = (arm("upper", motions.upper), arm("lower", motions.lower), carrier, rod)
-    return Corner(bodies, moment, wheel, shaft)
+    upper = arm("upper", linkage.upper, motions.upper)
+    lower = arm("lower", linkage.lower, motions.lower)
+    return Corner((upper, lower, carrier, rod), moment, wheel, shaft)
 
 
 def rear_corner(tape: Tape, v: Vehicle, k: int, rates: Sequence[Rate]) -> Corner:
@@ -297,7 +292,5 @@ def _arm_tensor(tape: Tape, v: Vehicle, k: int, arm: links.Arm, name: str) -> Te
     normal = g.named(tape, axis.cross(lever) * sp.Integer(SIDES[k]))
     up = g.named(tape, normal * (1 / g.length(tape, normal)))
     out = g.named(tape, up.cross(axis))
-    frame = tuple(g.vector([axis[i], out[i], up[i]]) for i in range(3))
-    return m.rotated_tensor(
-        tape, diagonal(v.p, f"{name}_arm_inertia"), (frame[0], frame[1], frame[2])
-    )
+    axes = g.matrix(lambda i, j: (axis, out, up)[j][i])
+    return m.rotated_tensor(tape, diagonal(v.p, f"{name}_arm_inertia"), axes)

@@ -7,15 +7,7 @@ from itertools import chain
 
 import sympy as sp
 
-from vehiclemor.multibody.components import body
-from vehiclemor.multibody.components.slip import SlipLaw, relaxed_slip, static_slip
-from vehiclemor.multibody.components.tires import (
-    Corner,
-    WheelMotion,
-    kane_with_corners,
-    tire_outputs,
-    upright_wheel,
-)
+from vehiclemor.multibody.components import body, tires
 from vehiclemor.multibody.independent_suspension.definition import DECLARED, Derived, derived
 from vehiclemor.multibody.independent_suspension.relaxation import DEFINITION as RELAXED
 from vehiclemor.multibody.quantities import DEFAULTS, WHEELS, InputChoice
@@ -29,21 +21,21 @@ from vehiclemor.symbolic.tape import Tape
 
 def derive(choice: InputChoice = DEFAULTS) -> Program:
     """Derive state derivatives, outputs and the second-order form; parameters stay symbols."""
-    return derive_with(choice, DECLARED["parameters"], [static_slip] * len(WHEELS))
+    return derive_with(choice, DECLARED["parameters"], [tires.static_slip] * len(WHEELS))
 
 
 def derive_relaxed(choice: InputChoice = DEFAULTS) -> Program:
     """The same of the vehicle with relaxation, by another law of slip."""
     states = body.symbols(RELAXED.further_states)
     wheels = zip(states[:4], states[4:], strict=True)
-    laws = [partial(relaxed_slip, deflections=deflections) for deflections in wheels]
+    laws = [partial(tires.relaxed_slip, deflections=deflections) for deflections in wheels]
     return derive_with(choice, RELAXED.parameters, laws, states)
 
 
 def derive_with(
     choice: InputChoice,
     declared_parameters: Mapping[str, Declared],
-    slip_laws: Sequence[SlipLaw],  # Of the wheels.
+    slip_laws: Sequence[tires.SlipLaw],  # Of the wheels.
     further_states: Sequence[sp.Symbol] = (),
 ) -> Program:
     """As `derive` by laws of slip; with further states there is no second-order form."""
@@ -52,7 +44,7 @@ def derive_with(
     q, nu, attitude = vehicle.q, vehicle.nu, vehicle.attitude
     sprung = _sprung_body(tape, vehicle)
     wheels = [_wheel(tape, vehicle, number, law) for number, law in enumerate(slip_laws)]
-    mass, force = kane_with_corners(tape, sprung, wheels, range(6, 10), len(nu))
+    mass, force = tires.kane_with_corners(tape, sprung, wheels, range(6, 10), len(nu))
     for row, spin, inputs in zip(range(10, 14), nu[10:], vehicle.at_wheels, strict=True):
         # Reactions act on the carrier, which does not turn in the chassis.
         force[row] = tape.let(force[row] + inputs.torque(tape, spin))
@@ -62,9 +54,9 @@ def derive_with(
     rates = [*body.rates(tape, attitude, nu), *nu[6:]]
     n = len(q)
     # Of all wheels the first deflection, then the second.
-    slip_rates = chain(*zip(*(corner.wheel.slip_rates for corner in wheels), strict=True))
+    slip_rates = chain(*zip(*(corner.wheel.slip.rates for corner in wheels), strict=True))
     derivative = [*rates, *(solved[k] for k in range(n)), *slip_rates]
-    outputs = [*body.outputs(q, nu), *tire_outputs(tape, wheels)]
+    outputs = [*body.outputs(q, nu), *tires.tire_outputs(tape, wheels)]
     functions = {
         "derivative": (derivative, (len(derivative),)),
         "outputs": (outputs, (len(outputs),)),
@@ -134,7 +126,7 @@ def _sprung_body(tape: Tape, v: _Vehicle) -> mechanics.Body:
     return mechanics.Body(mass, origin, v.weight * mass + pushed, rotation, inertia)
 
 
-def _wheel(tape: Tape, v: _Vehicle, wheel: int, slip_law: SlipLaw) -> Corner:
+def _wheel(tape: Tape, v: _Vehicle, wheel: int, slip_law: tires.SlipLaw) -> tires.Corner:
     """A wheel of number 0 to 3 with its load, tire and spring."""
     p, d, frame, front = v.p, v.derived, v.frame, wheel < 2
     end, side = (0, "front") if front else (1, "rear")
@@ -156,10 +148,10 @@ def _wheel(tape: Tape, v: _Vehicle, wheel: int, slip_law: SlipLaw) -> Corner:
     rotation = frame.rotation(tape, about, spin=(10 + wheel, spin, axle))
     up = v.attitude.road_normal
     height = tape.let(v.q[2] + tape.let(up @ hub))
-    motion = WheelMotion(height, axle, centre.value, rotation.value)
-    on_road = upright_wheel(tape, up, motion, p, v.at_wheels[wheel], slip_law)
+    motion = tires.WheelMotion(height, axle, centre.value, rotation.value)
+    on_road = tires.upright_wheel(tape, up, motion, p, v.at_wheels[wheel], slip_law)
     mass = p["unsprung_mass"]
     applied = g.named(tape, on_road.force + v.weight * mass)
     spring = d.preload[end] + p[f"{side}_stiffness"] * travel + p[f"{side}_damping"] * rate
     rigid = mechanics.Body(mass, centre, applied, rotation, about, on_road.moment)
-    return Corner((rigid,), -tape.let(spring), on_road)
+    return tires.Corner((rigid,), -tape.let(spring), on_road)

@@ -1,7 +1,7 @@
 """The 14-DOF vehicle with relaxation of its tires: eight states more, down to standstill.
 
 The equations are those of the vehicle beside it; the slips of each wheel follow from two
-deflections of its contact, see `components.slip.relaxed_slip`.
+deflections of its contact, see `components.tires.relaxed_slip`.
 """
 
 import math

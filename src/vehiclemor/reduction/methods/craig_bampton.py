@@ -30,14 +30,17 @@ class CraigBamptonSettings(StructuralSettings):
     )
 
 
-def fixed_modes(model: StructuralModel, highest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Static shapes (n, p) of unit deflections of the ports, and modes (n, k) up to so many Hz.
+def fit(
+    model: StructuralModel, training: Training, settings: CraigBamptonSettings
+) -> ReducedStructure:
+    """Static shapes (n, p) and modes (n, k); no training run is looked at.
 
-    The modes are those of the structure whose ports do not deflect.
+    `InputError` if no mode is slow.
     """
     from scipy.sparse import block_array
     from scipy.sparse.linalg import splu
 
+    began = time.process_time()
     structure: Any = model.system.structure
     n, p = structure.ports.shape
     # In a matrix of like sizes pivots stay where the factors are sparse.
@@ -52,16 +55,8 @@ def fixed_modes(model: StructuralModel, highest: float) -> tuple[np.ndarray, np.
     def solve(b: np.ndarray) -> np.ndarray:
         return factor.solve(np.concatenate([b, np.zeros(p)]))[:n]
 
-    return shapes, modes_below(structure.stiffness, structure.mass, solve, 0.0, highest)
-
-
-def fit(
-    model: StructuralModel, training: Training, settings: CraigBamptonSettings
-) -> ReducedStructure:
-    """Static shapes and modes; no training run is looked at.  `InputError` if no mode is slow."""
-    began = time.process_time()
-    basis = np.hstack(fixed_modes(model, settings.highest))
-    return reduced(model, basis, settings, began)
+    modes = modes_below(structure.stiffness, structure.mass, solve, 0.0, settings.highest)
+    return reduced(model, np.hstack([shapes, modes]), settings, began)
 
 
 METHOD = Method(

@@ -1,7 +1,6 @@
 """The full-order model itself: the baseline of every comparison."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -10,8 +9,8 @@ from pydantic import Field
 
 from vehiclemor.exceptions import ConvergenceError
 from vehiclemor.inputs.excitation import Excitation
-from vehiclemor.reduction.interface import Method, OfflineCost, Presets
-from vehiclemor.reduction.projection.structural import StructuralRuns, StructuralSettings
+from vehiclemor.reduction.interface import Method, OfflineCost
+from vehiclemor.reduction.projection.structural import StructuralSettings
 from vehiclemor.reduction.reduced_system import ReducedMechanism, ReducedSystem
 from vehiclemor.reduction.settings import (
     AnyIntegrator,
@@ -19,16 +18,15 @@ from vehiclemor.reduction.settings import (
     Settings,
     StepTolerance,
     Tolerance,
-    Value,
 )
 from vehiclemor.reduction.training import Training
+from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE, AlgebraicModel
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import By
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.structures.model import SOLVER, USUAL, StructuralModel
-from vehiclemor.simulation.structures.system import StructuralSystem
 from vehiclemor.simulation.system import System
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -60,17 +58,16 @@ class FullStructureSettings(StructuralSettings):
     )
 
 
-# The paper's kind of baseline: a general-purpose integrator of variable step.
-PAPER = {"solver": "dopri5", "tolerance": 1e-6}
-LOCKING = {"solver": "rodas4", "tolerance": 1e-3}
-
-
-def _presets(solver: str, tolerance: float, **others: Mapping[str, Value]) -> Presets:
-    return {"strongest": {"solver": solver, "tolerance": tolerance}, **others}
+# The paper's kind of baseline, a general-purpose integrator of variable step; and for wheels that
+# lock or spin, where a frozen Jacobian errs.
+OF_MOTION = {
+    "paper": {"solver": "dopri5", "tolerance": 1e-6},
+    "locking": {"solver": "rodas4", "tolerance": 1e-3},
+}
 
 
 @dataclass(frozen=True, eq=False)
-class FullOrder:
+class FullOrder(ShortRepr):
     """The full-order model as if it were a reduced one."""
 
     model: Model
@@ -137,25 +134,27 @@ class FullOrderMechanism(FullOrder, ReducedMechanism):
 
 
 @dataclass(frozen=True, eq=False)
-class FullOrderStructure(StructuralRuns, FullOrder):
+class FullOrderStructure(FullOrder):
     """A structural model; it can't be stepped."""
 
     model: StructuralModel
-    step_size: float = 0.0
-
-    @property
-    def system(self) -> StructuralSystem:
-        """The structure itself."""
-        return self.model.system
+    step_size: float = 0.0  # In s, instead of the tolerance; 0: by that.
 
     @property
     def order(self) -> int:
         """Number of coordinates."""
         return self.model.size
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """The states themselves."""
-        return states
+    def for_model(self, model: StructuralModel) -> "FullOrderStructure":
+        """The same for a model whose online parameters are others."""
+        return replace(self, model=model)
+
+    def simulate(
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
+        """A run at the maneuver's output times; it may have diverged."""
+        self.model.start(start)
+        return self.model.run(maneuver, None, self.tolerance, outputs, step=self.step_size)
 
 
 def fit(model: Any, training: Training, settings: Any) -> FullOrder:
@@ -172,14 +171,16 @@ METHOD = Method(
     summary="no reduction: the full-order model, the baseline",
     settings={"ae": AlgebraicSettings, "ode": DynamicSettings, "dae": DynamicSettings}
     | {"structural": FullStructureSettings},
-    # Locking: for wheels that lock or spin, where a frozen Jacobian errs.
     # Strongest: the fastest candidate of the model's protocol that keeps all of its bounds on all
     # validation runs; of `ode` on those of the 14-DOF, of `dae` on those of the high-fidelity car.
     presets={
-        "ae": _presets("newton_lanes", 1e-4),
-        "ode": _presets("etdrk4", 1e-2, paper=PAPER, locking=LOCKING),
-        "dae": _presets("etdrk4", 2e-3, paper=PAPER, locking=LOCKING),
-        "structural": _presets(SOLVER, 1e-2, paper={"tolerance": USUAL}),
+        "ae": {"strongest": {"solver": "newton_lanes", "tolerance": 1e-4}},
+        "ode": {"strongest": {"solver": "etdrk4", "tolerance": 1e-2}, **OF_MOTION},
+        "dae": {"strongest": {"solver": "etdrk4", "tolerance": 2e-3}, **OF_MOTION},
+        "structural": {
+            "strongest": {"solver": SOLVER, "tolerance": 1e-2},
+            "paper": {"tolerance": USUAL},
+        },
     },
     fit=fit,
     learns_from="nothing",

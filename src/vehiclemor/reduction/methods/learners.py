@@ -24,8 +24,8 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned_model import (
     LearnedModel,
     LearnedSettings,
-    Path,
     TrainingData,
+    paths_in_step,
     predicted,
     stepped,
 )
@@ -87,18 +87,20 @@ def operators(data: TrainingData, settings: OperatorInferenceSettings) -> Learne
 
     # The library wants inputs at the last sample too.
     inputs = [np.vstack([u, u[-1:]]).T for u in data.inputs]
-    paths = [z.T for z in data.paths]
+    paths, starts = [z.T for z in data.paths], [z[0] for z in data.paths]
+    keys = [z.tobytes() + u.tobytes() for z, u in zip(starts, inputs, strict=True)]
 
     class Step(opinf.models.DiscreteModel):
         """One step; training runs go on together, where the library takes one after the other."""
 
         def refit(self) -> Any:
             super().refit()
-            self.runs = solved_together(stepped(lambda z, u: self.rhs(z.T, u.T).T), paths, inputs)
+            path = stepped(lambda z, u: self.rhs(z.T, u.T).T)
+            self.runs = dict(zip(keys, paths_in_step(path, starts, data.inputs), strict=True))
             return self
 
         def predict(self, state0: np.ndarray, niters: int, inputs: Any = None) -> np.ndarray:
-            return self.runs[state0.tobytes() + inputs.tobytes()][:, :niters]
+            return self.runs[state0.tobytes() + inputs.tobytes()][:niters].T
 
     class Reduced(opinf.lstsq.L2Solver):
         """Least squares of as many rows as there are unknowns, which have the same solution."""
@@ -115,24 +117,6 @@ def operators(data: TrainingData, settings: OperatorInferenceSettings) -> Learne
         raise InputError("opinf finds no ridge that keeps all training runs stable") from error
     step.runs.clear()
     return data.model(stepped(lambda z, u: step.rhs(z.T, u.T).T))
-
-
-def solved_together(
-    path: Path, paths: list[np.ndarray], inputs: list[np.ndarray]
-) -> dict[bytes, np.ndarray]:
-    """Start and inputs of each run as bytes -> its path (r, samples) by a learned step.
-
-    Known are paths (r, samples) and inputs (2 inputs, samples).
-    """
-    driven = np.zeros((max(u.shape[1] for u in inputs) - 1, len(inputs), len(inputs[0])))
-    for run, u in enumerate(inputs):
-        driven[: u.shape[1] - 1, run] = u[:, :-1].T
-    with np.errstate(all="ignore"):
-        found = path(np.array([z[:, 0] for z in paths]), driven)
-    return {
-        z[:, 0].tobytes() + u.tobytes(): found[: z.shape[1], run].T
-        for run, (z, u) in enumerate(zip(paths, inputs, strict=True))
-    }
 
 
 def same_least_squares(arguments: np.ndarray, results: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -219,8 +203,7 @@ def learner(
     """A method that learns a step from training runs by a package, imported by another name."""
 
     def fit(model: Any, training: Training, chosen: Any) -> LearnedModel:
-        data = TrainingData.of(model, training, chosen, package[1], chosen.of_samples)
-        return regression(data, chosen)
+        return regression(TrainingData.of(model, training, chosen, package[1]), chosen)
 
     # Of a mechanism coordinates follow from the inputs, which needs a regression without steps.
     static = ("ae",) * (settings in (GaussianProcessSettings, NeuralNetworkSettings))

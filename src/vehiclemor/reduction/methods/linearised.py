@@ -17,7 +17,12 @@ Reductors choose coordinates of the lateral modes, those that steering moves:
   steady cornering is that of the linearisation.  Of a structure it takes all modes up to a
   frequency, linearised at the static state.
 - `balanced_truncation` (B. C. Moore, IEEE Trans. Autom. Control 26 (1981), 17-32) is pyMOR's; its
-  outputs are the yaw rate and the lateral speed.
+  outputs are the yaw rate and the lateral speed.  A structure is balanced with free velocities
+  (D. G. Meyer, S. Srinivasan, IEEE Trans. Autom. Control 41 (1996), 1632-1644).  Inputs are the
+  forces of the ports, outputs their deflections; strains, many among a model's outputs, would crowd
+  out the motion.  The projection is Galerkin's, in pyMOR's right basis alone: matrices stay
+  symmetric.  Gramians need damping, and motion in soft springs has hardly any.  So they are those
+  of q exp(-t / FADING), which weighs late motion less; nothing of this is in the reduced structure.
 
 The single-track car (P. Riekert, T. E. Schunck, Ing.-Arch. 11 (1940), 210-224; M. Mitschke,
 H. Wallentowitz, Dynamik der Kraftfahrzeuge, Springer) has the lateral speed V and the yaw rate r at
@@ -44,15 +49,12 @@ from pydantic import Field
 
 from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import Method, OfflineCost, installed, offline_cost
-from vehiclemor.reduction.projection.balancing import (
-    BalancedStructureSettings,
-    balanced_structure,
-    check_balancing,
-)
 from vehiclemor.reduction.projection.structural import (
+    MASSLESS,
     ReducedStructure,
     StructuralSettings,
-    free_modes,
+    modes_below,
+    port_rates,
     reduced,
 )
 from vehiclemor.reduction.settings import FallbackSettings
@@ -67,6 +69,7 @@ from vehiclemor.reduction.vehicle.linear_modes import (
 from vehiclemor.reduction.vehicle.reduced_vehicle import ReducedVehicle
 from vehiclemor.reduction.vehicle.shape import VehicleShape, no_steered_vehicle
 from vehiclemor.simulation.dynamic import DynamicModel
+from vehiclemor.simulation.structures.system import factored
 
 # Lateral acceleration (m/s^2) of steady cornering that gives states their typical size (ISO 7401).
 CORNERING = 4.0
@@ -75,6 +78,10 @@ MARGIN = 3.0
 SPEED, HEADING, POSITION = 10.0, 1.0, 10.0
 # Lateral speed (m/s) of a typical maneuver.
 SIDEWARD = 0.5
+# Time in s in which the motion of a structure counts less by a factor e.
+FADING = 2.0
+# Most coordinates n: from 2 n = 1000 on pyMOR iterates, which did not converge on the truck.
+LARGEST = 499
 
 
 class ModalVehicleSettings(FallbackSettings):
@@ -95,21 +102,18 @@ class StructuralModesSettings(StructuralSettings):
     highest: float = Field(100.0, gt=0.0, le=1e5, description="modes of up to so many Hz are kept")
 
 
-# Shape, its lateral modes, its static response (what follows the inputs at once), settings -> modes
-# and static response of the reduced vehicle.
-Reductor = Callable[
-    [VehicleShape, SlowModes, np.ndarray, Any],
-    tuple[SlowModes, np.ndarray],
-]
+class BalancedStructureSettings(StructuralSettings):
+    """Settings for a structure."""
+
+    rank: int = Field(45, ge=1, description="basis vectors")
 
 
-def truncated(
-    shape: VehicleShape,
-    modes: SlowModes,
-    static_response: np.ndarray,
-    settings: ModalVehicleSettings,
-) -> tuple[SlowModes, np.ndarray]:
-    """The slow modes; `InputError` if there are none."""
+def truncated(shape: VehicleShape, settings: ModalVehicleSettings) -> tuple[SlowModes, np.ndarray]:
+    """The slow lateral modes, and what of the shape (n, inputs) follows the inputs at once.
+
+    `InputError` if there are none.
+    """
+    modes, static_response = lateral_modes(shape)
     # In real form, rows of a block have the length |lambda|.
     slow = np.linalg.norm(modes.rates, axis=1) <= settings.fastest
     if not slow.any():
@@ -117,23 +121,23 @@ def truncated(
         raise InputError(f"fastest is {limit:g} 1/s: no mode that steering moves is that slow")
     if not slow.all():
         steady = np.linalg.solve(modes.rates[~slow][:, ~slow], modes.input_matrix[~slow])
-        static_response = static_response.copy()
         static_response[:, 0] -= modes.right[:, ~slow] @ steady
     chosen = np.eye(len(slow))[slow]
     return within(modes, chosen, chosen.T), static_response
 
 
 def balanced_modes(
-    shape: VehicleShape,
-    modes: SlowModes,
-    static_response: np.ndarray,
-    settings: RankedVehicleSettings,
+    shape: VehicleShape, settings: RankedVehicleSettings
 ) -> tuple[SlowModes, np.ndarray]:
-    """The modes in pyMOR's bases; `InputError` if pyMOR is missing or the rank is too high."""
+    """The lateral modes in pyMOR's bases, and what of the shape follows the inputs at once.
+
+    `InputError` if pyMOR is missing or the rank is too high.
+    """
     with installed("pyMOR"):
         from pymor.core.logger import log_levels
         from pymor.models.iosys import LTIModel
         from pymor.reductors.bt import BTReductor
+    modes, static_response = lateral_modes(shape)
     if settings.rank >= (most := len(modes.rates)):
         raise InputError(f"rank is {settings.rank}; {shape.model.name} allows at most {most - 1}")
     outputs = shape.linearised.velocity_a[[0, 2]] @ modes.right
@@ -145,11 +149,11 @@ def balanced_modes(
     return within(modes, np.linalg.solve(test.T @ trial, test.T), trial), static_response
 
 
-def linear_vehicle(model: DynamicModel, settings: Any, reductor: Reductor) -> ReducedVehicle:
-    """The reduced vehicle of linear dynamics in the coordinates that a reductor chooses."""
+def linear_vehicle(model: DynamicModel, settings: Any, choose: Callable) -> ReducedVehicle:
+    """The reduced vehicle of linear dynamics, in modes that `truncated` or the like chooses."""
     began = time.process_time()
     shape = VehicleShape(model)
-    modes, static_response = reductor(shape, *lateral_modes(shape), settings)
+    modes, static_response = choose(shape, settings)
     linear = shape.linearised
     k, inputs = len(modes.rates), linear.b.shape[1]
     listing = FeatureListing(k + 1, inputs)
@@ -253,14 +257,56 @@ def modal(model: Any, training: Training, settings: Any) -> ReducedVehicle | Red
     if model.kind != "structural":
         return linear_vehicle(model, settings, truncated)
     began = time.process_time()
-    return reduced(model, free_modes(model, settings.highest), settings, began)
+    structure: Any = model.system.structure
+    # On its springs and tires at the static state; dampers are left out.
+    held = structure.with_port_springs(port_rates(model)[0])
+    # Shifted, so that motion that hardly anything holds does no harm.
+    shift = 1.0
+    solve = factored(held + shift * structure.mass, "MMD_AT_PLUS_A").solve
+    modes = modes_below(held, structure.mass, solve, -shift, settings.highest)
+    return reduced(model, modes, settings, began)
 
 
 def balanced(model: Any, training: Training, settings: Any) -> ReducedVehicle | ReducedStructure:
     """Balance and truncate; `InputError` if pyMOR is missing."""
     if model.kind != "structural":
         return linear_vehicle(model, settings, balanced_modes)
-    return balanced_structure(model, settings)
+    with installed("pyMOR"):
+        from pymor.core.logger import log_levels
+        from pymor.models.iosys import SecondOrderModel
+        from pymor.reductors.sobt import SOBTfvReductor
+    began = time.process_time()
+    structure, fading = model.system.structure, 1.0 / FADING
+    mass, elastic = structure.mass.toarray(), structure.stiffness.toarray()
+    ports, dampers = structure.ports.toarray(), structure.dampers.toarray()
+    stiffness, rates = port_rates(model)
+    damping = structure.damping_time * elastic + dampers @ dampers.T + (ports * rates) @ ports.T
+    faded_stiffness = (
+        structure.with_port_springs(stiffness).toarray() + fading * damping + fading**2 * mass
+    )
+    faded_damping = damping + 2.0 * fading * mass
+    full = SecondOrderModel.from_matrices(mass, faded_damping, faded_stiffness, ports, ports.T)
+    with log_levels({"pymor": "ERROR"}):
+        reductor: Any = SOBTfvReductor(full)
+        reductor.reduce(settings.rank)
+    return reduced(model, reductor.V.to_numpy(), settings, began)
+
+
+def check_balancing(model: Any, settings: Any) -> None:
+    """Raise `InputError` if a structure is too large or too small, or its mass is singular."""
+    if model.kind != "structural":
+        return
+    name, n = model.name, model.size
+    if n > LARGEST:
+        raise InputError(
+            f"{name} has n = {n}; balanced_truncation solves dense Lyapunov equations for n up to "
+            f"{LARGEST}: take a coarser mesh, or krylov"
+        )
+    if settings.rank >= n:
+        raise InputError(f"rank is {settings.rank}; {name} allows at most {n - 1}")
+    masses = np.linalg.eigvalsh(model.system.structure.mass.toarray())
+    if masses[0] <= MASSLESS * masses[-1]:
+        raise InputError(f"{name} has motions without mass; take krylov or craig_bampton for it")
 
 
 def no_linear_model(model: Any) -> str:

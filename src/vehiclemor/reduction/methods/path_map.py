@@ -208,12 +208,6 @@ class PathMapModel(ReducedMechanism):
         return _mapped(model, self.ranges, self.degree, number)
 
 
-def _named(model: AlgebraicModel, ranges: np.ndarray) -> str:
-    """Ranges (inputs, 2) of the inputs by their names and units."""
-    pairs = zip(model.definition.inputs, ranges, strict=True)
-    return ", ".join(f"{q.name} {low:.5g} to {high:.5g} {q.unit}" for q, (low, high) in pairs)
-
-
 def check(model: Model, settings: PathMapSettings) -> None:
     """Raise `InputError` if the degree is too high for powers, or the nodes are too many."""
     if settings.degree > HIGHEST_DEGREE:
@@ -254,7 +248,8 @@ def _mapped(model: AlgebraicModel, ranges: np.ndarray, degree: int, number: int)
     try:
         solved = model.solve_path(np.zeros(len(inputs)), inputs)
     except UnreachableError:
-        box = _named(model, ranges)
+        sides = zip(model.definition.inputs, ranges, strict=True)
+        box = ", ".join(f"{q.name} {low:.5g} to {high:.5g} {q.unit}" for q, (low, high) in sides)
         raise InputError(f"path_map: what training spans is not all in reach: {box}") from None
     numbers = np.where(widths > RESTING, number, 1)
     values, columns = _distinct(np.hstack([solved.coordinates, solved.outputs]))
@@ -271,15 +266,11 @@ def _mapped(model: AlgebraicModel, ranges: np.ndarray, degree: int, number: int)
 
 def _distinct(values: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
     """Columns (nodes, columns) that differ, and which of them stands for each of the values."""
-    different: list[np.ndarray] = []
-    indices = []
-    for column in values.T:
-        same = (k for k, other in enumerate(different) if np.abs(other - column).max() < SAME)
-        index = next(same, len(different))
-        if index == len(different):
-            different.append(column)
-        indices.append(index)
-    return np.column_stack(different), tuple(indices)
+    from scipy.spatial.distance import cdist
+
+    first_alike = (cdist(values.T, values.T, "chebyshev") < SAME).argmax(axis=1)
+    different, indices = np.unique(first_alike, return_inverse=True)
+    return values[:, different], tuple(indices.tolist())
 
 
 def _coefficients(values: np.ndarray, moving: int, number: int, degree: int) -> np.ndarray:
@@ -297,15 +288,12 @@ def _coefficients(values: np.ndarray, moving: int, number: int, degree: int) -> 
     cells[:, orders > degree] = 0.0
     to_powers = np.zeros((size, size))
     for order in range(size):
-        to_powers[: order + 1, order] = chebyshev.cheb2poly(np.eye(size)[order, : order + 1])
+        to_powers[: order + 1, order] = chebyshev.cheb2poly(np.eye(size)[order])
     for axis in range(1, moving + 1):
         cells = _along(to_powers, cells, axis)
-    terms = monomials(moving, degree)
-    powers = np.zeros((moving, len(terms)), dtype=int)
-    for column, term in enumerate(terms):
-        for variable in term:
-            powers[variable, column] += 1
-    coefficients = cells[:, *powers]
+    terms = [np.array(term, dtype=int) for term in monomials(moving, degree)]
+    powers = np.array([np.bincount(term, minlength=moving) for term in terms])
+    coefficients = cells[:, *powers.T]
     padding = padded(quantities) - quantities
     return loop_array(np.pad(coefficients, ((0, 0), (0, 0), (0, padding))))
 

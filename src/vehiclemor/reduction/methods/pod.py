@@ -5,6 +5,7 @@ the Proper Orthogonal Decomposition, J. Comput. Nonlinear Dyn. 10(3), 031007 (20
 L. Sirovich, Turbulence and the dynamics of coherent structures, Quart. Appl. Math. 45 (1987).
 """
 
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -40,16 +41,9 @@ PRESETS = {
 }
 
 
-def _in_periods(kind: str) -> type[Settings]:
-    """Settings of POD in control periods."""
-    period: Any = ControlPeriod, PERIODS[kind]
-    return create_model("PodSettings", __base__=SETTINGS[kind], control_period=period)
-
-
-def _of_one_basis(kind: str) -> type[Settings]:
-    """Settings of POD with one basis."""
-    snapshots: Any = Snapshots, SNAPSHOTS[kind]
-    return create_model("FixedBasisSettings", __base__=SETTINGS[kind], snapshots=snapshots)
+def _settings(kind: str, name: str, **further: Any) -> type[Settings]:
+    """Settings of POD with another field or default."""
+    return create_model(name, __base__=SETTINGS[kind], **further)
 
 
 def check(model: Model, settings: Any) -> None:
@@ -63,10 +57,16 @@ def check(model: Model, settings: Any) -> None:
 
 
 def fit(model: Model, training: Training, settings: Any) -> FittedModel:
-    """One POD subspace for each control period of the training runs, or for the whole of them."""
+    """One POD subspace for each control period of the training runs, or for the whole of them.
+
+    `InputError` if these differ in duration.
+    """
     if model.kind == "structural":
         return structural.fit_basis(model, training, settings)  # type: ignore[arg-type]
-    duration = training[0].maneuver.duration
+    duration, *others = sorted({run.maneuver.duration for run in training})
+    if others:
+        lengths = ", ".join(f"{length:g}" for length in (duration, *others))
+        raise InputError(f"windows in time need training runs of one duration, not {lengths} s")
     edges = window_edges(duration, getattr(settings, "control_period", duration))
     return PROJECTIONS[model.kind].fit_windows(model, training, edges, settings)
 
@@ -75,20 +75,23 @@ METHOD = Method(
     name="pod",
     summary="POD with its own mean and basis in each control period (the paper's method)",
     reference="10.1115/1.4029390",
-    settings={kind: _in_periods(kind) for kind in SETTINGS},
+    settings={
+        kind: _settings(kind, "PodSettings", control_period=(ControlPeriod, PERIODS[kind]))
+        for kind in SETTINGS
+    },
     presets=PRESETS,
     refusal=dynamic.further_states_refused,
     check=check,
     fit=fit,
 )
-FIXED_BASIS = Method(
+FIXED_BASIS = replace(
+    METHOD,
     name="fixed_basis",
     summary="POD with one mean and basis for the whole run",
     reference="10.1090/qam/910462",
-    settings={kind: _of_one_basis(kind) for kind in SETTINGS}
+    settings={
+        kind: _settings(kind, "FixedBasisSettings", snapshots=(Snapshots, SNAPSHOTS[kind]))
+        for kind in SETTINGS
+    }
     | {"structural": structural.StructuralPodSettings},
-    presets=PRESETS,
-    refusal=dynamic.further_states_refused,
-    check=check,
-    fit=fit,
 )

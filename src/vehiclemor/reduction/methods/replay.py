@@ -6,7 +6,7 @@ that it was not trained on has learned nothing about the model.
 
 import time
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -70,7 +70,15 @@ class ReplayModel(ShortRepr):
         inputs = completed(maneuver, self.model.definition).at(times)
         numbers = range(len(self.recorded))
         alike = [k for k in numbers if np.array_equal(self.recorded[k].times, times)]
-        distance = partial(self._distance, times, inputs, conditions)
+
+        def distance(number: int) -> float:
+            run = self.recorded[number]
+            shared = times <= run.times[-1]
+            difference = _resampled(run.times, run.inputs, times[shared]) - inputs[shared]
+            of_inputs = np.sqrt(np.mean(difference**2, axis=0))
+            differences = np.append(of_inputs, self.conditions[number] - conditions)
+            return float(np.linalg.norm(differences / self._ranges))
+
         nearest = self.recorded[min(alike or numbers, key=distance)]
         paths = {
             name: _resampled(nearest.times, getattr(nearest, name), times)
@@ -90,20 +98,8 @@ class ReplayModel(ShortRepr):
             seconds=0.0,
         )
 
-    def _distance(
-        self, times: np.ndarray, inputs: np.ndarray, conditions: np.ndarray, number: int
-    ) -> float:
-        """Distance of a training run, over the time that both cover."""
-        run = self.recorded[number]
-        shared = times <= run.times[-1]
-        difference = _resampled(run.times, run.inputs, times[shared]) - inputs[shared]
-        of_inputs = np.sqrt(np.mean(difference**2, axis=0))
-        differences = np.append(of_inputs, self.conditions[number] - conditions)
-        return float(np.linalg.norm(differences / self._ranges))
-
     def best_approximation(self, states: np.ndarray) -> None:
         """There is no subspace to project onto."""
-        del states
 
 
 def _conditions(model: Model, start: Start) -> np.ndarray:

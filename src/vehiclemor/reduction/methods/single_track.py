@@ -23,7 +23,7 @@ from vehiclemor.reduction.interface import Method
 from vehiclemor.reduction.learned_model import LearnedModel, SampledSettings, TrainingData
 from vehiclemor.reduction.learned_samples import MOST_SAMPLES, Coordinates, Samples
 from vehiclemor.reduction.training import Training
-from vehiclemor.reduction.vehicle.shape import RANK, VehicleShape, no_steered_vehicle
+from vehiclemor.reduction.vehicle.shape import RANK, no_steered_vehicle
 
 # Constants of a medium car, SI units, by which the fit begins; kappa is that of the model.
 TIRES = [*(0.0, 1.3, 60.0, 5.0, 1.3), *(0.0, 1.4, 60.0, 5.0, 1.3)]
@@ -42,15 +42,14 @@ class SingleTrackSettings(SampledSettings):
     )
     iterations: int = Field(30, ge=0, le=500, description="of the least squares over whole runs")
 
-
-def physical(samples: Samples) -> Coordinates:
-    """V, r, roll and its rate, and the deviation of U."""
-    shape: Any = samples.states.shape
-    linear = shape.linearised
-    roll = linear.output_a[shape.model.outputs.index("roll")]
-    turn, forward, lateral = linear.velocity_a
-    rows = np.array([lateral, turn, roll, roll @ linear.a, forward])
-    return Coordinates(rows, np.zeros((len(rows), samples.runs[0].inputs.shape[1])))
+    def of_samples(self, samples: Samples) -> Coordinates:
+        """V, r, roll and its rate, and the deviation of U."""
+        shape: Any = samples.shape
+        linear = shape.linearised
+        roll = linear.output_a[shape.model.outputs.index("roll")]
+        turn, forward, lateral = linear.velocity_a
+        rows = np.array([lateral, turn, roll, roll @ linear.a, forward])
+        return Coordinates(rows, np.zeros((len(rows), samples.runs[0].inputs.shape[1])))
 
 
 def axle_force(slip: np.ndarray, stiffness: Any, peak: Any, form: Any) -> np.ndarray:
@@ -136,10 +135,8 @@ def steering(data: TrainingData, inputs: np.ndarray) -> np.ndarray:
 
 def fit(model: Any, training: Training, settings: SingleTrackSettings) -> LearnedModel:
     """The single track with the constants of least squares, and what is read from it."""
-    data, shape = (
-        TrainingData.of(model, training, settings, "sklearn", physical),
-        VehicleShape(model),
-    )
+    data = TrainingData.of(model, training, settings)
+    shape: Any = data.samples.shape
     # Of a car that turns as its wheels point.
     linear = shape.linearised
     steady = -np.linalg.lstsq(linear.a, linear.b[:, 0], rcond=RANK)[0]

@@ -53,7 +53,7 @@ def _fitted(model: Any, training: Training, settings: TrajectoryNetworkSettings)
         from jax_sysid.models import Model  # pyright: ignore[reportMissingImports]
         from sklearn.neural_network import MLPRegressor
 
-    data = TrainingData.of(model, training, settings, "sklearn", settings.of_samples)
+    data = TrainingData.of(model, training, settings)
     now, inputs, _ = data.steps
     r, m, lanes = now.shape[1], inputs.shape[1], in_lanes([*map(len, data.inputs)])
 

@@ -16,7 +16,6 @@ import numpy as np
 from pydantic import Field
 
 from vehiclemor.arguments import require
-from vehiclemor.exceptions import InputError
 from vehiclemor.reduction.interface import OfflineCost, offline_cost
 from vehiclemor.reduction.projection.bases import (
     Basis,
@@ -157,14 +156,7 @@ class DynamicProjection(ReducedSystem):
 def fit_windows(
     model: DynamicModel, training: Training, edges: np.ndarray, settings: DynamicPodSettings
 ) -> DynamicProjection:
-    """POD subspaces, between edges (windows + 1,) in s, of equidistant snapshots of all runs.
-
-    `InputError` if the training runs differ in duration.
-    """
-    durations = sorted({run.maneuver.duration for run in training})
-    if len(durations) > 1:
-        lengths = ", ".join(f"{duration:g}" for duration in durations)
-        raise InputError(f"windows in time need training runs of one duration, not {lengths} s")
+    """POD subspaces, between edges (windows + 1,) in s, of equidistant snapshots of all runs."""
     began = time.process_time()
     count = settings.snapshots
     snapshot_times = np.concatenate([np.linspace(a, b, count) for a, b in pairwise(edges)])
@@ -236,7 +228,6 @@ def _weight(
     if settings.inner_product == "range":
         ranges = np.ptp(states, axis=0)
         return np.diag(1.0 / np.maximum(ranges, SMALLEST_RANGE * ranges.max()) ** 2)
-    assert settings.inner_product == "energy", settings.inner_product
     mass = model.mass_matrix(model.start())
     if not of_states:
         return mass

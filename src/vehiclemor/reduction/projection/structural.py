@@ -9,7 +9,7 @@ to solve in a step has few entries.
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -24,10 +24,9 @@ from vehiclemor.reduction.settings import LARGEST_TOLERANCE, SHORTEST, Settings
 from vehiclemor.reduction.training import Training
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.checks import check_positive
 from vehiclemor.simulation.evaluation import PLACES, By, parameter_names, partial
 from vehiclemor.simulation.structures.model import FIRST_STEP, REASONS, USUAL, StructuralModel
-from vehiclemor.simulation.structures.system import StructuralSystem, factored
+from vehiclemor.simulation.structures.system import StructuralSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
 # Modes that are looked for at first.
@@ -99,33 +98,8 @@ def projected(structure: Structure, modes: np.ndarray) -> Structure:
     )
 
 
-class StructuralRuns(ShortRepr):
-    """Base of what runs like a structure: dataclasses with the fields below."""
-
-    if TYPE_CHECKING:
-        model: StructuralModel
-        tolerance: float
-        step_size: float  # In s, instead of the tolerance; 0: by that.
-        system: Any  # The `StructuralSystem` that is solved.
-
-    def for_model(self, model: StructuralModel) -> Any:
-        """The same for a model whose online parameters are others."""
-        return replace(self, model=model)  # type: ignore[type-var]
-
-    def simulate(
-        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
-    ) -> Trajectory:
-        """A run at the maneuver's output times; it may have diverged."""
-        self.model.start(start)
-        return self.model.run(maneuver, self.system, self.tolerance, outputs, step=self.step_size)
-
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """Runs have no coordinates to project."""
-        del states
-
-
 @dataclass(frozen=True, eq=False)
-class ReducedStructure(StructuralRuns):
+class ReducedStructure(ShortRepr):
     """A structure in one basis, as a function of its states too."""
 
     model: StructuralModel  # The full one.
@@ -160,6 +134,16 @@ class ReducedStructure(StructuralRuns):
         numbers = range(1, self.order + 1)
         return tuple(f"{name}{k}" for name in ("mode_", "mode_rate_") for k in numbers)
 
+    def simulate(
+        self, maneuver: Excitation, start: Start, outputs: tuple[str, ...] | None = None
+    ) -> Trajectory:
+        """A run at the maneuver's output times; it may have diverged."""
+        self.model.start(start)
+        return self.model.run(maneuver, self.system, self.tolerance, outputs, step=self.step_size)
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """Runs have no coordinates to project."""
+
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
         """State (2 r,) of the static state."""
         del inputs
@@ -178,7 +162,6 @@ class ReducedStructure(StructuralRuns):
 
         A state has no accelerations of the method, with which runs go on.
         """
-        check_positive("dt", dt)
         count = max(int(np.ceil(dt / FIRST_STEP - 1e-9)), 1)
         ends = inputs if next_inputs is None else next_inputs
         path = inputs + np.linspace(0.0, 1.0, count + 1)[:, None] * (ends - inputs)
@@ -248,7 +231,6 @@ class ReducedStructure(StructuralRuns):
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> None:
         """Its inputs tell how far it goes in what it knows."""
-        del states, inputs
 
 
 def reduced(
@@ -272,20 +254,6 @@ def port_rates(model: StructuralModel) -> tuple[np.ndarray, np.ndarray]:
     return stiffness, damping
 
 
-def free_modes(model: StructuralModel, highest: float) -> np.ndarray:
-    """Modes (n, k) up to so many Hz of the structure on its springs and tires.
-
-    It is linearised at the static state; dampers are left out.
-    """
-    structure: Any = model.system.structure
-    stiffness, _ = port_rates(model)
-    held = structure.with_port_springs(stiffness)
-    # Shifted, so that motion that hardly anything holds does no harm.
-    shift = 1.0
-    solve = factored(held + shift * structure.mass, "MMD_AT_PLUS_A").solve
-    return modes_below(held, structure.mass, solve, -shift, highest)
-
-
 def modes_below(stiffness: Any, mass: Any, solve: Any, shift: float, highest: float) -> np.ndarray:
     """Modes (n, k) up to so many Hz; `solve` is by the stiffness less `shift` times the mass."""
     from scipy.sparse.linalg import LinearOperator, eigsh
@@ -302,12 +270,9 @@ def modes_below(stiffness: Any, mass: Any, solve: Any, shift: float, highest: fl
             break
         count *= 2
     if squares[0] > largest:
-        raise InputError(f"no mode is below {highest:g} Hz: the first has {_hertz(squares[0]):.4g}")
+        first = np.sqrt(max(squares[0], 0.0)) / (2.0 * np.pi)
+        raise InputError(f"no mode is below {highest:g} Hz: the first has {first:.4g}")
     return modes[:, squares <= largest]
-
-
-def _hertz(square: float) -> float:
-    return float(np.sqrt(max(square, 0.0)) / (2.0 * np.pi))
 
 
 class StructuralPodSettings(StructuralSettings):

@@ -15,13 +15,13 @@ from vehiclemor.exceptions import InputError
 from vehiclemor.files import begins_with, replaceable, write_whole
 from vehiclemor.parameters import load_parameters
 from vehiclemor.registry import component
-from vehiclemor.report.figures.result_plot import by_method, configuration, model_name
+from vehiclemor.report.figures.result_plot import by_method
+from vehiclemor.report.figures.runs import configuration, model_name
 from vehiclemor.report.figures.theme import FULL, Style, panels, styled, styles
 from vehiclemor.report.labels import method_text
 from vehiclemor.simulation.trajectory import Trajectory
 
-FULL_ORDER = "full order"
-FRAMES_PER_SECOND, DOTS, DURATIONS, FACTORS = 12, 100, (0.5, 60.0), (0.01, 1000.0)
+FRAMES_PER_SECOND, DURATIONS, FACTORS = 12, (0.5, 60.0), (0.01, 1000.0)
 # Half of what is seen of the road from above; and least and most of it from behind (m).
 ALONG, ACROSS, NARROWEST, WIDEST = 16.0, 7.0, 3.0, 6.5
 PLACE = ("longitudinal_position", "lateral_position", "yaw")
@@ -35,8 +35,6 @@ CAR = {"front_axle_distance": 1.2, "rear_axle_distance": 1.4, "front_track": 1.5
 CAR |= {"tire_radius": 0.32, "tire_stiffness": 2e5}
 SECTION = ((-0.8, 0.3), (0.8, 0.3), (0.8, 0.8), (0.6, 1.4), (-0.6, 1.4), (-0.8, 0.8), (-0.8, 0.3))
 OVERHANG, RIM = 0.8, 0.1
-# Factor on roll, pitch and bounce.
-MAGNIFY = 3.0
 
 
 def line(*points: Sequence[Any] | np.ndarray) -> np.ndarray:
@@ -100,7 +98,7 @@ def animate(
     *beside: Trajectory | xr.Dataset,
     labels: Sequence[str] = (),
     duration: float = 8.0,
-    magnify: float = MAGNIFY,
+    magnify: float = 3.0,
     out: str | Path = "car.gif",
 ) -> Path:
     """Write a film of runs of a car with the same input, together in colours.
@@ -116,7 +114,7 @@ def animate(
     duration
         Of the film in s; the run is shown faster or slower.
     magnify
-        Factor on roll, pitch and bounce, which the title names; 3 by default.
+        Factor on roll, pitch and bounce, which the title names.
     out
         GIF file.
 
@@ -138,7 +136,7 @@ def animate(
             runs.append(quantities)
     texts = list(labels) or [method_text(name) for name in methods]
     if not labels and beside:
-        texts[-1] = FULL_ORDER
+        texts[-1] = "full order"
     if len(texts) != len(runs):
         raise InputError(f"labels: {len(runs)} runs are drawn, not {len(texts)}")
     followed = runs[-1]
@@ -158,7 +156,7 @@ def animate(
         frames = [{name: h[name][rows] for name in h} for h in runs]
         film = _film(frames, texts, looks, _parameters(run), factor)
         writer = PillowWriter(fps=FRAMES_PER_SECOND)
-        return write_whole(path, lambda part: film.save(part, writer=writer, dpi=DOTS))
+        return write_whole(path, lambda part: film.save(part, writer=writer, dpi=100))
 
 
 def _styles(methods: Sequence[str]) -> list[Style]:
@@ -228,7 +226,7 @@ def _histories(run: Any) -> list[tuple[str, dict[str, np.ndarray]]]:
     dataset = run.dataset() if isinstance(run, Trajectory) else run
     if not isinstance(dataset, xr.Dataset) or "outputs" not in dataset:
         raise InputError(f"{quoted(run)} is neither a run nor a dataset with histories")
-    dataset = by_method(dataset, "reduced")
+    dataset = by_method(dataset)
     known = [str(label) for label in dataset["label"].values]
     reduced = [label for label in known if not label.startswith("full_order")] or known[:1]
     histories = [(name, _quantities(dataset.sel(label=name), "outputs")) for name in reduced]

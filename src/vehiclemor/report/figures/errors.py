@@ -20,29 +20,20 @@ from matplotlib.figure import Figure
 from vehiclemor.exceptions import InputError
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
-from vehiclemor.report.figures.runs import legend_of
+from vehiclemor.report.figures.runs import legend_of, shown_outputs
 from vehiclemor.report.figures.theme import Style, Ticks, tick_decades, ticks_of
-from vehiclemor.report.findings import at_point
-from vehiclemor.report.frames import saturated_ranks
 from vehiclemor.report.published import rms_numbers
-from vehiclemor.report.unseen import method_rows, protocol_of
+from vehiclemor.report.results import at_point, saturated_ranks
+from vehiclemor.report.unseen import method_rows
 from vehiclemor.simulation.trajectory import FINISHED
 from vehiclemor.study.plans.protocol import FULL_ORDER
 from vehiclemor.study.plans.study_runs import FACTORS, PARAMETER
 
-# Lines of a panel.
-LINES = 8
-# Letters of an axis' label in a line.
-LETTERS = 38
-# Between marks of two lines above the axes, as a share of their height.
-SHIFT = 0.025
 # What a logarithmic axis can't show: mark, height as a share of the axes, text, which errors.
 OFF: tuple[tuple[Style, float, str, Callable[[np.ndarray], np.ndarray]], ...] = (
     (theme.CROSS, 1.0, "a run has failed", lambda errors: ~np.isfinite(errors)),
     (theme.ZERO, 0.0, "error 0, off the log axis", lambda errors: errors == 0.0),
 )
-# Letters of a title in a line.
-TITLE = 60
 # Full-order integrators: of twelve no two look alike.
 GREYS: list[Style] = [
     {"color": color, "linestyle": line, "marker": marker, "markersize": 4, "linewidth": 0.8}
@@ -53,7 +44,7 @@ GREYS: list[Style] = [
 Lines = Mapping[str, tuple[str, xr.DataArray]]
 
 
-def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
+def figure_errors(dataset: xr.Dataset) -> Figure:
     """RMS errors of a study over all that it varies; of full order where there is nothing else."""
     if not {"rms_error", "signal_range"} <= set(dataset):
         raise InputError("no errors in this result: it was not compared with full order")
@@ -61,43 +52,34 @@ def figure_errors(dataset: xr.Dataset, *, outputs: Sequence[str]) -> Figure:
     reduced = {m: text for m, text in methods.items() if not m.startswith("full_order")}
     varied = _varied(dataset)
     if not varied:
-        return _of_a_point(dataset, reduced)
+        return _of_a_point(dataset)
     methods = reduced or methods
     saturated = saturated_ranks(dataset)
     errors = dataset["rms_error"].where(dataset["status"].isin(FINISHED), np.inf)
     lines = _lines(errors, methods, varied[1:], saturated)
     notes: list[str] = []
-    if len(lines) > max(LINES, len(methods)):
+    # More lines than can be told from each other.
+    if len(lines) > max(8, len(methods)):
         largest = errors.max(varied[1:])
         lines = {label: (text, largest.sel(label=label)) for label, text in methods.items()}
         notes.append(f"the largest error over {_listed(varied[1:])}")
-    figure = _panels(dataset, varied[0], outputs, lines)
-    _mark_saturation(figure, [f"{methods[m]} saturates at {r}" for m, r in saturated.items()])
+    ticks = ticks_of(dataset, varied[0])
+    if saturated and varied[0] == "rank":
+        texts = [f"{methods[label]} saturates at {rank}" for label, rank in saturated.items()]
+        ticks = ticks._replace(label=textwrap.fill(f"rank; {', '.join(texts)}", width=38))
+    outputs = shown_outputs(dataset)
+    size = 6.7 if len(outputs) < 3 else 8.5, 3.3
+    figure, grid = theme.panels(1, len(outputs), size)
+    for number, (panel, output) in enumerate(zip(grid.flat, outputs, strict=True)):
+        panel.set_title(theme.letter(number))
+        _draw_panel(panel, dataset, output, varied[0], ticks, lines)
+        ticks.scale(panel)
     trained = labels.trained_runs(dataset).sel(label=list(methods))
     if number := int(trained.sum()):
         notes.append(f"{number} of {trained.size} runs were in their own training")
     if notes:
         figure.suptitle("\n".join(notes), fontsize="medium")
     theme.legend_below(figure, figure.axes)
-    return figure
-
-
-def _mark_saturation(figure: Figure, texts: Sequence[str]) -> None:
-    """Say beside axes of ranks which methods reach their largest rank."""
-    for panel in figure.axes if texts else ():
-        if panel.get_xlabel() == "rank":
-            panel.set_xlabel(textwrap.fill(f"rank; {', '.join(texts)}", LETTERS))
-
-
-def _panels(dataset: xr.Dataset, axis: str, outputs: Sequence[str], lines: Lines) -> Figure:
-    """A panel for each output."""
-    ticks = ticks_of(dataset, axis)
-    size = 6.7 if len(outputs) < 3 else 8.5, 3.3
-    figure, grid = theme.panels(1, len(outputs), size)
-    for number, (panel, output) in enumerate(zip(grid.flat, outputs, strict=True)):
-        panel.set_title(theme.letter(number))
-        _draw_panel(panel, dataset, output, axis, ticks, lines)
-        ticks.scale(panel)
     return figure
 
 
@@ -165,7 +147,11 @@ def _draw_panel(
         axis.plot(ticks.at, np.where(visible, values, np.nan), label=text, **look)
         for mark, height, _, is_off in OFF:
             off = np.compress(is_off(values), ticks.at)
-            _draw_off(axis, off, mark, height, look["color"])
+            if len(off):
+                # Above those of other lines.
+                heights = np.full(len(off), height + 0.025 * _count_marked(axis, mark))
+                edge: Style = {"transform": axis.get_xaxis_transform(), "clip_on": False, **mark}
+                axis.plot(off, heights, color=look["color"], **edge)
     published = rms_numbers(str(dataset.attrs["model"])).get(output)
     if published and dimension in FACTORS:
         axis.axhline(published.value, label="published, nominal", **theme.THIN)
@@ -178,28 +164,21 @@ def _draw_panel(
     axis.set_ylabel(labels.error_label(dataset, "RMS error", output))
 
 
-def _draw_off(axis: Axes, at: np.ndarray, mark: Style, height: float, color: str) -> None:
-    """Marks at the edge of the axes, above those of other lines."""
-    if len(at):
-        heights = np.full(len(at), height + SHIFT * _count_marked(axis, mark))
-        transform = axis.get_xaxis_transform()
-        axis.plot(at, heights, color=color, transform=transform, clip_on=False, **mark)
-
-
 def _count_marked(axis: Axes, mark: Style) -> int:
     return sum(line.get_marker() == mark["marker"] for line in axis.lines)
 
 
-def _of_a_point(dataset: xr.Dataset, methods: Mapping[str, str]) -> Figure:
+def _of_a_point(dataset: xr.Dataset) -> Figure:
     """RMS errors of all outputs as shares of their ranges, a mark for each method."""
-    if not methods:
+    texts = legend_of(dataset)
+    if not texts:
         raise InputError("full order alone: no errors to draw")
     names = [str(output) for output in dataset["output"].values]
     figure, grid = theme.panels(1, 1, (6.7, 1.6 + 0.19 * len(names)))
     axis, heights = grid[0, 0], np.arange(len(names))
     drawn = theme.methods_of(dataset)
-    looks, marks = theme.styles(methods, drawn), theme.marks(methods, drawn)
-    for label, text in legend_of(dataset, methods).items():
+    looks, marks = theme.styles(texts, drawn), theme.marks(texts, drawn)
+    for label, text in texts.items():
         run = at_point(dataset, label)
         share = 100.0 * (run["rms_error"] / run["signal_range"])
         share = share.where(np.isfinite(share) & (share > 0.0))
@@ -220,7 +199,7 @@ def figure_pareto(dataset: xr.Dataset) -> Figure:
     Each full-order integrator is a line through its tolerances; a cross below the upper edge is a
     reduced model of which a run has failed.  Bars: between the quartiles of the rounds.
     """
-    rows: Any = pd.DataFrame(method_rows(dataset, protocol_of(dataset)))
+    rows: Any = pd.DataFrame(method_rows(dataset))
     rows["time"] = 1e6 * rows["seconds"]
     rows["bar"] = 0.5 * rows["spread"] * rows["time"]
     rows["tolerance"] = [json.loads(text).get("tolerance", 0.0) for text in rows["settings"]]
@@ -258,5 +237,5 @@ def figure_pareto(dataset: xr.Dataset) -> Figure:
     # Of what is chosen the mark is larger than a line of the legend.
     figure.legend(loc="outside right upper", fontsize=7, markerscale=0.7)
     # The legend stands beside the axes, whose title can't be wrapped by itself.
-    axis.set_title(textwrap.fill(str(dataset.attrs["title"]), TITLE))
+    axis.set_title(textwrap.fill(str(dataset.attrs["title"]), width=60))
     return figure

@@ -1,9 +1,10 @@
 """Runs of any model: histories and paths of full order and reduced models, and their errors."""
 
 import itertools
+import json
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -11,32 +12,28 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vehiclemor.exceptions import InputError
+from vehiclemor.multibody.definition import ModelDefinition
+from vehiclemor.registry import component
 from vehiclemor.report import labels
 from vehiclemor.report.figures import theme
 from vehiclemor.report.figures.theme import CROSS, FULL, Style, hide_rounding, tick_decades
-from vehiclemor.report.findings import at_point
 from vehiclemor.report.published import rms_numbers
+from vehiclemor.report.results import at_point
 from vehiclemor.simulation.trajectory import FINISHED
 
 # Lines of inputs.
 INPUTS = ("-", *theme.DASHES)
 # Outputs that make a path in the plane.
 PATH = ("longitudinal_position", "lateral_position")
-DISTANCE = "distance from full order at the same time"
 RMS_MARK: Style = {"marker": "<", "markersize": 6, "linestyle": "none"}
 # How far around the full-order signal the others are shown, as a multiple of its range; share of
 # the largest value below which the full order stands still.
 REACH, STILL = 0.6, 1e-4
-# Height of a panel in inches; letters of a label beside it in one line.
-HISTORY, ERROR, LINE = 2.5, 1.8, 26
-# Letters in a line of an input's meaning.
-MEANING = 20
 
 
 class Curve(NamedTuple):
     """One run, with the text of its legend and its style."""
 
-    label: str
     text: str
     style: Style
     run: xr.Dataset
@@ -54,25 +51,62 @@ class Runs(NamedTuple):
         return bool(self.curves) and bool(self.full["reference_outputs"].notnull().any())
 
 
-def legend_of(dataset: xr.Dataset, methods: Mapping[str, str] | None = None) -> dict[str, str]:
+def configuration(dataset: xr.Dataset) -> dict[str, Any]:
+    """What determines the result; a run that is no experiment has none."""
+    return json.loads(dataset.attrs.get("configuration", "{}"))
+
+
+def model_name(dataset: xr.Dataset) -> str:
+    """The model that a result is of."""
+    return str(dataset.attrs.get("model") or configuration(dataset).get("model", "it"))
+
+
+def shown_outputs(dataset: xr.Dataset) -> list[str]:
+    """Outputs that the model shows, three at most; of one that is not installed, the first."""
+    known = [str(output) for output in dataset["output"].values]
+    shown: list[str] = []
+    if definition := _definition(dataset):
+        main = labels.main_outputs(definition)
+        every = dict.fromkeys((*main, *labels.tabled_outputs(definition)))
+        shown = list(every)[: max(2, len(main))]
+    # Of outputs that a user has chosen none may be among them.
+    return ([output for output in shown if output in known] or known)[:3]
+
+
+def _input_meanings(dataset: xr.Dataset) -> dict[str, str]:
+    """Meaning of each input, without its remarks."""
+    definition = _definition(dataset)
+    inputs = definition.inputs if definition else ()
+    return {quantity.name: quantity.long_name.partition(",")[0] for quantity in inputs}
+
+
+def _definition(dataset: xr.Dataset) -> ModelDefinition | None:
+    """The model of a result, if it is installed here."""
+    try:
+        return component("model", model_name(dataset))
+    except InputError:
+        return None
+
+
+def legend_of(dataset: xr.Dataset) -> dict[str, str]:
     """Text of each reduced model by its label: trained on the run, and not ended well, if so.
 
-    `methods` are labels with their texts, those that the study lacks left out; by default all, or
-    full order where nothing was compared with it.
+    Full order has one too where nothing was compared with it.
     """
-    known = [str(label) for label in dataset["label"].values]
-    if methods is None:
-        alone = "reference_outputs" not in dataset and "rms_error" not in dataset
-        reduced = [label for label in known if alone or not label.startswith("full_order")]
-        methods = {label: labels.method_text(label) for label in reduced}
+    alone = "reference_outputs" not in dataset and "rms_error" not in dataset
     texts: dict[str, str] = {}
-    for label in [label for label in methods if label in known]:
+    for label in map(str, dataset["label"].values):
+        if label.startswith("full_order") and not alone:
+            continue
         run = at_point(dataset, label)
         ends = run["status"].to_series() if run["status"].ndim else {"": run["status"].item()}
         bad = {at: end for at, end in ends.items() if end != "ok"}
         failed = "; ".join(f"{end}, {at} start" if at else end for at, end in bad.items())
-        mark = labels.MARK * bool(labels.trained_runs(run).all())
-        texts[label] = methods[label] + mark + (f" ({failed})" if failed else "")
+        texts[label] = labels.method_text(label)
+        if labels.trained_runs(run).all():
+            texts[label] += labels.MARK
+        if failed:
+            texts[label] += f" ({failed})"
     return texts
 
 
@@ -88,23 +122,21 @@ def runs_of(dataset: xr.Dataset, texts: Mapping[str, str]) -> Runs:
         raise InputError(f"choose a point of the grid first: {', '.join(several)}")
     with_full = (p for p in points.values() if bool(p["reference_outputs"].notnull().any()))
     looks = theme.styles(texts, theme.methods_of(dataset))
-    curves = [Curve(label, text, looks[label], points[label]) for label, text in texts.items()]
+    curves = [Curve(text, looks[label], points[label]) for label, text in texts.items()]
     return Runs(next(with_full, next(iter(points.values()))), curves)
 
 
-def figure_histories(
-    dataset: xr.Dataset, *, outputs: Sequence[str], inputs: Mapping[str, str]
-) -> Figure:
+def figure_histories(dataset: xr.Dataset) -> Figure:
     """Outputs over the time, side by side, at a point of a study; their errors below.
 
-    The inputs, with their meanings by name, stand at the right, if the result has them.
+    The inputs stand at the right, if the result has them.
     """
-    texts = legend_of(dataset)
+    texts, outputs = legend_of(dataset), shown_outputs(dataset)
     runs = runs_of(dataset, texts)
     rows: list[Callable[[Axes, Runs, str], object]] = [draw_history]
     if runs.compared:
         rows.append(draw_largest_errors if len(texts) > 1 else draw_errors)
-    heights = [HISTORY, ERROR][: len(rows)]
+    heights = [2.5, 1.8][: len(rows)]
     columns = len(outputs) + ("inputs" in runs.full)
     size = (6.7 if columns < 3 else 9.5, sum(heights) + 1.2)
     ratios = {"height_ratios": heights}
@@ -113,7 +145,7 @@ def figure_histories(
     if "inputs" in runs.full:
         for axis in axes[1:, -1]:
             axis.remove()
-        draw_inputs(axes[0, -1], runs.full, inputs)
+        draw_inputs(axes[0, -1], runs.full, _input_meanings(dataset))
         axes[0, -1].tick_params(labelbottom=True)
         lowest.append(axes[0, -1])
     for number, axis in enumerate(figure.axes):
@@ -141,7 +173,7 @@ def draw_inputs(axis: Axes, run: xr.Dataset, meanings: Mapping[str, str]) -> Non
         axis.plot(run["time"], inputs[k], label=label, **look)
     text = meanings.get(names[shown[0]], names[shown[0]]) if len(shown) == 1 else "inputs"
     unit = labels.raised(units[shown[0]])
-    axis.set_ylabel(textwrap.fill(f"{text} ({unit})", MEANING))
+    axis.set_ylabel(textwrap.fill(f"{text} ({unit})", width=20))
 
 
 def draw_history(axis: Axes, runs: Runs, output: str) -> str:
@@ -252,7 +284,7 @@ def draw_largest_errors(axis: Axes, runs: Runs, output: str) -> None:
     axis.set_ylim(bottom=min([axis.get_ylim()[0], *(0.5 * rms for rms in marked)]))
     tick_decades(axis.yaxis, *axis.get_ylim())
     label = f"largest error of {labels.label_of(output).symbol}"
-    label = label if len(label) <= LINE else label.replace(" of ", "\nof ", 1)
+    label = label if len(label) <= 26 else label.replace(" of ", "\nof ", 1)
     unit = labels.raised(labels.unit_of(runs.full, output))
     axis.set_ylabel(f"{label}\nin each {period:.2g} s ({unit})")
 
@@ -263,7 +295,7 @@ def figure_paths(dataset: xr.Dataset) -> Figure:
     if missing:
         raise InputError(f"{dataset.attrs.get('model')} has no path: no output {missing}")
     runs = runs_of(dataset, legend_of(dataset))
-    titles = ["", DISTANCE][: 1 + runs.compared]
+    titles = ["", "distance from full order at the same time"][: 1 + runs.compared]
     figure, axes = theme.panels(len(titles), 1, (6.7, 1.4 + 1.5 * len(titles)), sharex=True)
     for number, (axis, title) in enumerate(zip(axes.flat, titles, strict=True)):
         axis.set_title(theme.letter(number, title))

@@ -34,9 +34,8 @@ METADATA: dict[str, dict[str, None]] = {
     "svg": {"Date": None, "Creator": None},
     "png": {"Software": None},
 }
-# Colour-blind safe (M. Okabe, K. Ito); and the colours of more lines than these.
+# Colour-blind safe (M. Okabe, K. Ito).
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-RAMP = "viridis"
 FULL: Style = {"color": "black", "linewidth": 2.6, "alpha": 0.45}
 # Lines differ where they are printed in grey too.
 DASHES = ("--", (0, (8, 2)), (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (8, 2, 2, 2)))
@@ -45,13 +44,7 @@ MARKERS = "os^D<>phP*d"
 CROSS: Style = {"marker": "x", "markersize": 6, "markeredgewidth": 1.6, "linestyle": "none"}
 ZERO: Style = {"marker": 7, "markersize": 6, "linestyle": "none"}
 THIN: Style = {"color": "black", "linewidth": 0.8}
-# Of a legend in inches: what stands beside a text, and a letter of it.
-HANDLE, LETTER = 0.55, 0.068
 UNITS = {"control_period": "s"}
-# Ratio of the largest to the smallest number from which on an axis is logarithmic; letters of the
-# names that there is room for on an axis; decades up to which one has 1, 2 and 5; what is below is
-# written with a power of ten.
-WIDE, LETTERS, FEW_DECADES, SMALL = 30.0, 60, 2.5, 1e-4
 
 
 def look_of(label: str, methods: Mapping[str, str]) -> MethodLook | None:
@@ -79,7 +72,8 @@ def styles(labels: Iterable[str], methods: Mapping[str, str]) -> dict[str, Style
     taken = {style["color"] for style in known.values()}
     colors = [color for color in COLORS if color not in taken]
     if len(rest) > len(colors):
-        colors = [to_hex(color) for color in colormaps[RAMP](np.linspace(0.0, 0.95, len(rest)))]
+        ramp = colormaps["viridis"](np.linspace(0.0, 0.95, len(rest)))
+        colors = list(map(to_hex, ramp))
     for label, color, dashes in zip(rest, colors, cycle(DASHES), strict=False):
         known[label] = {"color": color, "linestyle": dashes}
     return known
@@ -113,8 +107,7 @@ def panels(
 
 def letter(number: int, title: str = "") -> str:
     """Title of a panel, counted from 0."""
-    name = string.ascii_lowercase[number % 26] * (number // 26 + 1)
-    return f"({name}) {title}".rstrip()
+    return f"({string.ascii_lowercase[number]}) {title}".rstrip()
 
 
 class Ticks(NamedTuple):
@@ -127,23 +120,20 @@ class Ticks(NamedTuple):
     label: str
     names: Sequence[str] = ()
 
-    def tick(self, axis: Axis) -> None:
-        """Label an axis."""
-        axis.set_label_text(self.label)
-        if self.names:
-            room = max(1, LETTERS // max(map(len, self.names)))
-            step = ceil(len(self.names) / min(12, room))
-            axis.set_ticks(self.at[::step], list(self.names)[::step])
-        elif self.at.dtype.kind == "i":
-            axis.set_major_locator(MaxNLocator(nbins=8, integer=True))
-
     def scale(self, panel: Axes) -> None:
         """Label the lower axis of a panel, logarithmic where the numbers ask for it."""
+        panel.set_xlabel(self.label)
         if self.names:
             panel.set_xlim(-0.5, len(self.names) - 0.5)
-        elif 0.0 < WIDE * self.at.min() <= self.at.max():
+            # As many names as there is room for, by their letters.
+            room = max(1, 60 // max(map(len, self.names)))
+            step = ceil(len(self.names) / min(12, room))
+            panel.set_xticks(self.at[::step], list(self.names)[::step])
+            return
+        if 0.0 < 30.0 * self.at.min() <= self.at.max():
             panel.set_xscale("log")
-        self.tick(panel.xaxis)
+        if self.at.dtype.kind == "i":
+            panel.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True))
 
 
 def ticks_of(dataset: xr.Dataset, name: str) -> Ticks:
@@ -159,10 +149,10 @@ def ticks_of(dataset: xr.Dataset, name: str) -> Ticks:
 
 def tick_decades(axis: Axis, low: float, high: float) -> None:
     """Ticks of a logarithmic axis: some of each decade where there are few decades."""
-    if np.log10(high / low) < FEW_DECADES:
+    if np.log10(high / low) < 2.5:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         powers = LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))
-        axis.set_major_formatter("{x:g}" if low >= SMALL else powers)
+        axis.set_major_formatter("{x:g}" if low >= 1e-4 else powers)
         axis.set_minor_formatter(NullFormatter())
 
 
@@ -180,8 +170,8 @@ def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
     lengths = [len(text.replace("$", "")) for text in shown]
 
     def width(columns: int) -> float:
-        parts = np.array_split(lengths, columns)
-        return sum(HANDLE + LETTER * max(part) for part in parts)
+        # In inches: the line beside a text, and its letters.
+        return sum(0.55 + 0.068 * max(part) for part in np.array_split(lengths, columns))
 
     fitting = (n for n in range(len(shown), 1, -1) if width(n) <= figure.get_figwidth())
     # As few columns as the rows need, so that none stands almost empty.
@@ -222,5 +212,4 @@ def save_figure(figure: Figure, path: Path) -> Path:
     """Write a complete figure; its format is the file's suffix."""
     suffix = picture_path(path).suffix.removeprefix(".").lower()
     metadata = METADATA[suffix]
-    write_whole(path, lambda part: figure.savefig(part, format=suffix, metadata=metadata))
-    return path
+    return write_whole(path, lambda part: figure.savefig(part, format=suffix, metadata=metadata))

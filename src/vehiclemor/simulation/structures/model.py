@@ -210,7 +210,7 @@ class StructuralModel(Model):
         Newton's method in the port forces; `GeometryError` if it can't stand.
         """
         p, nothing = structure.ports.shape[1], np.zeros(len(self.inputs))
-        law = PortLaw(self.equations.kernels, self.constants, np.zeros((2, p)))
+        law = PortLaw(self.equations, self.constants, np.zeros((2, p)))
         # Springs at all ports hold those that carry nothing at first.
         stiffness = np.full(p, 1e5)
         factor = factored(structure.with_port_springs(stiffness), "MMD_AT_PLUS_A")

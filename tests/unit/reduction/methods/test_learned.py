@@ -45,8 +45,7 @@ def learned(name, model, runs, **settings):
     """What a method fits to runs, and what it has seen."""
     method = component("method", name)
     chosen = method.settings[model.kind](**settings)
-    data = TrainingData.of(model, runs, chosen, "numpy", chosen.of_samples)
-    return method.fit(model, runs, chosen), data
+    return method.fit(model, runs, chosen), TrainingData.of(model, runs, chosen)
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +126,7 @@ def test_a_learned_car_drives_straight_on_and_turns_with_its_heading(car, runs):
     straight = reduced.simulate(vm.maneuver("straight_ahead"), "equilibrium")
     distance = straight["longitudinal_position"][-1]
     assert abs(straight["lateral_position"]).max() < 1e-9
-    assert distance == pytest.approx(reduced.states.shape.speed * straight.times[-1], rel=1e-9)
+    assert distance == pytest.approx(reduced.shape.speed * straight.times[-1], rel=1e-9)
     turned, (x, y, heading) = car.start("equilibrium").copy(), car.planar
     for a, b in zip(car.rotating[1::2], car.rotating[2::2], strict=True):
         turned[b], turned[a] = turned[a], -turned[b]

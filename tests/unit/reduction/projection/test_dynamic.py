@@ -7,7 +7,8 @@ import pytest
 
 from tests.oracles import vehicle_lagrange as oracle
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.steering import lane_change, step_steer
+from vehiclemor.inputs.steering import lane_change
+from vehiclemor.inputs.suspension import sine_travel
 from vehiclemor.reduction.methods import pod
 from vehiclemor.reduction.training import TrainingRun
 from vehiclemor.reduction.validation import validated
@@ -97,7 +98,7 @@ def test_divergence_is_recorded_with_its_time(model):
 
 
 def test_windows_refuse_runs_of_different_durations(model):
-    settings = validated(pod.METHOD, "ode", {})
-    runs = [TrainingRun(model, maneuver, "dropped") for maneuver in (lane_change, step_steer)]
-    with pytest.raises(InputError, match="5, 25 s"):
-        pod.fit(model, runs, settings)
+    for built, longer in ((model, lane_change), (build("double_wishbone"), sine_travel)):
+        runs = [TrainingRun(built, m, "dropped") for m in (longer, replace(longer, duration=5.0))]
+        with pytest.raises(InputError, match=r"not 5, (25|10) s"):
+            pod.fit(built, runs, validated(pod.METHOD, built.kind, {}))

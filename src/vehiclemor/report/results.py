@@ -1,27 +1,35 @@
-"""Results as frames: a row for each run, of grids and protocols alike; tables and files of them."""
+"""Results: which run is meant, a row for each run, and files of other formats."""
 
 import itertools
 import os
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Mapping
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from vehiclemor.arguments import file_path
+from vehiclemor.arguments import file_path, quoted
+from vehiclemor.error_measures import errors
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.files import begins_with, replaceable, write_text, write_whole
+from vehiclemor.netcdf_file import read_dataset
 from vehiclemor.registry import choice, component
-from vehiclemor.report.labels import Format, trained_runs
+from vehiclemor.report.labels import Format, Kind, trained_runs
 from vehiclemor.report.printing import ends_text, format_value
-from vehiclemor.report.result_selection import stored_result
-from vehiclemor.simulation.trajectory import EVALUATIONS, FINISHED
+from vehiclemor.simulation.trajectory import EVALUATIONS, FINISHED, Trajectory
+from vehiclemor.study.plans.loading import content_hash, is_study, load_studies
+from vehiclemor.study.plans.study_runs import FACTORS
+from vehiclemor.study.store import combined_path, result_path
 
+# Kinds of pictures of a run, or of a point of a grid.
+KINDS: tuple[str, ...] = get_args(Kind)
+# Values of a dimension that an error lists.
+MOST_NAMED = 12
 # Kind of the rows of a grid in a comparison, and of what they have the median.
 ERRORS = "errors"
 MEDIANS = ("seconds", "offline_seconds", "evaluations")
@@ -29,20 +37,109 @@ MEDIANS = ("seconds", "offline_seconds", "evaluations")
 ENGINES = {"zarr": "zarr", "parquet": "pyarrow"}
 
 
-def frame(dataset: xr.Dataset, variables: Iterable[str] = ()) -> pd.DataFrame:
+def result_kind(dataset: xr.Dataset) -> Literal["protocol", "grid", "other"]:
+    """What a result is of; `other` is a timing, or a run without errors and outputs."""
+    if "scenario_set" in dataset.coords:
+        return "protocol"
+    return "grid" if dataset.sizes.get("output") else "other"
+
+
+def stored_result(name: str, results: Path) -> xr.Dataset:
+    """A netCDF file, or the stored result of a study, by its name or by that of the result."""
+    path = file_path("result", name)
+    if path.suffix == ".nc":
+        return read_dataset(path)
+    path = file_path("result", combined_path(results, name))
+    if is_study(name) or not path.exists():
+        members = load_studies(name)
+        if len(members) > 1:
+            raise InputError(f"{name} is a collection: name one of {', '.join(members)}")
+        ((study, definition),) = members.items()
+        path = combined_path(results, study)
+        if result_path(results, study, content_hash(definition)) is None:
+            raise InputError(f"{path}: no such result; vehiclemor run {name} makes it")
+    return read_dataset(path, stored=True)
+
+
+def select_point(
+    dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]
+) -> tuple[xr.Dataset, str]:
+    """What of a result is drawn: one point of a study's grid with all methods, and its name.
+
+    A dimension that is not chosen is at its nominal or first value, but errors are drawn over it.
+    The point stands in the title.
+    """
+    grid = check_point(dataset, kind, chosen)
+    parts: list[str] = []
+    for dimension in grid:
+        values = dataset[dimension].values.tolist()
+        if dimension not in chosen and (dimension == "label" or kind == "errors"):
+            continue
+        default = 1.0 if dimension in FACTORS and 1.0 in values else values[0]
+        value: Any = chosen.get(dimension, default)
+        dataset = dataset.isel({dimension: _index_of(dimension, values, value)})
+        if len(values) > 1:
+            parts.append(f"{dimension} {value}")
+    point = ", ".join(parts)
+    if point:
+        title = f"{dataset.attrs.get('title', '')}\nat {point}".strip()
+        dataset = dataset.assign_attrs(title=title)
+    return dataset, point
+
+
+def check_point(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) -> list[str]:
+    """Dimensions of a grid of methods, if this kind can be drawn where it is `chosen`."""
+    choice("kind of plot", kind, KINDS)
+    if "status" not in dataset:
+        raise InputError("neither a run nor a study that can be drawn")
+    dimensions = [str(name) for name in dataset["status"].dims]
+    for key in chosen:
+        choice("dimension of the result", key, dimensions)
+    # What has no methods, such as a timing, is refused where it is drawn.
+    return dimensions if "label" in dimensions else []
+
+
+def _index_of(dimension: str, values: list[Any], value: Any) -> int:
+    for index, known in enumerate(values):
+        # An array equals no value.
+        if np.array_equal([known], [value]):
+            return index
+    listed = ", ".join(map(str, values[:MOST_NAMED]))
+    if len(values) > MOST_NAMED:
+        listed += ", ..."
+    raise InputError(f"{dimension} is {quoted(value)}, not one of {listed}")
+
+
+def at_point(dataset: xr.Dataset, label: str, **point: object) -> xr.Dataset:
+    """One method at one point of the grid, without dimensions that have one value."""
+    chosen = dataset.sel({"label": label, **point})
+    single = [d for d in chosen["status"].dims if chosen.sizes[d] == 1]
+    return chosen.squeeze(single, drop=True)
+
+
+def dataset_of(run: Trajectory, full: Trajectory | None = None) -> xr.Dataset:
+    """A run as a dataset, with the outputs of the full-order run."""
+    dataset = run.dataset()
+    if full is None:
+        return dataset
+    reference = {"reference_outputs": (("time", "output"), full.chosen(run.names).outputs)}
+    return dataset.assign(reference).assign(errors(run, full).data_vars)
+
+
+# Rows.
+
+
+def frame(dataset: xr.Dataset) -> pd.DataFrame:
     """A row for each run, in the order of the grid; histories are left out.
 
     Columns are what varies (factors, parameters, start, label and its method, scenario), then the
-    wanted variables, all by default; one with further dimensions has a column for each of their
-    values: `rms_error.toe`.
+    variables; one with further dimensions has a column for each of their values: `rms_error.toe`.
     """
-    like, wanted = dataset["status"], set(variables)
+    like = dataset["status"]
     columns: dict[str, np.ndarray] = {}
     dimensions = _further_dimensions(dataset)
     coordinates = [name for name in dimensions if name in dataset.coords]
     variables = [name for name in dimensions if name not in dataset.coords]
-    if wanted:
-        variables = [name for name in variables if name in wanted]
     for name in (*coordinates, *variables):
         further = dimensions[name]
         complete, _ = xr.broadcast(dataset[name], like)
@@ -97,8 +194,8 @@ def grid_rows(dataset: xr.Dataset) -> list[dict[str, Any]]:
     head = {"kind": ERRORS, **attributes, "grid": _grid_text(dataset)}
     count = EVALUATIONS[component("model", head["model"]).kind]
     extended = dataset.assign(trained=trained_runs(dataset), evaluations=dataset[count])
-    wanted = ["rms_error", "floor_rms_error", "cell_key", "status", "message"]
-    runs: Any = frame(extended, [*wanted, *MEDIANS, "effective_rank", "warned", "trained"])
+    wanted = ["rms_error", "floor_rms_error", "cell_key", "status", "message", *MEDIANS]
+    runs: Any = frame(extended[[*wanted, "effective_rank", "warned", "trained"]])
     # Points of the grid that a method does not depend on are one run.
     runs = runs.drop_duplicates(["start", "label", "cell_key"])
     saturated = saturated_ranks(dataset)
@@ -121,7 +218,7 @@ def saturated_ranks(dataset: xr.Dataset) -> dict[str, int]:
     if not {"rank", *wanted} <= set(dataset.variables) or "rank" not in dataset["status"].dims:
         return {}
     # A method that has no rank is one run at all ranks.
-    runs: Any = frame(dataset, wanted).drop_duplicates(["label", "cell_key"])
+    runs: Any = frame(dataset[wanted]).drop_duplicates(["label", "cell_key"])
     runs = runs[runs["status"].isin(FINISHED)]
     ranks = runs.groupby("label", sort=False)["rank"].agg(["min", "max"])
     reached = runs.groupby("label", sort=False)["effective_rank"].max()
@@ -181,9 +278,10 @@ def _grid_text(dataset: xr.Dataset) -> str:
 def counted_ends(dataset: xr.Dataset) -> str:
     """How the runs of a study have ended; a run that stands at several points counts once."""
     extended = dataset.assign(trained=trained_runs(dataset))
-    runs: Any = frame(extended, ["status", "cell_key", "warned", "trained"])
+    wanted = {"status", "cell_key", "warned", "trained"} & set(extended)
+    runs: Any = frame(extended[[*wanted]])
     # Runs of a protocol have no such files.
-    if "cell_key" in runs:
+    if "cell_key" in wanted:
         runs = runs.drop_duplicates("cell_key")
     trained, warned = int(runs["trained"].sum()), runs["warned"] & (runs["status"] == "ok")
     note = f"; {trained} trained on the tested run" if trained else ""
