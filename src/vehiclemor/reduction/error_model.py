@@ -182,7 +182,7 @@ class ErrorModel:
         path = Path(step, run, corrected, np.empty((nodes, len(model.inputs))), np.empty(n))
         first = min(max(int(SETTLED / step) + 1, 5), nodes)
         violated = Violated(*map(np.zeros, ((first, violations), (first, n), (first, n), 3)))
-        outputs, results = model.packed(names, nodes)
+        outputs, results = model.recorder.packed(names, nodes)
         own, full = np.empty((2, nodes, results))
         bounded = Bounded(outputs.bundle, own, full, *np.empty((3, len(names))))
         call = loops(LOOPS, ("corrected_run",))["corrected_run"].prepared(

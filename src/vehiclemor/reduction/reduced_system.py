@@ -11,18 +11,11 @@ from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost
+from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.algebraic import AlgebraicModel
 from vehiclemor.simulation.dynamic import RESULTS, DynamicModel
-from vehiclemor.simulation.evaluation import (
-    CONSTANTS,
-    INPUTS,
-    PLACES,
-    STATE,
-    By,
-    chosen,
-    parameter_names,
-)
+from vehiclemor.simulation.evaluation import CONSTANTS, INPUTS, PLACES, STATE, By, parameter_names
 from vehiclemor.simulation.stepping import Sensitivity, SteppedSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Run, Solver
@@ -103,7 +96,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         self, state: np.ndarray, inputs: np.ndarray, time: float, by: By, of: str
     ) -> np.ndarray:
         """Analytic derivatives of the rates or of the outputs."""
-        function, names = chosen(of, RESULTS), parameter_names(by)
+        function, names = RESULTS[choice("of", of, RESULTS)], parameter_names(by)
         if not names:
             sensitivity = Sensitivity(PLACES[str(by)])
         elif np.array_equal(self.system.constants, self.model.constants):
@@ -135,7 +128,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         maneuver = checked_maneuver(maneuver, self.model.definition)
         inputs = maneuver.recorded_inputs[1]
         run = self.run(maneuver, self.known(start, inputs[0]))
-        states = self.decode(run.recorded_states, inputs)
+        states = self.decode(run.output.states, inputs)
         trajectory = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)
         run.give_back()
         return trajectory

@@ -11,14 +11,14 @@ import numpy as np
 
 from vehiclemor.codegen.loops import Loop, Prepared, Ready, address_of_array, loops, ready
 from vehiclemor.codegen.operations import LANES
-from vehiclemor.exceptions import ConvergenceError, InputError, UnreachableError
+from vehiclemor.exceptions import ConvergenceError, GeometryError, InputError, UnreachableError
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation, cached
 from vehiclemor.multibody.definition import DESIGN_START
 from vehiclemor.registry import choice
 from vehiclemor.simulation import newton_loops
 from vehiclemor.simulation.checks import check_positive, checked_array, checked_inputs, output_times
-from vehiclemor.simulation.evaluation import By, address_of, chosen
+from vehiclemor.simulation.evaluation import By, address_of
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import ALGEBRAIC_COUNTS, Names, Start, Trajectory
@@ -29,10 +29,12 @@ LARGEST_INCREMENT = 5e-3
 NEWTON_TOLERANCE = 1e-12
 ITERATION_LIMIT = 50
 SOLVERS = ("newton", "newton_lanes")
-# What derivatives are of -> function of the equations, if it is one.
-RESULTS = {"residual": "residual", "outputs": "outputs", "coordinates": ""}
-# Largest gap (m or rad) between joints at which coordinates count as a solution.
-CLOSED = 1e-6
+RESULTS = ("residual", "outputs", "coordinates")
+# Largest gap (m or rad) between joints at which coordinates count as a solution, and with which a
+# mechanism counts as assembled.
+CLOSED, ASSEMBLED = 1e-6, 1e-9
+# Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
+SMALLEST_SINGULAR_VALUE = 1e-8
 # Steps (m) of the inputs: shortest to a sample, and in the search for the limits of travel.
 SHORTEST_STEP, SHORTEST_SEARCH_STEP = 1e-9, 1e-7
 # Loops of the full-order solution.
@@ -55,30 +57,43 @@ LaneRun = tuple[Prepared, np.ndarray, int]
 class AlgebraicModel(Model):
     """Compiled residual equations Phi(q; u) = 0 of one mechanism."""
 
+    loops, reference = KINEMATIC_LOOPS, ("newton", NEWTON_TOLERANCE)
+
+    def __post_init__(self) -> None:
+        """`GeometryError` where it can't be assembled or is locked at design."""
+        super().__post_init__()
+        nothing = np.zeros(len(self.inputs))
+        gap = float(np.abs(self.residual(self.design, nothing)).max())
+        if not gap < ASSEMBLED:
+            raise GeometryError(
+                f"the geometry can't be assembled: the joints are {gap:.3g} m apart"
+            )
+        jacobian = self.jacobian(self.design, nothing)
+        smallest = float(np.linalg.svd(jacobian, compute_uv=False)[-1])
+        if smallest < SMALLEST_SINGULAR_VALUE:
+            raise GeometryError(
+                f"the geometry can't be assembled: the mechanism is locked at design "
+                f"(smallest singular value of the Jacobian {smallest:.1e})"
+            )
+
     @property
     def design(self) -> np.ndarray:
         """Coordinates (n,) at the design position, where all inputs are zero."""
         return self.initial[DESIGN_START]
 
     def start(self, name: Start | None = None) -> np.ndarray:
-        """Coordinates (n,) at the design position, whose name is the only start.
-
-        Raises
-        ------
-        InputError
-            If it is another name, or coordinates: these follow from the inputs.
-        """
+        """Coordinates (n,) at the design position, whose name is the only start."""
         self.check_start(name)
-        return super().start(name)
+        return self.design.copy()
 
     def check_start(self, name: Start | None) -> None:
-        """Raise `InputError` as `start` does, which also copies it."""
+        """Raise `InputError` if it is another name, or coordinates: the inputs give these."""
         if not isinstance(name, str | None):
             raise InputError(
                 f"{self.name} starts from {DESIGN_START!r} alone: its inputs say where it is"
             )
-        if name is not None and name not in self.initial:
-            super().start(name)
+        if name is not None:
+            choice("start", name, self.initial)
 
     def residual(self, q: Any, u: Any) -> np.ndarray:
         """Residual Phi(q; u), shape (n,)."""
@@ -93,22 +108,22 @@ class AlgebraicModel(Model):
         of the residual with q held, of coordinates and outputs with q following, by the implicit
         function theorem dq = -Phi_q^-1 Phi_u du; the coordinates must close the joints.
         """
-        function, by = chosen(of, RESULTS), with_respect_to
-        if by == "state" and not function:
+        of, by = choice("of", of, RESULTS), with_respect_to
+        if by == "state" and of == "coordinates":
             raise InputError("derivatives of the coordinates are by inputs or parameters")
         if of == "residual" and by == "state":
             return self.evaluated("residual_jacobian", state, u)[:, :-1].copy()
         if of == "residual" or by == "state":
-            return self.jacobian_of(function, state, u, by)
+            return self.jacobian_of(of, state, u, by)
         gap = float(np.abs(self.evaluated("residual", state, u)).max())
         if not gap < CLOSED:
             raise InputError(f"{self.name}: at these coordinates the joints are {gap:.3g} m apart")
         change = self.jacobian_of("residual", state, u, by)
         moved = -np.linalg.solve(self.evaluated("residual_jacobian", state, u)[:, :-1], change)
-        if not function:
+        if of == "coordinates":
             return moved
-        follows = self.jacobian_of(function, state, u, "state") @ moved
-        return self.jacobian_of(function, state, u, by) + follows
+        follows = self.jacobian_of(of, state, u, "state") @ moved
+        return self.jacobian_of(of, state, u, by) + follows
 
     def joints_at(self, q: Any) -> dict[str, np.ndarray]:
         """Positions (3,) in m of the moving joints, for drawing."""
@@ -140,7 +155,8 @@ class AlgebraicModel(Model):
         target, reached = np.array([direction * self.definition.travel_limit, rack]), np.empty(2)
         iteration = _iteration(NEWTON_TOLERANCE, SHORTEST_SEARCH_STEP)
         loop = kinematic_loop("travel_limit")
-        if loop(self._mechanism, target, iteration, reached, self._buffer()):
+        loop(self._mechanism, target, iteration, reached, self._buffer())
+        if reached[1] != rack:
             raise UnreachableError(
                 f"{self.name}: rack displacement {rack:g} m is out of reach at the design height; "
                 f"it goes to {reached[1]:.4f} m"
@@ -148,17 +164,18 @@ class AlgebraicModel(Model):
         return float(reached[0])
 
     @cached_property
-    def _mechanism(self) -> newton_loops.Mechanism:
+    def _mechanism(self) -> Ready:
         stops = self.definition.stops
         largest = np.array([stops.get(name, np.inf) for name in self.coordinates])
         jacobian = self.jacobian(self.design, np.zeros(len(self.inputs)))
         orientation = int(np.linalg.slogdet(jacobian).sign)
         kernels = self.addresses("newton_step", "residual_jacobian")
-        return newton_loops.Mechanism(self.design, largest, self.constants, kernels, orientation)
+        fields = self.design, largest, self.constants, kernels, orientation
+        return ready(newton_loops.Mechanism(*fields))
 
     def _buffer(self) -> np.ndarray:
         n = len(self.coordinates)
-        return np.empty(n * (n + 4) + 3 * len(self.inputs))
+        return np.empty(n * (n + 4) + 2 * len(self.inputs))
 
     def simulate(
         self,
@@ -171,15 +188,14 @@ class AlgebraicModel(Model):
     ) -> Trajectory:
         """Full-order solution, see `Model.simulate`."""
         self.check_start(start)
+        solver = "newton" if solver is None else solver
+        tolerance = NEWTON_TOLERANCE if tolerance is None else tolerance
         if times is None:
-            sampled = self.sampled(maneuver)
+            run = self._solved(self.sampled(maneuver), solver, tolerance)
         else:
             maneuver = checked_maneuver(maneuver, self.definition)
             times = output_times(times, maneuver, repeats=True)
-            inputs = checked_inputs(maneuver.at(times), times, self.inputs)
-            sampled = times, inputs, ready(newton_loops.Samples(inputs))
-        tolerance = NEWTON_TOLERANCE if tolerance is None else tolerance
-        run = self._solved(sampled, "newton" if solver is None else solver, tolerance)
+            run = self.solve_path(times, maneuver.at(times), solver, tolerance)
         return run if outputs is None else run.chosen(outputs)
 
     def sampled(self, maneuver: Excitation) -> Sampled:
@@ -220,13 +236,9 @@ class AlgebraicModel(Model):
         path = np.full((len(inputs), n), np.nan)
         solution = newton_loops.Solution(path, new_counts())
         iteration, buffer = _iteration(tolerance, SHORTEST_STEP), self._buffer()
-        run = kinematic_loop("newton_path").prepared(
-            self._ready_mechanism, given, iteration, solution, buffer
-        )
-        status, seconds = timed(run)
-        counts = solution.counts.tolist()
-        failure = (status, counts[newton_loops.SAMPLE]) if status else None
-        return self.trajectory(times, inputs, path, counts, seconds, failure)
+        arguments = self._mechanism, given, iteration, solution, buffer
+        status, seconds = timed(kinematic_loop("newton_path").prepared(*arguments))
+        return self.trajectory(times, inputs, path, solution.counts.tolist(), seconds, status)
 
     def _solved_in_lanes(self, sampled: Sampled, iteration: Ready) -> Trajectory | None:
         """Solution with the samples in vector lanes, as many at least; none if it fails."""
@@ -241,7 +253,7 @@ class AlgebraicModel(Model):
         self._lanes.give_back(kind, run)
         if status:
             return None
-        return self.trajectory(times, inputs, table[:, :n], counts, seconds, None, table[:, n:])
+        return self.trajectory(times, inputs, table[:, :n], counts, seconds, 0, table[:, n:])
 
     @cached_property
     def _lanes(self) -> Pool[LaneRun]:
@@ -253,15 +265,11 @@ class AlgebraicModel(Model):
         solution = newton_loops.Solution(np.empty((0, n + m)), new_counts())
         buffer = np.empty(LANES * (5 * n + inputs + m) + n * (n + 1))
         loop = kinematic_loop("lane_path")
-        shared = self._ready_mechanism, samples, lane_kernels, iteration
+        shared = self._mechanism, samples, lane_kernels, iteration
         call = loop.prepared(*shared, solution, buffer)
         table = call.address("solution.path")
         call.words[table + 1] = len(samples.bundle.inputs)
         return call, solution.counts, table
-
-    @cached_property
-    def _ready_mechanism(self) -> Ready:
-        return ready(self._mechanism)
 
     def trajectory(
         self,
@@ -270,17 +278,17 @@ class AlgebraicModel(Model):
         path: np.ndarray,
         counts: Sequence[int],
         seconds: float,
-        failure: tuple[int, int] | None = None,
+        reason: int = newton_loops.CONVERGED,
         outputs: np.ndarray | None = None,
     ) -> Trajectory:
-        """Trajectory of a path of coordinates; `failure` is (status, sample) of a stopped loop.
+        """Trajectory of a path of coordinates; `reason` is why a loop has stopped.
 
         Outputs are those of the path where none are given.
         """
         status, message = "ok", ""
-        if failure is not None:
+        if reason:
             status = "diverged"
-            message = f"{REASONS[failure[0]]} at t = {times[failure[1]]:.6g} s"
+            message = f"{REASONS[reason]} at t = {times[counts[newton_loops.SAMPLE]]:.6g} s"
         return Trajectory.of(
             times=times,
             inputs=inputs,

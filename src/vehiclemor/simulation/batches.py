@@ -20,15 +20,12 @@ from vehiclemor.inputs.maneuver import registered
 from vehiclemor.parameters import parameter_and_axis
 from vehiclemor.provenance import attributes
 from vehiclemor.registry import choice
-from vehiclemor.simulation.algebraic import NEWTON_TOLERANCE
 from vehiclemor.simulation.build import build, reparametrised
 from vehiclemor.simulation.checks import checked_path
-from vehiclemor.simulation.dynamic import REFERENCE_SOLVER, REFERENCE_TOLERANCE
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import CLOCK, one_thread
-from vehiclemor.simulation.structures.model import SOLVER, TIGHT
 from vehiclemor.simulation.trajectory import (
-    STATUSES,
+    REPORTED,
     Names,
     Start,
     Trajectory,
@@ -47,10 +44,7 @@ LARGEST = 4 << 30
 # Parameter sets whose models are kept.
 MOST_SETS = 32
 # What else there is of each run: unit and meaning.
-REPORTED = {
-    "status": ("", f"one of {', '.join(STATUSES)}"),
-    "message": ("", "why the status is not ok"),
-    "remark": ("", "what else there is to know"),
+MEANINGS = {name: ("", meaning) for name, meaning in REPORTED.items()} | {
     "indicator": ("1", "how far the run goes in what its model knows; 1 is the edge"),
     "until": ("s", "time at which the indicator has first passed 1"),
     "seconds": ("s", "time spent in the compiled loop"),
@@ -109,7 +103,9 @@ def simulate_many(
     from joblib import cpu_count
 
     given, full, driven = _driven(model, signals)
-    runs, names = _count_of(driven, full), _names(full, outputs)
+    runs, names = len(driven), full.outputs if outputs is None else output_names(outputs)
+    for name in names:
+        choice("output", name, (*full.outputs, *full.definition.states))
     kept, rows = _kept_times(times, driven)
     begins = _starts_of(starts, runs, full)
     model_of = _models(given, full, parameters, runs)
@@ -132,22 +128,27 @@ def simulate_many(
 
     with one_thread(), ThreadPoolExecutor(threads, "vehiclemor") as pool:
         found = list(itertools.chain(*pool.map(reports, range(0, runs, CHUNK))))
-    return _dataset(full, list(names), kept, values, found).assign_attrs(
-        _about(given, full, driven)
-    )
+    dataset = _dataset(full, list(names), kept, values, found)
+    return dataset.assign_attrs(_about(given, full, driven))
 
 
-def _driven(model: Any, signals: Any) -> tuple[Any, Model, Any]:
+def _driven(model: Any, signals: Any) -> tuple[Any, Model, Sequence[Excitation]]:
     """What is to run, its full model and what drives it, all inputs of which a full one has."""
-    if isinstance(signals, list | tuple):
-        signals = [registered(each) if isinstance(each, str) else each for each in signals]
     given = build(model) if isinstance(model, str) else model
     full = getattr(given, "model", given)
     if not isinstance(full, Model):
         raise InputError(f"model is {quoted(model)}, neither a model nor the name of one")
-    is_list = isinstance(signals, Sequence) and all(isinstance(s, Excitation) for s in signals)
-    if given is full and is_list:
+    if isinstance(signals, Excitation) or not isinstance(signals, Sequence) or not len(signals):
+        raise InputError(f"signals is {quoted(signals)}, not a list with a signal for each run")
+    if isinstance(signals, list | tuple):
+        signals = [registered(each) if isinstance(each, str) else each for each in signals]
+    for run, signal in enumerate(signals):
+        if not isinstance(signal, Excitation):
+            raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
+    if given is full:
         given = full = full.driving([name for signal in signals for name in signal.inputs])
+    for signal in signals:
+        completed(signal, full.definition)
     return given, full, signals
 
 
@@ -166,8 +167,7 @@ def _judgement(given: Any, bounds: Any, trust: str) -> dict[str, Any]:
 
 def _about(given: Any, full: Model, signals: Sequence[Excitation]) -> dict[str, Any]:
     """Attributes of the result: of which model with which settings it is."""
-    others = {"structural": (SOLVER, TIGHT), "ae": ("newton", NEWTON_TOLERANCE)}
-    solver, tolerance = others.get(full.kind, (REFERENCE_SOLVER, REFERENCE_TOLERANCE))
+    solver, tolerance = full.reference
     runs, default = len(signals), {"solver": solver, "tolerance": tolerance}
     settings, method = getattr(given, "settings", default), getattr(given, "method", "full_order")
     title, of = f"{runs} runs of {full.name}, {method}", {"model": full.name, "method": method}
@@ -175,7 +175,7 @@ def _about(given: Any, full: Model, signals: Sequence[Excitation]) -> dict[str, 
 
 
 def _report(done: Trajectory | Failure, model: Model) -> tuple:
-    """What else there is of a run: what `REPORTED` names, and solver counts."""
+    """What else there is of a run: what `MEANINGS` names, and solver counts."""
     if isinstance(done, Failure):
         return done.status, done.message, "", np.nan, 0.0, 0.0, *[0] * len(model.counts)
     trust = done.trust or Trust(np.nan)
@@ -193,45 +193,22 @@ def _whole_run(model: Any, signal: Excitation, start: Start, how: Mapping[str, A
         return error.trajectory
 
 
-def _count_of(signals: Any, model: Model) -> int:
-    """Number of runs; `InputError` if something else than inputs of the model is given."""
-    if isinstance(signals, Excitation) or not isinstance(signals, Sequence) or not len(signals):
-        raise InputError(f"signals is {quoted(signals)}, not a list with a signal for each run")
-    for run, signal in enumerate(signals):
-        if not isinstance(signal, Excitation):
-            raise InputError(f"signals[{run}] is {quoted(signal)}, not a signal or maneuver")
-        completed(signal, model.definition)
-    return len(signals)
-
-
-def _names(model: Model, outputs: Names) -> tuple[str, ...]:
-    """Names of what is kept; `InputError` if the model has no such quantity."""
-    known = *model.outputs, *model.definition.states
-    names = model.outputs if outputs is None else output_names(outputs)
-    return tuple(choice("output", name, known) for name in names)
-
-
 def _kept_times(
     given: Any, signals: Sequence[Excitation]
 ) -> tuple[np.ndarray, list[slice | np.ndarray]]:
     """Times in s of the result, and which samples of each run these are."""
-    first = signals[0]
-    if given is None:
-        for run, signal in enumerate(signals):
-            if (signal.duration, signal.samples) != (first.duration, first.samples):
-                raise InputError(
-                    f"signals[{run}] has other output times than the first: choose times="
-                )
-        return first.times, [slice(None)] * len(signals)
-    known: dict[tuple[float, int], np.ndarray] = {}
+    known: dict[tuple[float, int], slice | np.ndarray] = {}
     for run, signal in enumerate(signals):
         alike = signal.duration, signal.samples
-        if alike not in known:
-            try:
-                known[alike] = sample_rows(given, signal.times)
-            except InputError as error:
-                raise InputError(f"signals[{run}]: {error}") from None
-    times = np.atleast_1d(real_array(given))
+        if alike in known:
+            continue
+        if given is None and known:
+            raise InputError(f"signals[{run}] has other output times than the first: choose times=")
+        try:
+            known[alike] = slice(None) if given is None else sample_rows(given, signal.times)
+        except InputError as error:
+            raise InputError(f"signals[{run}]: {error}") from None
+    times = signals[0].times if given is None else np.atleast_1d(real_array(given))
     return times, [known[signal.duration, signal.samples] for signal in signals]
 
 
@@ -314,13 +291,11 @@ def _dataset(
 
     declared = (*model.definition.outputs, *model.definition.state_quantities)
     units = {quantity.name: quantity.unit for quantity in reversed(declared)}
-    described = REPORTED | {name: ("1", long_name) for name, long_name in model.counts.items()}
-    variables: dict[str, Any] = {
-        "values": (("run", "time", "output"), values, {"long_name": "quantities"})
-    }
-    for (name, (unit, long_name)), column in zip(
-        described.items(), zip(*reports, strict=True), strict=True
-    ):
+    described = MEANINGS | {name: ("1", long_name) for name, long_name in model.counts.items()}
+    variables: dict[str, Any] = {}
+    variables["values"] = ("run", "time", "output"), values, {"long_name": "quantities"}
+    columns = zip(*reports, strict=True)
+    for (name, (unit, long_name)), column in zip(described.items(), columns, strict=True):
         further = {"units": unit} if unit else {}
         variables[name] = "run", np.array(column), {"long_name": long_name} | further
     variables["seconds"][2]["clock"] = CLOCK

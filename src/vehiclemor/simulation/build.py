@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import quoted, real_array
 from vehiclemor.codegen.kernels import Kernels, derivation, is_derived
 from vehiclemor.codegen.loops import loops_digest
-from vehiclemor.exceptions import GeometryError, InputError, VehiclemorError, blamed
+from vehiclemor.exceptions import InputError, VehiclemorError, blamed
 from vehiclemor.multibody.definition import (
     DESIGN_START,
     ModelDefinition,
@@ -22,32 +22,20 @@ from vehiclemor.multibody.definition import (
     with_overrides,
 )
 from vehiclemor.multibody.quantities import DEFAULTS
-from vehiclemor.parameters import (
-    ParameterSet,
-    load_parameters,
-    overridden,
-    parameter_path,
-)
+from vehiclemor.parameters import ParameterSet, load_parameters, overridden, parameter_path
 from vehiclemor.progress import first_use
 from vehiclemor.registry import component
 from vehiclemor.simulation.checks import checked_array
 from vehiclemor.simulation.evaluation import hoisted_constants, solved_parameters, values_of
-from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES
 
 if TYPE_CHECKING:
-    from vehiclemor.simulation.algebraic import AlgebraicModel
     from vehiclemor.simulation.dynamic import DynamicModel
     from vehiclemor.simulation.model import Model
-    from vehiclemor.simulation.structures.model import StructuralModel
     from vehiclemor.symbolic.program import Program
 
 # Integrators freeze the Jacobian of the model of rounded parameters, which many cars share.  They
 # are rounded to the default ones and steps of this part of them; points to steps of so many m.
 ROUNDED, ROUNDED_POINT, SMALLEST = 0.25, 0.02, 1e-9
-# Largest gap (m or rad) between the joints of a mechanism that counts as assembled.
-CLOSED = 1e-9
-# Smallest singular value of the Jacobian at design below which a mechanism counts as locked.
-SMALLEST_SINGULAR_VALUE = 1e-8
 
 
 def build(
@@ -81,26 +69,21 @@ def build(
 
 def reparametrised(model: Model, overrides: Mapping[str, object]) -> Model:
     """The model with some of its parameters changed: name -> value in SI units; see `build`."""
-    definition = with_overrides(model.definition, overrides)
-    if definition is not model.definition:
-        return _with_definition(model, definition, overrides)
-    parameters = overridden(model.parameters, definition.parameters, overrides)
-    return _made(definition, parameters, (model.equations, model.kernel_hash))
+    return _changed(model, with_overrides(model.definition, overrides), overrides)
 
 
 @lru_cache(maxsize=64)
 def _rebuilt(model: Model, definition: ModelDefinition) -> Model:
     """The model with the inputs of another declaration of it."""
-    return _with_definition(model, definition)
+    return _changed(model, definition, {})
 
 
-def _with_definition(
-    model: Model, definition: ModelDefinition, overrides: Mapping[str, object] | None = None
-) -> Model:
-    """A model with the same parameters, but for what another choice of inputs adds or drops."""
-    parameters = overridden(model.parameters, definition.parameters, overrides or {})
+def _changed(model: Model, definition: ModelDefinition, overrides: Mapping[str, object]) -> Model:
+    """A model with other values, and what another choice of inputs adds or drops."""
+    parameters = overridden(model.parameters, definition.parameters, overrides)
+    same = definition is model.definition
     with first_use(model.name):
-        return _made(definition, parameters)
+        return _made(definition, parameters, (model.equations, model.kernel_hash) if same else None)
 
 
 def _made(
@@ -109,16 +92,14 @@ def _made(
     derived: tuple[Kernels, str] | None = None,
 ) -> Model:
     """A model of equations that may have been derived already, see `compiled`."""
-    name, flat = definition.name, parameters.flat()
-    make, loops = _kind(definition.kind)
-    near: list[DynamicModel | None] = []
+    name, flat, further = definition.name, parameters.flat(), {}
     values, initial = values_of(definition, flat), {DESIGN_START: np.zeros(0)}
     with blamed(f"model {name!r}: check", definition.check):
         definition.check(values)
     if definition.kind == "ae":
         with blamed(f"model {name!r}: design_coordinates", definition.design_coordinates):
             initial = {DESIGN_START: real_array(definition.design_coordinates(parameters.values()))}
-    equations, digest = derived or compiled(definition, loops)
+    equations, digest = derived or compiled(definition)
     check_equations(definition, equations)
     with blamed(f"model {name!r}: solve_equilibrium", definition.solve_equilibrium):
         values |= solved_parameters(definition, flat, equations)
@@ -126,26 +107,29 @@ def _made(
     if definition.kind in ("ode", "dae"):
         with blamed(f"model {name!r}: starts", definition.starts):
             initial = {start: real_array(x) for start, x in definition.starts(values).items()}
-        near = [_near(definition, flat, equations, digest)]
-    _check_states(definition, initial)
+        further = {"near": _near(definition, flat, equations, digest)}
+    if not initial:
+        raise InputError(f"model {name!r} has no start")
+    for start, state in initial.items():
+        checked_array(state, len(definition.states), f"start {start!r}", name)
     constants = hoisted_constants(equations, flat, solved)
-    return make(definition, equations, parameters, digest, constants, initial, _rebuilt, *near)
+    fields = definition, equations, parameters, digest, constants, initial, _rebuilt
+    return _class_of(definition.kind)(*fields, **further)
 
 
-def _kind(kind: str) -> tuple[Callable[..., Model], Sequence[str]]:
-    """What makes models of a kind, and the loops that run them."""
+def _class_of(kind: str) -> type[Model]:
     # Imported here: a model of one kind needs nothing of the others.
     if kind == "ae":
-        from vehiclemor.simulation.algebraic import KINEMATIC_LOOPS
+        from vehiclemor.simulation.algebraic import AlgebraicModel
 
-        return _assembled, KINEMATIC_LOOPS
+        return AlgebraicModel
     if kind == "structural":
-        from vehiclemor.simulation.structures.system import STRUCTURAL_LOOPS
+        from vehiclemor.simulation.structures.model import StructuralModel
 
-        return _standing, STRUCTURAL_LOOPS
+        return StructuralModel
     from vehiclemor.simulation.dynamic import DynamicModel
 
-    return DynamicModel, LOOP_SOURCES
+    return DynamicModel
 
 
 def _near(definition: ModelDefinition, flat: np.ndarray, *derived: Any) -> DynamicModel | None:
@@ -177,35 +161,6 @@ def _rounded_model(definition: ModelDefinition, rounded: bytes, *derived: Any) -
     return _made(definition, load_parameters(name, declared, path, overrides), derived)
 
 
-def _assembled(*fields: Any) -> AlgebraicModel:
-    """A kinematic model; `GeometryError` where it can't be assembled or is locked at design."""
-    from vehiclemor.simulation.algebraic import AlgebraicModel
-
-    model = AlgebraicModel(*fields)
-    nothing = np.zeros(len(model.inputs))
-    gap = float(np.abs(model.residual(model.design, nothing)).max())
-    if not gap < CLOSED:
-        raise GeometryError(f"the geometry can't be assembled: the joints are {gap:.3g} m apart")
-    jacobian = model.jacobian(model.design, nothing)
-    smallest = float(np.linalg.svd(jacobian, compute_uv=False)[-1])
-    if smallest < SMALLEST_SINGULAR_VALUE:
-        raise GeometryError(
-            f"the geometry can't be assembled: the mechanism is locked at design "
-            f"(smallest singular value of the Jacobian {smallest:.1e})"
-        )
-    return model
-
-
-def _standing(*fields: Any) -> StructuralModel:
-    """A model of sparse matrices and a port law; `GeometryError` where it can't stand."""
-    from vehiclemor.simulation.structures.model import StructuralModel
-
-    model = StructuralModel(*fields)
-    # Wrong matrices raise now.
-    _ = model.system
-    return model
-
-
 def kept_build(name: str) -> Model:
     """As `build` with the default parameters, to be read; cached while their file is the same."""
     definition: ModelDefinition = component("model", name)
@@ -230,21 +185,18 @@ def build_derived(name: str) -> Model | None:
 
 def check_equations(definition: ModelDefinition, equations: Kernels) -> None:
     """Raise `InputError` if functions that were derived are missing or of another shape."""
-    n, outputs = len(definition.coordinates), len(definition.outputs)
-    constraints = len(definition.constraints)
-    needed: dict[str, tuple[int, ...]]
-    further: dict[str, tuple[int, ...]]
+    n, constraints = len(definition.coordinates), len(definition.constraints)
+    needed: dict[str, tuple[int, ...]] = {"outputs": (len(definition.outputs),)}
+    further: dict[str, tuple[int, ...]] = {}
     if definition.kind == "ae":
-        needed = {"residual": (n,), "residual_jacobian": (n, n + 1), "newton_step": (n,)}
+        needed |= {"residual": (n,), "residual_jacobian": (n, n + 1), "newton_step": (n,)}
         further = {"joints": (len(definition.joints), 3)}
     elif definition.kind == "structural":
-        needed, further = {"port_forces": (len(definition.ports), 3)}, {}
+        needed = {"port_forces": (len(definition.ports), 3)}
     else:
-        needed = {"derivative": (len(definition.states),)}
+        needed |= {"derivative": (len(definition.states),)}
         further = {"second_order": (n, n + 1), "speeds": (n,), "violations": (constraints, 2)}
-        further["descriptor"] = (n + constraints, n + 1)
-    if definition.kind != "structural":
-        needed["outputs"] = (outputs,)
+        further |= {"descriptor": (n + constraints, n + 1)}
     if definition.further_states:
         for function in {"second_order", "speeds"}.intersection(equations.shapes):
             raise InputError(f"model {definition.name!r} has further states, so no {function}")
@@ -258,22 +210,12 @@ def check_equations(definition: ModelDefinition, equations: Kernels) -> None:
             )
 
 
-def _check_states(definition: ModelDefinition, initial: Mapping[str, np.ndarray]) -> None:
-    """Raise `InputError` if a model starts nowhere, or from what is no state of it."""
-    if not initial:
-        raise InputError(f"model {definition.name!r} has no start")
-    for name, state in initial.items():
-        checked_array(state, len(definition.states), f"start {name!r}", definition.name)
-
-
-def compiled(
-    definition: ModelDefinition, loops: Sequence[str] = LOOP_SOURCES
-) -> tuple[Kernels, str]:
+def compiled(definition: ModelDefinition) -> tuple[Kernels, str]:
     """Derivation of a model, and the hash of its source and of the loops that run it."""
     name, derive = definition.name, definition.derive
     with blamed(f"model {name!r}: its equations can't be derived", derive):
         equations = derivation(name, *_derivation(definition))
-    text = f"{equations.source}\n{loops_digest(loops)}"
+    text = f"{equations.source}\n{loops_digest(_class_of(definition.kind).loops)}"
     return equations, hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

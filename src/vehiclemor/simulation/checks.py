@@ -9,7 +9,7 @@ import numpy as np
 
 from vehiclemor.arguments import loop_array, number, quoted, within
 from vehiclemor.exceptions import InputError
-from vehiclemor.inputs.excitation import Excitation
+from vehiclemor.inputs.excitation import Excitation, checked_times
 from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.multibody.quantities import DEFAULTS
 
@@ -93,26 +93,14 @@ def output_times(
     if begin:
         within("begin", number("begin", begin), (0.0, maneuver.duration), " s")
     if given is None:
-        times = maneuver.times
-        return _shared(times[times >= begin])
-    try:
-        times = loop_array(given)
-    except (TypeError, ValueError):
-        raise InputError(f"output times are {quoted(given)}, no list of times in s") from None
-    if times.ndim != 1:
-        raise InputError("output times must be a list of times in s")
-    slack = 1e-9 * maneuver.duration
-    steps = np.diff(times)
-    if not (np.isfinite(times).all() and np.all(steps >= 0.0 if repeats else steps > 0.0)):
-        raise InputError("output times must be finite and increasing")
-    if len(times) == 0 or times[0] < begin or times[-1] > maneuver.duration + slack:
-        raise InputError(
-            f"output times must lie within the run, {begin:g} to {maneuver.duration:g} s"
-        )
-    return _shared(times.copy())
-
-
-def _shared(times: np.ndarray) -> np.ndarray:
+        times = maneuver.times[maneuver.times >= begin]
+    else:
+        times, end = checked_times(given).copy(), maneuver.duration
+        steps = np.diff(times)
+        if not np.all(steps >= 0.0 if repeats else steps > 0.0):
+            raise InputError("output times must increase")
+        if len(times) == 0 or times[0] < begin or times[-1] > end + 1e-9 * end:
+            raise InputError(f"output times must lie within the run, {begin:g} to {end:g} s")
     times.flags.writeable = False
     return times
 
@@ -160,18 +148,15 @@ def wheel_remarks(
     if min(first, default=len(times)) == len(times):
         return remarks
     loads, slips = definition.loads, watched_slips(definition)
-    if off := _wheels(loads, first[: len(loads)], times):
-        remarks.append(f"off the ground for a time: {off}")
-    if sliding := _wheels(slips, first[len(loads) :], times):
-        remarks.append(f"{LOCKED}: {sliding}")
+    for text, outputs, samples in (
+        ("off the ground for a time", loads, first[: len(loads)]),
+        (LOCKED, slips, first[len(loads) :]),
+    ):
+        wheels = [
+            f"{name.rpartition('_')[2]} (first at {times.item(sample):.4g} s)"
+            for name, sample in zip(outputs, samples, strict=True)
+            if sample < len(times)
+        ]
+        if wheels:
+            remarks.append(f"{text}: {', '.join(wheels)}")
     return remarks
-
-
-def _wheels(outputs: Sequence[str], first: Sequence[int], times: np.ndarray) -> str:
-    """Wheels with a first sample inside the run, and its time; empty if there is none."""
-    parts = [
-        f"{name.rpartition('_')[2]} (first at {times.item(sample):.4g} s)"
-        for name, sample in zip(outputs, first, strict=True)
-        if sample < len(times)
-    ]
-    return ", ".join(parts)

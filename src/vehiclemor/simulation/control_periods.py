@@ -32,11 +32,9 @@ class ControlPeriods(ShortRepr):
         windows, form = len(self.ranks), self.formulation
         rows, columns = self.trial_basis.shape[1:]
         require(form in ("full", "state", "coordinates") and windows > 0, "formulation")
-        bases = (
-            (self.trial_basis, windows, rows, columns),
-            (self.test_basis, windows, rows, columns),
-        )
-        check_shapes("spaces", (self.edges, windows + 1), (self.means, windows, columns), *bases)
+        check_shapes("spaces", (self.edges, windows + 1), (self.means, windows, columns))
+        for basis in (self.trial_basis, self.test_basis):
+            check_shapes("spaces", (basis, windows, rows, columns))
         if form != "full":
             # A coordinate and its rate share a row where coordinates are projected.
             most = rows * (2 if form == "coordinates" else 1)
@@ -48,20 +46,16 @@ class ControlPeriods(ShortRepr):
         return ready(Subspaces(self.means, self.trial_basis, self.test_basis, self.ranks))
 
     def spans(self, breaks: np.ndarray, end: float, begin: float = 0.0) -> Ready:
-        """As `smooth_spans`, with the window edges; cached."""
+        """Spans from `begin` to `end` without a window edge or a break point of the inputs inside.
+
+        Break points are ends of the smooth segments of the inputs, from 0 to the maneuver's end.
+        """
         return _spans(breaks.tobytes(), self.edges.tobytes(), end, begin)
 
 
 @lru_cache(maxsize=256)
-def _spans(breaks: bytes, edges: bytes, end: float, begin: float) -> Ready:
-    return ready(smooth_spans(np.frombuffer(breaks), np.frombuffer(edges), end, begin))
-
-
-def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float = 0.0) -> Spans:
-    """Spans from `begin` to `end` without a window edge or a break point of the inputs inside.
-
-    Break points are ends of the smooth segments of the inputs, from 0 to the end of the maneuver.
-    """
+def _spans(breaks_in_bytes: bytes, edges_in_bytes: bytes, end: float, begin: float) -> Ready:
+    breaks, edges = np.frombuffer(breaks_in_bytes), np.frombuffer(edges_in_bytes)
     cuts = np.sort(np.concatenate([breaks, edges, [begin, end]]))
     cuts = cuts[(cuts >= begin) & (cuts <= end)]
     # Times that differ by rounding are one.
@@ -74,18 +68,12 @@ def smooth_spans(breaks: np.ndarray, edges: np.ndarray, end: float, begin: float
         np.minimum(np.searchsorted(known, middles, side="right") - 1, len(known) - 2)
         for known in (breaks, edges)
     )
-    return Spans(cuts, segments, windows)
+    return ready(Spans(cuts, segments, windows))
 
 
 @lru_cache(maxsize=64)
 def whole_space(dim: int) -> ControlPeriods:
     """The full space of a system with `dim` states, in one window."""
-    nothing = np.zeros((1, 1, 1))
-    return ControlPeriods(
-        "full",
-        np.array([0.0, np.inf]),
-        np.zeros((1, 1)),
-        nothing,
-        nothing,
-        np.array([dim], dtype=np.int64),
-    )
+    edges, ranks = np.array([0.0, np.inf]), np.array([dim], dtype=np.int64)
+    mean, nothing = np.zeros((1, 1)), np.zeros((1, 1, 1))
+    return ControlPeriods("full", edges, mean, nothing, nothing, ranks)

@@ -10,17 +10,18 @@ from typing import Any
 import numpy as np
 
 from vehiclemor.arguments import loop_array, number
-from vehiclemor.codegen.loops import Ready
 from vehiclemor.exceptions import ConvergenceError, InputError
 from vehiclemor.inputs.checks import checked_maneuver, cut_short
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import STATE_KINDS
+from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import LOCKED, left_validity, stopped, wheel_remarks
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
-from vehiclemor.simulation.evaluation import By, chosen
-from vehiclemor.simulation.integrators.catalogue import frozen, integrator
+from vehiclemor.simulation.evaluation import By
+from vehiclemor.simulation.integrators.catalogue import LOOP_SOURCES, frozen, integrator
 from vehiclemor.simulation.integrators.step_kernels import partners
 from vehiclemor.simulation.linear_model import LinearModel
+from vehiclemor.simulation.loop_arguments import Output
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.recording import Recorder, Recording
 from vehiclemor.simulation.system import System
@@ -32,12 +33,10 @@ from vehiclemor.simulation.trajectory import (
     Trajectory,
     output_names,
 )
-from vehiclemor.simulation.workspaces import ALL_SAMPLES, Run, Solver
+from vehiclemor.simulation.workspaces import Run, Solver
 
 # What derivatives are of -> function of the equations.
 RESULTS = {"rhs": "derivative", "outputs": "outputs"}
-# How full-order runs are solved that others are measured against.
-REFERENCE_SOLVER, REFERENCE_TOLERANCE = "dopri5", 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +46,8 @@ class DynamicModel(Model):
     Near is a model of similar parameters, whose operators and workspaces serve this one too.
     """
 
+    # Full-order runs are solved like this that others are measured against.
+    loops, reference = LOOP_SOURCES, ("dopri5", 1e-8)
     near: DynamicModel | None = None
 
     def _numbers(self, states: Iterable[str]) -> np.ndarray:
@@ -114,7 +115,7 @@ class DynamicModel(Model):
         self, state: Any, u: Any, with_respect_to: By = "state", of: str = "rhs"
     ) -> np.ndarray:
         """Analytic derivatives of `rhs` or `outputs`, see `Model.jacobian`."""
-        return self.jacobian_of(chosen(of, RESULTS), state, u, with_respect_to)
+        return self.jacobian_of(RESULTS[choice("of", of, RESULTS)], state, u, with_respect_to)
 
     def linearise(self, state: Start | None = None, inputs: Any = None) -> LinearModel:
         """Linear model at a state or start, the first by default, and inputs, 0 by default."""
@@ -158,25 +159,14 @@ class DynamicModel(Model):
         begin: float = 0.0,
     ) -> Trajectory:
         """Full-order trajectory, see `Model.simulate`."""
-        driven = self.driven_by(maneuver)
-        if driven is not self:
-            how = times, solver, tolerance, outputs, longest_step, begin
-            return driven.simulate(maneuver, start, *how)
-        solver = REFERENCE_SOLVER if solver is None else solver
+        solver = self.reference[0] if solver is None else solver
+        tolerance = self.reference[1] if tolerance is None else tolerance
         integrator(solver)
-        trajectory = self.integrate(
-            maneuver,
-            self.start(start),
-            whole_space(len(self.definition.states)),
-            Solver(
-                solver,
-                REFERENCE_TOLERANCE if tolerance is None else tolerance,
-                times,
-                longest_step,
-                begin if type(begin) is float else number("begin", begin),
-            ),
-            None if outputs is None else output_names(outputs),
-        )
+        begin = begin if type(begin) is float else number("begin", begin)
+        how = Solver(solver, tolerance, times, longest_step, begin)
+        names = None if outputs is None else output_names(outputs)
+        state, space = self.start(start), whole_space(len(self.definition.states))
+        trajectory = self.driven_by(maneuver).integrate(maneuver, state, space, how, names)
         if trajectory.status not in WITHOUT_COMPLAINT:
             raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)
         return trajectory
@@ -197,11 +187,8 @@ class DynamicModel(Model):
         if windows.formulation == "coordinates":
             self.require("second_order", "speeds")
         run = self.system.run(maneuver, state, windows, how, 0.0)
-        if how.times is None and not how.begin:
-            inputs = maneuver.recorded_inputs[1]
-        else:
-            inputs = maneuver.at(run.times)
-        trajectory = self.recorded(maneuver, run, inputs, run.recorded_states, outputs=outputs)
+        inputs = maneuver.recorded_inputs[1] if how.complete else run.output.sample_inputs
+        trajectory = self.recorded(maneuver, run, inputs, run.output.states, outputs=outputs)
         run.give_back()
         if LOCKED in trajectory.remark and frozen(how.name):
             remark = f"{trajectory.remark}; {how.name} errs there, its Jacobian is frozen"
@@ -218,8 +205,9 @@ class DynamicModel(Model):
         failure: str = "",
     ) -> Trajectory:
         """Trajectory of a path of states; it has diverged where the model means nothing."""
-        run = Run(times, states, np.asarray(counts), seconds, failure)
-        return self.recorded(None, run, loop_array(inputs), loop_array(states))
+        states, inputs = loop_array(states), loop_array(inputs)
+        run = Run(Output.of(times, states, np.asarray(counts), inputs), seconds, failure)
+        return self.recorded(None, run, inputs, states)
 
     def recorded(
         self,
@@ -235,21 +223,21 @@ class DynamicModel(Model):
         recorded, those of the model and what may follow them.  Where outputs are named, these alone
         are computed; else all can be read.
         """
-        remark = "" if maneuver is None else cut_short(maneuver)
-        recorder, times, n = self._recorder, run.times, len(self.definition.states)
-        at_points = run.recorded_at(inputs)[1]
-        first = recorder.first_outside(run, at_points, states)
+        recorder, times, n = self.recorder, run.output.samples, len(self.definition.states)
+        rows, samples = run.rows, run.output.point_of_sample
+        whole = states, run.inputs, samples
+        points = whole[0][:rows], whole[1][:rows], samples
+        first = recorder.first_outside(whole, rows, run.cached_loops)
         limited, message, end = len(recorder.limited), run.failure, len(times)
-        points = states[: run.rows], at_points[: run.rows], run.point_of_sample
         left = min(first[:limited], default=end)
         status, reached = "diverged" if message else "ok", end
         if message:
             # From the failure on there are no numbers, which says nothing of limits.
-            reached = int(np.isfinite(Recording(recorder, *points).state_history[:, 0]).sum())
+            reached = int(np.isfinite(Recording(recorder, points).state_history[:, 0]).sum())
             first = [end if sample == reached else sample for sample in first]
         if left < reached:
             name = recorder.limited[first.index(left)]
-            ended = Recording(recorder, *points).columns((name, *self.definition.standstill))[left]
+            ended = Recording(recorder, points).columns((name, *self.definition.standstill))[left]
             if stopped(self.definition, name, ended[1:]):
                 # At rest the slip is so stiff that a solver may fail there.
                 status, message = "stopped", f"the vehicle stops at t = {times[left]:.4g} s"
@@ -257,26 +245,26 @@ class DynamicModel(Model):
                 message = left_validity(self.definition, name, ended[0], times[left])
                 status = "diverged"
         remarks = wheel_remarks(self.definition, first[limited:], times)
-        if remark:
-            remarks.append(remark)
+        if maneuver is not None:
+            remarks.append(cut_short(maneuver))
         fields = {
             "times": times,
             "inputs": inputs,
-            "counts": dict(zip(DYNAMIC_COUNTS, run.counts.tolist(), strict=True)),
+            "counts": dict(zip(DYNAMIC_COUNTS, run.output.counts.tolist(), strict=True)),
             "seconds": run.seconds,
             "status": status,
             "message": message,
-            "remark": "; ".join(remarks),
+            "remark": "; ".join(filter(None, remarks)),
             "names": self.outputs,
             "model": self,
             "maneuver": "" if maneuver is None else maneuver.name,
         }
         if outputs not in (None, self.outputs) and not message:
-            histories, nothing = recorder.histories(run, at_points, states, outputs), inputs[:, :0]
-            fields |= {"names": outputs, **dict.fromkeys(STATE_KINDS, nothing)}
+            histories = recorder.histories(outputs, whole, rows, run.cached_loops)
+            fields |= {"names": outputs, **dict.fromkeys(STATE_KINDS, inputs[:, :0])}
             return Trajectory.of(**fields, outputs=histories)
-        points = points[0][:, :n], *points[1:]
-        recording = Recording(recorder, *(array.copy() for array in points))
+        copies = points[0][:, :n].copy(), points[1].copy(), samples.copy()
+        recording = Recording(recorder, copies)
         if left < end and (status == "stopped" or not run.failure):
             # What follows means nothing.
             recording.end = left
@@ -287,15 +275,9 @@ class DynamicModel(Model):
         self, names: tuple[str, ...], states: np.ndarray, inputs: np.ndarray
     ) -> np.ndarray:
         """Outputs, coordinates or speeds (samples, names) along a path of states and inputs."""
-        return Recording(self._recorder, states, inputs, ALL_SAMPLES).columns(names)
-
-    def packed(self, names: tuple[str, ...], samples: int) -> tuple[Ready, int]:
-        """Outputs, coordinates or speeds for loops over so many samples, see `Recorder.packed`.
-
-        They may have the constants of another model with the same equations.
-        """
-        return self._recorder.packed(names, samples)
+        return Recording(self.recorder, (states, inputs, np.empty((0, 2)))).columns(names)
 
     @cached_property
-    def _recorder(self) -> Recorder:
-        return Recorder(self) if self.near is None else self.near._recorder.of(self)
+    def recorder(self) -> Recorder:
+        """Makes outputs of its runs; loops over them may serve models with the same equations."""
+        return Recorder(self) if self.near is None else self.near.recorder.of(self)

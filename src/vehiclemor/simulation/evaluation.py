@@ -6,21 +6,19 @@ Constants are hoisted from the equations: they follow from the parameters alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vehiclemor.arguments import quoted
-from vehiclemor.codegen.derivatives import JacobianProduct, jacobian_product
+from vehiclemor.codegen.derivatives import jacobian_product
 from vehiclemor.codegen.kernels import Kernels
 from vehiclemor.codegen.loops import Loop, loops
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.exceptions import InputError
+from vehiclemor.multibody.definition import ModelDefinition
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import checked_path
-
-if TYPE_CHECKING:
-    from vehiclemor.multibody.definition import ModelDefinition
 
 PATH_LOOPS = ("simulation.loop_arguments", "simulation.path_loops")
 # Places of the arguments of a kernel.
@@ -49,25 +47,12 @@ def at_samples(
     """
     states = checked_path(paths[0], sizes[0], "states", finite=finite)
     inputs = checked_path(paths[1], sizes[1], "inputs", len(states), finite)
-    result = np.empty((len(states), sizes[2]))
-    if name in kernels:
-        kernels.sources[name].check(sizes[0], sizes[1], len(constants), sizes[2])
-    evaluate(kernels, name, constants, (states, inputs), result)
-    return result
-
-
-def evaluate(
-    kernels: Kernels,
-    name: str,
-    constants: np.ndarray,
-    paths: tuple[np.ndarray, np.ndarray],
-    result: np.ndarray,
-) -> None:
-    """Write the results of a kernel along a path."""
-    lanes = LANES if len(result) >= LANES else 1
+    lanes = LANES if len(states) >= LANES else 1
     address = np.array([address_of(kernels, name, lanes)], dtype=np.int64)
-    loop = path_loops()["lane_path" if lanes == LANES else "kernel_path"]
-    loop(*paths, address, constants, result)
+    kernels.sources[name].check(sizes[0], sizes[1], len(constants), sizes[2])
+    result = np.empty((len(states), sizes[2]))
+    path_loops()["kernel_path"](states, inputs, address, constants, result)
+    return result
 
 
 def address_of(kernels: Kernels, name: str, lanes: int = 1, results: tuple[int, ...] = ()) -> int:
@@ -83,27 +68,23 @@ def address_of(kernels: Kernels, name: str, lanes: int = 1, results: tuple[int, 
 
 def path_loops() -> Mapping[str, Loop]:
     """Loops over the samples of a path, the same for all systems."""
-    entries = "kernel_path", "lane_path", "watched", "chosen", "sampled"
-    return loops(PATH_LOOPS, entries)
+    return loops(PATH_LOOPS, ("kernel_path", "watched", "chosen", "sampled"))
 
 
 def partial(kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int) -> np.ndarray:
     """Derivatives (size, n) of a kernel's result by the entries of the argument at a argument."""
-    return _jacobian_product(kernels, name, arrays, size, argument).jacobian(arrays)
+    source = kernels.sources[name]
+    product = jacobian_product(source, source.arguments[argument], size, len(arrays[argument]))
+    return product.jacobian(arrays)
 
 
 def directional(
     kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int, directions: np.ndarray
 ) -> np.ndarray:
     """Derivatives (k, size) of a kernel's result along directions (k, n) of one argument."""
-    return _jacobian_product(kernels, name, arrays, size, argument).columns(arrays, directions)
-
-
-def _jacobian_product(
-    kernels: Kernels, name: str, arrays: Arrays, size: int, argument: int
-) -> JacobianProduct:
     source = kernels.sources[name]
-    return jacobian_product(source, source.arguments[argument], size, len(arrays[argument]))
+    product = jacobian_product(source, source.arguments[argument], size, len(arrays[argument]))
+    return product.columns(arrays, directions)
 
 
 def parameter_names(by: Any) -> tuple[str, ...]:
@@ -119,11 +100,6 @@ def parameter_names(by: Any) -> tuple[str, ...]:
             f"with_respect_to is {quoted(by)}, neither state nor inputs nor names of parameters"
         )
     return names
-
-
-def chosen(of: Any, known: Mapping[str, str]) -> str:
-    """What the derivatives are of, by its name; `InputError` if there is no such thing."""
-    return known[choice("of", of, known)]
 
 
 # --- constants ------------------------------------------------------------------------------------
@@ -178,26 +154,25 @@ def components(definition: ModelDefinition, name: str) -> range:
 
 
 def constant_derivatives(
-    definition: ModelDefinition, flat: np.ndarray, equations: Kernels, numbers: Sequence[int]
+    definition: ModelDefinition, equations: Kernels, values: np.ndarray, numbers: Sequence[int]
 ) -> np.ndarray:
     """Derivatives (numbers, constants) of the hoisted constants by components of the parameters.
 
-    The model is built anew with each: what its equilibrium solves for follows.  That part is by
-    differences of order 4, the rest is exact.
+    Values are `Model.parameter_values`.  The model is built anew with each: what its equilibrium
+    solves for follows.  That part is by differences of order 4, the rest is exact.
     """
+    flat = values[: len(values) - len(definition.solved)]
 
     def solved(moved: np.ndarray) -> np.ndarray:
         solved = solved_parameters(definition, moved, equations)
         return np.array([solved[name] for name in definition.solved])
 
-    directions = np.zeros((len(numbers), len(flat) + len(definition.solved)))
+    directions = np.zeros((len(numbers), len(values)))
     directions[np.arange(len(numbers)), numbers] = 1.0
-    if definition.solved:
-        directions[:, len(flat) :] = differences(solved, flat, numbers)
-    given = np.concatenate([flat, solved(flat)]) if definition.solved else flat
+    directions[:, len(flat) :] = differences(solved, flat, numbers)
     source = equations.sources["constants"]
-    found = jacobian_product(source, source.arguments[0], equations.constants, len(given))
-    return found.columns((given,), directions)
+    product = jacobian_product(source, source.arguments[0], equations.constants, len(values))
+    return product.columns((values,), directions)
 
 
 def differences(

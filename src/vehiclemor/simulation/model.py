@@ -7,11 +7,10 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from vehiclemor.arguments import quoted
 from vehiclemor.codegen.kernels import BareKernel, Kernels
 from vehiclemor.exceptions import InputError
 from vehiclemor.inputs.columns import listed
@@ -67,6 +66,8 @@ class Model(ShortRepr):
     """
 
     repr_fields = ("name", "kind", "coordinates", "inputs", "outputs", "starts")
+    loops: ClassVar[Sequence[str]]  # Modules of the loops that run it.
+    reference: ClassVar[tuple[str, float]]  # Solver and tolerance by default.
 
     definition: ModelDefinition
     equations: Kernels
@@ -204,10 +205,7 @@ class Model(ShortRepr):
         """State (n,) of an initial condition, the first by default, or a copy of the one given."""
         if not isinstance(name, str | None):
             return self._state(name, "start").copy()
-        name = self.starts[0] if name is None else name
-        if name not in self.initial:
-            known = ", ".join(self.starts)
-            raise InputError(f"unknown start {quoted(name)}; {self.name} has {known}")
+        name = self.starts[0] if name is None else choice("start", name, self.initial)
         return self.initial[name].copy()
 
     @abstractmethod
@@ -331,10 +329,9 @@ class Model(ShortRepr):
         """Derivatives (components, constants) of the constants by parameters, cached."""
         for name in names:
             if name not in self._constant_derivatives:
-                numbers, flat = components(self.definition, name), self.parameters.flat()
-                self._constant_derivatives[name] = constant_derivatives(
-                    self.definition, flat, self.equations, numbers
-                )
+                numbers = components(self.definition, name)
+                arguments = self.definition, self.equations, self.parameter_values, numbers
+                self._constant_derivatives[name] = constant_derivatives(*arguments)
         return np.concatenate([self._constant_derivatives[name] for name in names])
 
     @cached_property

@@ -32,8 +32,8 @@ from vehiclemor.codegen.operations import LANES
 from vehiclemor.simulation.integrators.dense_solves import small_solve
 
 CONVERGED, TOO_MANY_ITERATIONS, NOT_FINITE, SINGULAR, OFF_BRANCH = range(5)
-# Indices of the counts; behind them the sample at which a loop has stopped.
-ITERATIONS, RESIDUALS, JACOBIANS, LINEAR_SOLVES, SAMPLE = range(5)
+# Index of the sample at which a loop has stopped, behind `trajectory.ALGEBRAIC_COUNTS`.
+SAMPLE = 4
 # Largest first correction (rad or m), and largest ratio of the second to it, on the branch.
 CORRECTION, CONTRACTION = 0.1, 1.0 / 16.0
 # A second correction (rad or m) below which the iteration can't have crossed a fold.
@@ -142,12 +142,10 @@ def failure(q):
     return TOO_MANY_ITERATIONS
 
 
-def stopped(counts, iterations, jacobians, status):
-    """Status of a loop that ends; writes its counts."""
-    counts[ITERATIONS] = iterations
-    counts[RESIDUALS] = iterations
-    counts[LINEAR_SOLVES] = iterations
-    counts[JACOBIANS] = jacobians
+def stopped(counts, iterations, status):
+    """Status of a loop that ends; writes its counts, each of which an iteration raises by one."""
+    for count in range(SAMPLE):
+        counts[count] = iterations
     return status
 
 
@@ -237,12 +235,11 @@ def newton_path(
     method does not contract, the sample is approached from the design position instead.
     """
     path, counts = solution.path, solution.counts
-    q, u, previous, target, work = scratch(mechanism.start, inputs.shape[1], buffer)
+    q, u, previous, work = scratch(mechanism.start, inputs.shape[1], buffer)
     iterations = 0
     for sample in range(len(inputs)):
         counts[SAMPLE] = sample
-        for i in range(len(u)):
-            target[i] = inputs[sample, i]
+        target = inputs[sample]
         substeps = increments(previous, target, iteration.largest_increment)
         for substep in range(1, substeps + 1):
             for i in range(len(u)):
@@ -253,37 +250,29 @@ def newton_path(
                 count = approach(q, u, target, mechanism, iteration, work)
                 iterations += abs(count)
                 if count < 0:
-                    return stopped(counts, iterations, iterations, OFF_BRANCH)
+                    return stopped(counts, iterations, OFF_BRANCH)
                 break
         if not within(q, mechanism.stops):
-            return stopped(counts, iterations, iterations, OFF_BRANCH)
-        for i in range(len(u)):
-            previous[i] = target[i]
+            return stopped(counts, iterations, OFF_BRANCH)
+        previous = target
         for i in range(len(q)):
             path[sample, i] = q[i]
-    return stopped(counts, iterations, iterations, CONVERGED)
+    return stopped(counts, iterations, CONVERGED)
 
 
 def travel_limit(
     mechanism: Mechanism, target: Vector, iteration: Iteration, reached: Vector, buffer: Vector
 ) -> Int:
-    """How far the branch goes to a target, one input after the other, the height last.
-
-    `reached` are the inputs at which it ends; the status is that of all inputs but the height.
-    """
-    q, u, _, _, work = scratch(mechanism.start, len(target), buffer)
-    status = CONVERGED
-    for index in range(len(target) - 1, -1, -1):
-        if moved(q, u, index, target[index], mechanism, iteration, work) < 0 and index:
-            status = OFF_BRANCH
-            break
+    """How far the branch goes to a target, see `approach`; `reached` are the inputs at its end."""
+    q, u, _, work = scratch(mechanism.start, len(target), buffer)
+    approach(q, u, target, mechanism, iteration, work)
     for i in range(len(u)):
         reached[i] = u[i]
-    return status
+    return CONVERGED
 
 
 def scratch(start, inputs, buffer):
-    """Coordinates; inputs now, at the previous sample and at the next; scratch space of Newton.
+    """Coordinates; inputs now and at the previous sample; scratch space of Newton.
 
     They are parts of the buffer.  Coordinates and inputs are those of the design position.
     """
@@ -292,12 +281,11 @@ def scratch(start, inputs, buffer):
     full = matrix(buffer, 3 * n, n, n + 1)
     first = 3 * n + n * (n + 1)
     u, previous = vector(buffer, first, inputs), vector(buffer, first + inputs, inputs)
-    target = vector(buffer, first + 2 * inputs, inputs)
     for i in range(n):
         q[i] = start[i]
     for i in range(inputs):
         u[i], previous[i] = 0.0, 0.0
-    return q, u, previous, target, Work(step, saved, full)
+    return q, u, previous, Work(step, saved, full)
 
 
 def same_side(q, u, mechanism, full):
@@ -383,7 +371,7 @@ def lane_path(
         count = corrected(positions, u, mechanism, lane_kernels, iteration, work)
         iterations += abs(count) * LANES
         if count < 0:
-            return stopped(counts, iterations, iterations, OFF_BRANCH)
+            return stopped(counts, iterations, OFF_BRANCH)
         if step < 0:
             continue
         call_lanes(lane_kernels, LANE_OUTPUTS, q, u, mechanism.constants, results, 0)
@@ -394,4 +382,4 @@ def lane_path(
                 path[sample, i] = q[lane, i]
             for i in range(columns):
                 path[sample, n + i] = results[lane, i]
-    return stopped(counts, iterations, iterations, CONVERGED if inside else OFF_BRANCH)
+    return stopped(counts, iterations, CONVERGED if inside else OFF_BRANCH)

@@ -12,12 +12,7 @@ from vehiclemor.codegen.loop_types import (
     call_lanes,
 )
 from vehiclemor.codegen.operations import LANES
-from vehiclemor.simulation.loop_arguments import (
-    NODE_1,
-    NODE_2,
-    NODES,
-    Outputs,
-)
+from vehiclemor.simulation.loop_arguments import NODE_1, NODE_2, NODES, Outputs
 
 # Of Lagrange's polynomials at the outer and inner points: 1 over their products of differences.
 OUTER = 1.0 / ((NODE_1 - NODE_2) * (NODE_1 + NODE_2 - 1.0) * (2.0 * NODE_1 - 1.0))
@@ -35,16 +30,14 @@ INLINED = (
 def kernel_path(
     path: Matrix, inputs: Matrix, kernel: IntVector, constants: Vector, result: Matrix
 ) -> Int:
-    """Results (samples, size) of one kernel at every sample of a path of states."""
-    for sample in range(len(path)):
-        call_kernel(kernel, 0, path[sample], inputs[sample], constants, result[sample])
-    return 0
+    """Results (samples, size) of a kernel at every sample of a path of states.
 
-
-def lane_path(
-    path: Matrix, inputs: Matrix, kernel: IntVector, constants: Vector, result: Matrix
-) -> Int:
-    """Results of a kernel that takes `LANES` samples at once, which there must be."""
+    It takes `LANES` samples at once where there are so many.
+    """
+    if len(path) < LANES:
+        for sample in range(len(path)):
+            call_kernel(kernel, 0, path[sample], inputs[sample], constants, result[sample])
+        return 0
     last = len(path) - LANES
     for first in range(0, len(path), LANES):
         # The last lanes overlap those before.
@@ -114,11 +107,7 @@ def chosen(
 
 def evaluate(states, inputs, outputs, results):
     """Write the results of a kernel, if it has any."""
-    if results.shape[1] == 0:
-        return
-    if len(states) >= LANES:
-        lane_path(states, inputs, outputs.kernel, outputs.constants, results)
-    else:
+    if results.shape[1]:
         kernel_path(states, inputs, outputs.kernel, outputs.constants, results)
 
 
@@ -132,12 +121,8 @@ def sampled(points: Matrix, node_of_sample: Matrix, histories: Matrix) -> Int:
             continue
         a, b, c, d = z - NODE_1, z - NODE_2, z - 1.0 + NODE_2, z - 1.0 + NODE_1
         p, q, r, s = b * c * d * OUTER, a * c * d * INNER, -a * b * d * INNER, -a * b * c * OUTER
-        first, second, third, fourth = (
-            points[row],
-            points[row + 1],
-            points[row + 2],
-            points[row + 3],
-        )
+        first, second = points[row], points[row + 1]
+        third, fourth = points[row + 2], points[row + 3]
         into = histories[sample]
         for i in range(len(into)):
             into[i] = (p * first[i] + q * second[i]) + (r * third[i] + s * fourth[i])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +12,14 @@ from vehiclemor.codegen.loops import Prepared, Ready, address_of_array, ready
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.registry import choice
 from vehiclemor.simulation.checks import limits_of
-from vehiclemor.simulation.evaluation import address_of, evaluate, path_loops
+from vehiclemor.simulation.evaluation import address_of, path_loops
 from vehiclemor.simulation.loop_arguments import Outputs
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.workspaces import Run
 
 NO_RANGES = np.empty((0, 2))
+# States and inputs (points or more, number) at the points of a run, and how its samples follow from
+# them (samples, 2), empty if they are these; see `loop_arguments.Output`.
+Points = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 class Recorder:
@@ -38,39 +41,37 @@ class Recorder:
         call.words[call.address("outputs.constants")] = self._constants
         call()
 
-    def first_outside(self, run: Run, inputs: np.ndarray, states: np.ndarray) -> list[int]:
+    def first_outside(self, points: Points, rows: int, cached_loops: dict[str, Any]) -> list[int]:
         """The first sample at which each watched output is out of its limits; else all samples.
 
-        Inputs and states are those at the points of the run (points or more, number).
+        So many `rows` of the points are recorded.
         """
-        held = run.cached_loops.get("watched")
+        states, held = points[0], cached_loops.get("watched")
         if held is None or held[0] is not states:
             first = np.empty(len(self._watched), dtype=np.int64)
-            outputs, results = self.packed(self._watched, run.rows, self._ranges)
-            scratch = np.empty((len(states), results))
-            arrays = states, inputs, run.point_of_sample, outputs, scratch, first
-            call = path_loops()["watched"].prepared(*arrays)
-            held = run.cached_loops["watched"] = states, call, first, call.address("states") + 1
-        _, call, first, rows = held
-        call.words[rows] = run.rows
+            outputs, results = self.packed(self._watched, rows, self._ranges)
+            arrays = np.empty((len(states), results)), first
+            call = path_loops()["watched"].prepared(*points, outputs, *arrays)
+            held = cached_loops["watched"] = states, call, first, call.address("states") + 1
+        _, call, first, word_of_rows = held
+        call.words[word_of_rows] = rows
         self._run(call)
         return first.tolist()
 
     def histories(
-        self, run: Run, inputs: np.ndarray, states: np.ndarray, names: tuple[str, ...]
+        self, names: tuple[str, ...], points: Points, rows: int, cached_loops: dict[str, Any]
     ) -> np.ndarray:
-        """Outputs, coordinates or speeds (samples, names) of a run, arguments as above."""
-        held = run.cached_loops.get("chosen")
+        """Outputs, coordinates or speeds (samples, names), arguments as above."""
+        states, samples, held = points[0], len(points[2]) or rows, cached_loops.get("chosen")
         if held is None or held[0] is not states or held[1] != names:
-            outputs, results = self.packed(names, run.rows)
-            arrays = np.empty((len(states), results)), np.empty((len(names), len(run.times)))
-            loop = path_loops()["chosen"]
-            call = loop.prepared(states, inputs, run.point_of_sample, outputs, *arrays)
+            outputs, results = self.packed(names, rows)
+            arrays = np.empty((len(states), results)), np.empty((len(names), samples))
+            call = path_loops()["chosen"].prepared(*points, outputs, *arrays)
             words = call.address("states") + 1, call.address("result")
-            held = run.cached_loops["chosen"] = states, names, call, words
-        *_, call, (rows, address) = held
-        result = np.empty((len(names), len(run.times)))
-        call.words[rows], call.words[address] = run.rows, address_of_array(result)
+            held = cached_loops["chosen"] = states, names, call, words
+        *_, call, (word_of_rows, address) = held
+        result = np.empty((len(names), samples))
+        call.words[word_of_rows], call.words[address] = rows, address_of_array(result)
         self._run(call)
         return result.T
 
@@ -101,27 +102,13 @@ class Recorder:
 
 
 class Recording:
-    """States and inputs of a run at its points, and what follows from them at the samples.
+    """What follows from the points of a run at its samples."""
 
-    Attributes
-    ----------
-    states, inputs
-        At the points (points, number), see `loop_arguments.Output`.
-    point_of_sample
-        How the samples follow from them (samples, 2); empty (0, 2) if they are these.
-    """
-
-    def __init__(
-        self,
-        recorder: Recorder,
-        states: np.ndarray,
-        inputs: np.ndarray,
-        point_of_sample: np.ndarray,
-    ) -> None:
-        self._recorder, self.states, self.inputs = recorder, states, inputs
-        self.point_of_sample = point_of_sample
+    def __init__(self, recorder: Recorder, points: Points) -> None:
+        self._recorder, self._points = recorder, points
+        self.states, self.inputs, self.point_of_sample = points
         # The first sample without numbers.
-        self.end = len(point_of_sample) or len(states)
+        self.end = len(self.point_of_sample) or len(self.states)
 
     @cached_property
     def state_history(self) -> np.ndarray:
@@ -131,27 +118,21 @@ class Recording:
     @cached_property
     def output_history(self) -> np.ndarray:
         """Outputs (samples, number of outputs)."""
-        model = self._recorder.model
-        table = np.empty((len(self.states), len(model.outputs)))
-        evaluate(model.kernels, "outputs", model.constants, (self.states, self.inputs), table)
+        table = self._recorder.model.values_at("outputs", self.states, self.inputs)
         return self._cut(self._sampled(table))
 
     def columns(self, names: tuple[str, ...]) -> np.ndarray:
         """Some outputs, coordinates or speeds (samples, names), without the others."""
-        outputs, results = self._recorder.packed(names, len(self.states))
-        histories = np.empty((len(names), len(self.point_of_sample) or len(self.states)))
-        arrays = np.empty((len(self.states), results)), histories
-        path = self.states, self.inputs, self.point_of_sample
-        self._recorder._run(path_loops()["chosen"].prepared(*path, outputs, *arrays))
-        return self._cut(histories.T)
+        return self._cut(self._recorder.histories(names, self._points, len(self.states), {}))
 
     def at(self, rows: np.ndarray) -> Recording:
         """The same at some of the samples."""
-        states, inputs, points = self.states, self.inputs, self.point_of_sample
-        if len(points):
-            part = Recording(self._recorder, states, inputs, points[rows])
+        states, inputs, samples = self._points
+        if len(samples):
+            samples = samples[rows]
         else:
-            part = Recording(self._recorder, states[rows], inputs[rows], points)
+            states, inputs = states[rows], inputs[rows]
+        part = Recording(self._recorder, (states, inputs, samples))
         part.end = int(np.searchsorted(rows, self.end))
         return part
 

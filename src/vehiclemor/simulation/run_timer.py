@@ -7,10 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from time import thread_time
-from typing import TYPE_CHECKING, TypeVar
-
-if TYPE_CHECKING:
-    from threadpoolctl import ThreadpoolController
+from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 CLOCK = "CPU time of the thread"
@@ -38,7 +35,7 @@ def one_thread() -> Iterator[None]:
 
 
 @cache
-def _libraries(of_scipy: bool) -> ThreadpoolController:
+def _libraries(of_scipy: bool) -> Any:
     del of_scipy
     from threadpoolctl import ThreadpoolController
 

@@ -21,7 +21,7 @@ from vehiclemor.simulation.evaluation import CONSTANTS, STATE, directional, part
 from vehiclemor.simulation.loop_arguments import Output, Spans
 from vehiclemor.simulation.system import REASONS, System
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import Pool, RunInputs, Solver, Workspace
+from vehiclemor.simulation.workspaces import Pool, Solver, Workspace
 
 # Shortest step in s: the time loop takes times that differ by less for one.
 SHORTEST = 1e-9
@@ -39,12 +39,12 @@ class Sensitivity(NamedTuple):
 class StepSpace(NamedTuple):
     """A workspace of one step at a time, and what is overwritten for each.
 
-    Times are arrays that end with the length of the step; window is an index (1,), coefficients
-    (1, 6, inputs) are of the inputs, first is the first step.
+    Times are 0 and the length of the step; window is an index (1,), coefficients (1, 6, inputs) are
+    of the inputs, first is the first step.
     """
 
     space: Workspace
-    times: tuple[np.ndarray, ...]
+    times: np.ndarray
     window: np.ndarray
     coefficients: np.ndarray
     first: c_double
@@ -54,18 +54,11 @@ class SteppedSystem:
     """A system as a function of a state, the inputs and a length of time.
 
     Steps are independent of one another: the same arguments give the same state, in any thread.
-
-    Attributes
-    ----------
-    system, spaces
-        A `System`, and its formulation with the subspaces, `ControlPeriods`; in more windows
-        than one the time says which.
-    solver, tolerance
-        Integrator and its tolerance.
     """
 
     if TYPE_CHECKING:
-        # Any: a field or a property.
+        # A `System`, and its formulation with the subspaces, `ControlPeriods`; in more windows than
+        # one the time says which.  Any: a field or a property.
         system: Any
         spaces: Any
         solver: str
@@ -81,10 +74,7 @@ class SteppedSystem:
     ) -> np.ndarray:
         """State (n,) after dt s; inputs are held, or go straight to those at the end.
 
-        Raises
-        ------
-        ConvergenceError
-            If the integration fails.
+        `ConvergenceError` if the integration fails.
         """
         held = self._pool.taken(None, self._packed)
         space, coefficients = held.space, held.coefficients
@@ -97,8 +87,7 @@ class SteppedSystem:
             if slope is not None:
                 coefficients[0, 0] += begin * slope
                 coefficients[0, 1] = length * slope
-            for array in held.times:
-                array[-1] = length
+            held.times[1] = length
             held.first.value = length
             held.window[0] = window
             output.counts.fill(0)
@@ -128,18 +117,15 @@ class SteppedSystem:
             yield begin, end - begin, window
 
     def _packed(self) -> StepSpace:
-        edges, coefficients = np.zeros(2), np.zeros((1, 6, self.system.inputs))
-        span, window, sample = np.zeros(2), np.zeros(1, dtype=np.int64), np.ones(1)
-        counts, one = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64), np.array([0, 1])
-        signal = ready(Pieces(edges, one, np.empty(0), coefficients))
-        spans = ready(Spans(span, np.zeros(1, dtype=np.int64), window))
-        path = np.empty((1, len(self.system.error_scale)))
-        drive = RunInputs(signal, spans, np.empty((0, 0)))
-        output = Output.of(sample, path, counts)
-        space = self.system.packed(self.spaces, Solver(self.solver, self.tolerance), drive, output)
+        times, coefficients = np.zeros(2), np.zeros((1, 6, self.system.inputs))
+        window, counts = (np.zeros(size, dtype=np.int64) for size in (1, len(DYNAMIC_COUNTS)))
+        signal = ready(Pieces(times, np.array([0, 1]), np.empty(0), coefficients))
+        spans = ready(Spans(times, np.zeros(1, dtype=np.int64), window))
+        output = Output.of(times[1:], np.empty((1, len(self.system.error_scale))), counts)
+        how = Solver(self.solver, self.tolerance)
+        space = self.system.packed(self.spaces, how, signal, spans, output)
         words = space.call.words
         first = c_double.from_buffer(words, 8 * space.call.address("control.first"))
-        times = edges, span, sample
         return StepSpace(space, times, window, coefficients, first)
 
     def rates(self, state: np.ndarray, inputs: np.ndarray, time: float = 0.0) -> np.ndarray:

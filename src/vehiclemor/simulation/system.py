@@ -31,7 +31,7 @@ from vehiclemor.simulation.loop_arguments import (
 )
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import DYNAMIC_COUNTS
-from vehiclemor.simulation.workspaces import Pool, Run, RunInputs, Solver, Workspace
+from vehiclemor.simulation.workspaces import Pool, Run, Solver, Workspace
 
 # Below it there is only rounding.
 SMALLEST_TOLERANCE = 1e-13
@@ -165,23 +165,19 @@ class System(ShortRepr):
 
         From `record_all_until` s on the run may be recorded at points, see `loop_arguments.Output`.
         """
-        name, tolerance, times, longest, begin = solver
-        check_positive("tolerance", tolerance, SMALLEST_TOLERANCE)
-        if longest is not None:
-            check_positive("longest_step", longest)
-
-        def make() -> Workspace:
-            return self.workspace(maneuver, windows, solver, record_all_until)
-
-        if times is not None or begin:
-            space, left = make(), None
-        else:
+        check_positive("tolerance", solver.tolerance, SMALLEST_TOLERANCE)
+        if solver.longest_step is not None:
+            check_positive("longest_step", solver.longest_step)
+        pool, kind = Pool(), None
+        if solver.complete:
             # Complete maneuvers with the same output times share a workspace.
             length = maneuver.duration, maneuver.samples
-            kind = length, id(windows), name, tolerance, longest, record_all_until
-            space, left = self._pool.taken(kind, make), partial(self._pool.give_back, kind)
-            if space.signal is not maneuver.packed_pieces:
-                space.take(self._drive(maneuver, windows, space.output.samples))
+            pool, kind = self._pool, (length, id(windows), solver, record_all_until)
+        arguments = maneuver, windows, solver, record_all_until
+        space = pool.taken(kind, lambda: self.workspace(*arguments))
+        if space.signal is not maneuver.packed_pieces:
+            spans = _spans(maneuver, windows, space.output.samples)
+            space.take(maneuver.packed_pieces, spans, maneuver.recorded_inputs[1])
         self._set_constants(space.call)
         start, output = space.memory.start, space.output
         assert len(state) == len(start), f"{len(state)} states, not {len(start)}"
@@ -189,7 +185,8 @@ class System(ShortRepr):
         output.counts.fill(0)
         status, seconds = timed(space.call)
         failure = f"{REASONS[status]} at t = {space.memory.buffer[0]:.6g} s" if status else ""
-        return Run(output.samples, output.states, output.counts, seconds, failure, space, left)
+        give_back = partial(pool.give_back, kind, space)
+        return Run(output, seconds, failure, space.cached_loops, give_back)
 
     @cached_property
     def _pool(self) -> Pool[Workspace]:
@@ -204,28 +201,18 @@ class System(ShortRepr):
     ) -> Workspace:
         """Arrays of a run over a maneuver, its start still to be written; see `run`."""
         times = output_times(solver.times, maneuver, begin=solver.begin)
-        drive = self._drive(maneuver, windows, times, solver.begin)
+        spans = _spans(maneuver, windows, times, solver.begin)
         path = np.empty((len(times), len(self.error_scale)))
         counts = np.zeros(len(DYNAMIC_COUNTS), dtype=np.int64)
-        if solver.times is not None or solver.begin:
-            return self.packed(windows, solver, drive, Output.of(times, path, counts))
-        few = catalogue.integrator(solver.name).cubic and len(times) >= LANES
+        inputs = maneuver.recorded_inputs[1] if solver.complete else maneuver.at(times)
+        few = solver.complete and catalogue.integrator(solver.name).cubic and len(times) >= LANES
         if not few or record_all_until >= times[-1]:
             record_all_until = np.inf
-        output = Output.of(times, path, counts, drive.inputs.copy(), record_all_until)
-        return self.packed(windows, solver, drive, output)
-
-    def _drive(
-        self, maneuver: Excitation, windows: ControlPeriods, times: np.ndarray, begin: float = 0.0
-    ) -> RunInputs:
-        """What of a maneuver goes into a run."""
-        signal = maneuver.packed_pieces
-        end = float(times[-1]) if len(times) else maneuver.duration
-        spans = windows.spans(signal.bundle.edges, end, begin)
-        return RunInputs(signal, spans, maneuver.recorded_inputs[1])
+        output = Output.of(times, path, counts, inputs.copy(), record_all_until)
+        return self.packed(windows, solver, maneuver.packed_pieces, spans, output)
 
     def packed(
-        self, windows: ControlPeriods, solver: Solver, drive: RunInputs, output: Output
+        self, windows: ControlPeriods, solver: Solver, signal: Ready, spans: Ready, output: Output
     ) -> Workspace:
         """The time loop with all its arguments, see `integrators/loop.integrate`."""
         name, chosen = solver.name, catalogue.integrator(solver.name)
@@ -243,8 +230,8 @@ class System(ShortRepr):
         )
         call = catalogue.time_loop(name, formulation).prepared(
             self.called(formulation, name if full else ""),
-            drive.signal,
-            drive.spans,
+            signal,
+            spans,
             windows.subspaces,
             self.method(name, self.active if full else np.arange(dim)),
             catalogue.control_of(name, float(solver.tolerance), longest),
@@ -252,7 +239,7 @@ class System(ShortRepr):
             memory,
         )
         self._set_constants(call)
-        return Workspace(call, memory, output, windows, drive.signal)
+        return Workspace(call, memory, output, windows, signal)
 
     def _set_constants(self, call: Prepared) -> None:
         """Have a loop read the constants of this system."""
@@ -261,3 +248,11 @@ class System(ShortRepr):
     @cached_property
     def _address(self) -> int:
         return self.constants.ctypes.data
+
+
+def _spans(
+    maneuver: Excitation, windows: ControlPeriods, times: np.ndarray, begin: float = 0.0
+) -> Ready:
+    """Parts of a run over a maneuver, with these output times."""
+    end = float(times[-1]) if len(times) else maneuver.duration
+    return windows.spans(maneuver.packed_pieces.bundle.edges, end, begin)

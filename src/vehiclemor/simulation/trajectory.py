@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vehiclemor.arguments import check_shapes, quoted, real_array
+from vehiclemor.arguments import check_shapes, quoted
 from vehiclemor.exceptions import InputError
+from vehiclemor.inputs.excitation import checked_times
 from vehiclemor.multibody.definition import STATE_KINDS, ModelDefinition
 from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
@@ -34,6 +35,12 @@ STATUSES = ("ok", "untrusted", "stopped", "diverged", "unreachable", "rejected",
 WITHOUT_COMPLAINT = ("ok", "stopped")
 # Of a run that has come to its end; `untrusted` it has left what its model knows, and says so.
 FINISHED = (*WITHOUT_COMPLAINT, "untrusted")
+# What a run says of itself, in datasets.
+REPORTED = {
+    "status": f"one of {', '.join(STATUSES)}",
+    "message": "why the status is not ok",
+    "remark": "what else there is to know",
+}
 # What the solvers of a kind of model count: name -> meaning.
 ALGEBRAIC_COUNTS = {
     "iterations": "solver iterations",
@@ -194,11 +201,9 @@ class Trajectory(ShortRepr):
             for group in reversed(groups)
             for column, name in enumerate(groups[group])
         }
-        for name in names:
-            choice("quantity", name, columns)
         histories = []
         for name in names:
-            group, column = columns[name]
+            group, column = columns[choice("quantity", name, columns)]
             histories.append(getattr(self, group)[:, column])
         return np.stack(histories, 1)
 
@@ -291,14 +296,9 @@ def sample_rows(times: Any, known: np.ndarray) -> np.ndarray:
 
     `InputError` if the times don't increase, or one of them is no output time.
     """
-    try:
-        wanted = np.atleast_1d(real_array(times))
-    except (TypeError, ValueError):
-        raise InputError(f"times is {quoted(times)}, no list of times in s") from None
-    if wanted.ndim != 1 or not len(wanted) or not np.isfinite(wanted).all():
-        raise InputError("times must be a list of finite times in s")
-    if (np.diff(wanted) <= SAME_TIME).any():
-        raise InputError("times must increase")
+    wanted = checked_times(times if np.iterable(times) else [times])
+    if not len(wanted) or (np.diff(wanted) <= SAME_TIME).any():
+        raise InputError("times must be one or more, and increase")
     rows = np.minimum(np.searchsorted(known, wanted - SAME_TIME), len(known) - 1)
     missed = abs(known[rows] - wanted) > SAME_TIME
     if missed.any():
@@ -328,11 +328,7 @@ def trajectory_dataset(
         variables[name] = ((), trajectory.counts.get(name, 0), attributes)
     seconds = {"units": "s", "long_name": "time spent in the compiled loop", "clock": CLOCK}
     variables["seconds"] = ((), trajectory.seconds, seconds)
-    for name, long_name in (
-        ("status", f"one of {', '.join(STATUSES)}"),
-        ("message", "why the status is not ok"),
-        ("remark", "what else there is to know"),
-    ):
+    for name, long_name in REPORTED.items():
         variables[name] = ((), getattr(trajectory, name), {"long_name": long_name})
     names = trajectory.names or model.outputs
     labels = _labels(model.definition, held, names, trajectory.times.tobytes())

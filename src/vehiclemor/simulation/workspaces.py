@@ -6,6 +6,7 @@ kind.  It belongs to one run at a time, in whichever thread: lists are popped an
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -20,30 +21,26 @@ from vehiclemor.simulation.loop_arguments import Memory, Output
 Item = TypeVar("Item")
 # Kinds of runs whose workspaces are cached.
 MOST_KINDS = 64
-ALL_SAMPLES = np.empty((0, 2))
 
 
 class Pool(Generic[Item]):
     """What no run holds at present, by what all runs of a kind share."""
 
     def __init__(self) -> None:
-        self._spare: dict[Hashable, list[Item]] = {}
+        self._spare: dict[Hashable, list[Item]] = defaultdict(list)
 
     def taken(self, kind: Hashable, make: Callable[[], Item]) -> Item:
         """One of that kind, a new one if none is left."""
         try:
             return self._spare[kind].pop()
-        except (KeyError, IndexError):
+        except IndexError:
             return make()
 
     def give_back(self, kind: Hashable, held: Item) -> None:
         """Leave it to the next run."""
-        spare = self._spare.get(kind)
-        if spare is None:
-            if len(self._spare) >= MOST_KINDS:
-                self._spare.clear()
-            spare = self._spare.setdefault(kind, [])
-        spare.append(held)
+        if len(self._spare) > MOST_KINDS:
+            self._spare.clear()
+        self._spare[kind].append(held)
 
 
 class Solver(NamedTuple):
@@ -55,13 +52,10 @@ class Solver(NamedTuple):
     longest_step: float | None = None
     begin: float = 0.0
 
-
-class RunInputs(NamedTuple):
-    """What of a maneuver goes into a run: signal, parts of the run, inputs at the output times."""
-
-    signal: Ready
-    spans: Ready
-    inputs: np.ndarray
+    @property
+    def complete(self) -> bool:
+        """Whether it runs over a whole maneuver, at its output times."""
+        return self.times is None and not self.begin
 
 
 @dataclass(eq=False, slots=True)
@@ -80,65 +74,40 @@ class Workspace:
     signal: Ready
     cached_loops: dict[str, Any] = field(default_factory=dict)
 
-    def take(self, drive: RunInputs) -> None:
+    def take(self, signal: Ready, spans: Ready, inputs: np.ndarray) -> None:
         """Have the next run driven by another maneuver of the same output times."""
-        self.call.give("signal", drive.signal)
-        self.call.give("spans", drive.spans)
-        self.signal = drive.signal
-        self.output.sample_inputs[:] = drive.inputs
+        self.call.give("signal", signal)
+        self.call.give("spans", spans)
+        self.signal = signal
+        self.output.sample_inputs[:] = inputs
 
 
 @dataclass(eq=False, slots=True)
 class Run:
     """What a compiled run leaves behind."""
 
-    times: np.ndarray  # Output times (samples,) in s.
-    recorded_states: np.ndarray  # States (rows or more, dim), NaN from a failure on.
-    # Numbers in the order of `DYNAMIC_COUNTS`; time in the compiled loop; why it has ended early.
-    counts: np.ndarray
-    seconds: float
-    failure: str
-    # Where its arrays are from; called with it once nothing reads them any more.
-    space: Workspace | None = None
-    left: Callable[[Workspace], None] | None = None
+    output: Output
+    seconds: float  # Time in the compiled loop.
+    failure: str  # Why it has ended early.
+    # Loops that read its arrays, by name; called once nothing reads these any more.
+    cached_loops: dict[str, Any] = field(default_factory=dict)
+    give_back: Callable[[], None] = lambda: None
     rows: int = field(init=False)  # How many rows are recorded.
 
     def __post_init__(self) -> None:
         """Count the rows that are recorded."""
-        self.rows = len(self.recorded_states)
-        if self.space is not None and len(self.point_of_sample):
+        self.rows = len(self.output.states)
+        if len(self.output.point_of_sample):
             # Kernels take so many at once.
-            self.rows = max(int(self.space.output.rows[0]), LANES)
+            self.rows = max(int(self.output.rows[0]), LANES)
 
     @property
     def path(self) -> np.ndarray:
         """States (samples, dim) at the output times, or at points, see `loop_arguments.Output`."""
-        return self.recorded_states[: self.rows]
+        return self.output.states[: self.rows]
 
     @property
-    def point_of_sample(self) -> np.ndarray:
-        """See `loop_arguments.Output` (samples, 2); empty (0, 2) if the samples are the points."""
-        return ALL_SAMPLES if self.space is None else self.space.output.point_of_sample
-
-    def recorded_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Times (s) and inputs of its rows, or of more; those at the samples are given.
-
-        In a workspace that serves further runs their addresses stay the same.
-        """
-        if self.space is None or self.left is None:
-            return self.times, inputs
-        output = self.space.output
-        if len(self.point_of_sample):
-            return output.point_times, output.point_inputs
-        return self.times, output.sample_inputs
-
-    @property
-    def cached_loops(self) -> dict[str, Any]:
-        """Loops that read the arrays of its workspace, by name."""
-        return {} if self.space is None else self.space.cached_loops
-
-    def give_back(self) -> None:
-        """Leave its arrays to the next run: nothing may read them any more."""
-        if self.left is not None and self.space is not None:
-            self.left(self.space)
-            self.space = self.left = None
+    def inputs(self) -> np.ndarray:
+        """Inputs of its rows, or of more; their address stays the same in a workspace."""
+        output = self.output
+        return output.point_inputs if len(output.point_of_sample) else output.sample_inputs

@@ -165,7 +165,7 @@ def test_another_source_entry_or_compiler_is_another_file(monkeypatch):
     monkeypatch.setattr(module, "from_cache", from_cache)
     ask()
     ask()
-    ask(entries=("lane_path",))
+    ask(entries=("sampled",))
     ask(modules=("simulation.loop_arguments", "simulation.path_loops"))
     for name in ("source_digest", "compiler_identity"):
         monkeypatch.setattr(module, name, lambda *_: "another")

@@ -110,7 +110,7 @@ NO_STARTS = np.zeros(3), np.zeros((2, 8)), [np.nan] * 28, "abc", 1.0
 
 @pytest.mark.parametrize(
     ("argument", "values", "named"),
-    [("times", NO_TIMES, "output times"), ("start", NO_STARTS, "start")],
+    [("times", NO_TIMES, "times (are|must)"), ("start", NO_STARTS, "start")],
 )
 def test_times_and_starts_that_are_none_are_refused(each_model, argument, values, named):
     maneuver = component("maneuver", each_model.definition.maneuver)

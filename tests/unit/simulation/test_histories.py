@@ -110,7 +110,7 @@ def test_a_run_read_at_few_points_is_the_run_at_its_samples(name, maneuver, star
     own = Solver("etdrk4", 1e-3)
     space = whole_space(2 * len(model.coordinates))
     run = model.system.run(given, model.start(start), space, own, 0.0)
-    assert len(run.point_of_sample)
+    assert len(run.output.point_of_sample)
     assert len(run.path) < len(few.times)
 
 

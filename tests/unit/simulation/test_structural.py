@@ -154,7 +154,7 @@ WRONG = [
     ({"maneuver": "lane_change"}, "delta"),
     ({"maneuver": signal(0.4)}, "z is .* holds from -0.3 to 0.3"),
     ({"maneuver": NOWHERE}, "input z is not finite at t = 0 s"),
-    ({"start": "dropped"}, "unknown start 'dropped'; standing_chain has equilibrium"),
+    ({"start": "dropped"}, "unknown start 'dropped'; known: equilibrium"),
     ({"solver": "dopri5"}, "solver 'dopri5'"),
     ({"tolerance": np.nan}, "tolerance"),
     ({"outputs": ["bottom"]}, "bottom"),

@@ -29,7 +29,7 @@ from vehiclemor.reduction.training import Training
 from vehiclemor.registry import choice
 from vehiclemor.simulation.algebraic import AlgebraicModel, kinematic_loop, new_counts
 from vehiclemor.simulation.model import Model
-from vehiclemor.simulation.newton_loops import SAMPLE, Iteration, Solution
+from vehiclemor.simulation.newton_loops import Iteration, Solution
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -114,8 +114,7 @@ class AlgebraicProjection(ReducedMechanism):
         buffer = np.empty(3 * n + 3 * n * (n + 1) + len(model.inputs))
         path, counts = np.full((len(times), n), np.nan), new_counts()
         status, seconds = timed(loop.prepared(*given, Solution(path, counts), buffer))
-        failure = (status, int(counts[SAMPLE])) if status else None
-        return model.trajectory(times, inputs, path, counts.tolist(), seconds, failure)
+        return model.trajectory(times, inputs, path, counts.tolist(), seconds, status)
 
     def simulate(self, maneuver: Excitation, start: Start) -> Trajectory:
         """Solve the reduced equations at the maneuver's output times."""

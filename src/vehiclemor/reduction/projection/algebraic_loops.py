@@ -126,7 +126,7 @@ def projected_path(
                 else:
                     weigh(windows.tests[window], r, product, reduced)
                 if not small_solve(reduced, r):
-                    return stopped(counts, iterations, iterations, SINGULAR)
+                    return stopped(counts, iterations, SINGULAR)
                 for j in range(r):
                     step[j] = reduced[j, n]
                     qh[j] -= step[j]
@@ -135,7 +135,7 @@ def projected_path(
                     converged = True
                     break
             if not converged:
-                return stopped(counts, iterations, iterations, failure(q))
+                return stopped(counts, iterations, failure(q))
             for i in range(n):
                 path[sample, i] = q[i]
-    return stopped(counts, iterations, iterations, CONVERGED)
+    return stopped(counts, iterations, CONVERGED)

@@ -22,14 +22,10 @@ from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.projection.bases import RankTolerance
 from vehiclemor.reduction.settings import LARGEST_TOLERANCE, SHORTEST, Settings
 from vehiclemor.reduction.training import Training
+from vehiclemor.registry import choice
 from vehiclemor.short_repr import ShortRepr
-from vehiclemor.simulation.evaluation import PLACES, By, chosen, parameter_names, partial
-from vehiclemor.simulation.structures.model import (
-    FIRST_STEP,
-    REASONS,
-    USUAL,
-    StructuralModel,
-)
+from vehiclemor.simulation.evaluation import PLACES, By, parameter_names, partial
+from vehiclemor.simulation.structures.model import FIRST_STEP, REASONS, USUAL, StructuralModel
 from vehiclemor.simulation.structures.system import StructuralSystem
 from vehiclemor.simulation.trajectory import Start, Trajectory
 
@@ -37,7 +33,7 @@ from vehiclemor.simulation.trajectory import Start, Trajectory
 FIRST_MODES = 16
 # Directions whose mass is below this part of the largest one carry none.
 MASSLESS = 1e-12
-RESULTS = {"rhs": "rhs", "outputs": "outputs"}
+RESULTS = ("rhs", "outputs")
 
 
 class StructuralSettings(Settings):
@@ -213,11 +209,11 @@ class ReducedStructure(ShortRepr):
     ) -> np.ndarray:
         """Analytic derivatives of the rates or of the outputs by state or inputs."""
         del time
-        function = chosen(of, RESULTS)
+        choice("of", of, RESULTS)
         if parameter_names(by):
             raise InputError(f"the reduced equations of {self.model.name} have no parameters")
         a, b, c, d, ports = self._linear
-        direct, by_force = (a, b) if function == "rhs" else (c, d)
+        direct, by_force = (a, b) if of == "rhs" else (c, d)
         if by == "state":
             slopes = self._forces(state, inputs)
             return direct + by_force @ np.hstack(

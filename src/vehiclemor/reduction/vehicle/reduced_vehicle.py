@@ -104,14 +104,14 @@ class Decoding(ShortRepr):
         sizes = self.features.states + PLANAR, self.features.inputs, self._results
         return at_samples(kernels, "full_state", constants, (path, inputs), sizes)
 
-    def of_run(self, run: Run, inputs: np.ndarray) -> np.ndarray:
+    def of_run(self, run: Run) -> np.ndarray:
         """As of `states`, results where a run is recorded: its first `run.rows` rows.
 
-        `inputs` are those at the samples.  The array belongs to the run.
+        The array belongs to the run.
         """
         space = run.cached_loops.get("decoded")
         if space is None:
-            space = self._space(run.recorded_states, run.recorded_at(inputs)[1], run.rows)
+            space = self._space(run.output.states, run.inputs, run.rows)
             run.cached_loops["decoded"] = space
         for index in space.counts:
             space.call.words[index] = run.rows
@@ -124,8 +124,7 @@ class Decoding(ShortRepr):
         lanes = LANES if rows >= LANES else 1
         address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
         states = np.empty((len(path), self._results))
-        loop = path_loops()["lane_path" if lanes == LANES else "kernel_path"]
-        call = loop.prepared(path, inputs, address, constants, states)
+        call = path_loops()["kernel_path"].prepared(path, inputs, address, constants, states)
         counts = [call.address(name) + 1 for name in ("path", "inputs", "result")]
         return DecodingSpace(states, call, counts)
 
@@ -260,8 +259,9 @@ class ReducedVehicle(ReducedSystem):
         inputs = maneuver.recorded_inputs[1]
         state, encoded = self.known(start, inputs[0])
         run = self.run(maneuver, encoded, record_all_until=0.0)
-        states = self.decoder.of_run(run, inputs)
-        if not len(run.point_of_sample) or run.point_of_sample[0, 1] < 0.0:
+        states = self.decoder.of_run(run)
+        samples = run.output.point_of_sample
+        if not len(samples) or samples[0, 1] < 0.0:
             # The start is known better than its slow part.
             states[0, : len(state)] = state
         trajectory = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)

@@ -55,32 +55,15 @@ class Integrator:
     tables: Callable[[np.ndarray], np.ndarray] | None = None
 
 
-def explicit(
-    summary: str,
-    order: int,
-    table: np.ndarray,
-    control: Control | None = None,
-    modules: tuple[str, ...] = ("explicit_pair",),
-) -> Integrator:
-    """An explicit Runge-Kutta pair by its table, see `explicit_pair.pair_table`."""
-    return Integrator(
-        summary,
-        modules,
-        order,
-        control or Control(1.0 / order, 1.0 / order),
-        rows=explicit_pair.scratch_rows(table),
-        cubic=not table[-1].any(),
-        tableau=table,
-    )
-
-
 INTEGRATORS = {
-    "dopri5": explicit(
+    "dopri5": Integrator(
         "Dormand-Prince 5(4), explicit",
+        ("explicit_pair", "dopri5"),
         5,
-        dopri5.TABLE,
         Control(0.17, 0.17, 0.04, 1e-4, shrink_least=0.2, grow=10.0, halve_last=0.0),
-        modules=("explicit_pair", "dopri5"),
+        rows=explicit_pair.scratch_rows(dopri5.TABLE),
+        cubic=False,
+        tableau=dopri5.TABLE,
     ),
     "rodas4": Integrator(
         "Rosenbrock method of order 4, fresh Jacobians",

@@ -1,23 +1,21 @@
 """What the time loop calls: seven functions of an integrator, four of a formulation.
 
 Loops import them from here, and are compiled with the functions of the same name of one integrator
-and one formulation, see `catalogue.time_loop`.  Three are complete: an integrator that does not
+and one formulation, see `catalogue.time_loop`.  Five are complete: an integrator that does not
 replace them takes steps of any size, and its dense output is the cubic through states and slopes at
 both ends of a step.  Functions of all explicit pairs stand in `explicit_pair`.
 
-The arguments are bundles, see `loop_arguments`: `problem` is a `Problem`, `method` a `Method`,
-`control` a `Control`; `work` is the integrator's scratch space, a named tuple with at least the
-vectors `WORK`; `counts` are those of the run, see `RHS_CALLS`.
+The arguments are bundles, see `loop_arguments`: `problem` is a `Problem`, `method` a `Method`;
+`work` is the integrator's scratch space, a named tuple with at least the vectors y and f (reduced
+state and right-hand side at the beginning of a step), new and f_new (both at its end), error, and
+middle (a state within the step); `counts` are those of the run, see `RHS_CALLS`.
 """
 
 from vehiclemor.codegen.loop_types import COMPILED_ONLY
 
-# Vectors of every integrator's scratch space: reduced state and right-hand side at the beginning
-# of a step, both at its end, its error, and a state within the step.
-WORK = ("y", "f", "new", "f_new", "error", "middle")
 # Coefficients of the cubic, by powers of the part of a step that has passed.
 POWERS = 3
-INLINED = ("longest_step", "prepare_curve", "interpolate")
+INLINED = ("accept", "longest_step", "prepare_curve", "interpolate")
 
 
 # --- integrators ----------------------------------------------------------------------------------
@@ -28,12 +26,11 @@ def work_space(buffer, first, integers, dim, inputs, method):
     raise NotImplementedError(COMPILED_ONLY)
 
 
-def begin(problem, t, method, work):
-    """Begin a span at time t: right-hand side at `work.y` into `work.f`."""
-    raise NotImplementedError(COMPILED_ONLY)
+def begin(method, work):
+    """Begin a span at `work.y`, where `work.f` is the right-hand side."""
 
 
-def longest_step(h, method, control, work):
+def longest_step(h, method, work):
     """The longest step in s that the method can take and that is not above h."""
     return h
 
@@ -44,8 +41,7 @@ def step(problem, t, h, method, work, counts):
 
 
 def accept(problem, t, h, method, work, counts):
-    """Finish an accepted step: right-hand side at its end into `work.f_new`."""
-    raise NotImplementedError(COMPILED_ONLY)
+    """Finish an accepted step: right-hand side at its end into `work.f_new`, if not there yet."""
 
 
 def prepare_curve(h, method, work):

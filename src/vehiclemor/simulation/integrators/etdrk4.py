@@ -29,14 +29,13 @@ so that defective matrices, those of stabilised constraints, are no exception.
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from vehiclemor.codegen.loop_types import IntVector, Matrix, Vector, call_kernel, matrix, vector
 from vehiclemor.inputs.polynomial_loops import input_at
-from vehiclemor.simulation.integrators.contract import POWERS, rhs
+from vehiclemor.simulation.integrators.contract import POWERS
 from vehiclemor.simulation.loop_arguments import RHS_CALLS, STEP_KERNEL
 
 # Called once in the time loop: bundles of arrays cost more to pass than they take inside.
@@ -62,7 +61,7 @@ AT_ZERO = (0.0, 1.0 / 2.0, 1.0 / 2.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 6.0)
 
 
 class Work(NamedTuple):
-    """Scratch space: `contract.WORK`, coefficients of the cubic, and what the step kernel takes.
+    """Scratch space: `contract`'s vectors, powers of the cubic, and what the step kernel takes.
 
     Past are state and right-hand side a step before, one behind the other; their step size, 0 if
     there was none; the kernel's numbers and inputs, parts of its arguments; its result; the number
@@ -112,9 +111,8 @@ def work_space(buffer, first, integers, dim, inputs, method):
     )
 
 
-def begin(problem, t, method, work):
-    """Right-hand side at the beginning of a span; there is no step before."""
-    rhs(problem, t, work.y, work.f)
+def begin(method, work):
+    """There is no step before."""
     work.step_index[0], work.past_step[0] = len(method.step_sizes) // 2, 0.0
     keep_past(work)
 
@@ -125,7 +123,7 @@ def keep_past(work):
         work.past[i] = work.arguments[i]
 
 
-def longest_step(h, method, control, work):
+def longest_step(h, method, work):
     """The longest stored step size that is not above h."""
     work.step_index[0] = index_below(method.step_sizes, work.step_index[0], h)
     return min(h, method.step_sizes[work.step_index[0]])
@@ -214,19 +212,16 @@ def _doubled(functions: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     )
 
 
-def exponential_tables(
-    jacobian: np.ndarray, step_sizes: Sequence[float] | np.ndarray
-) -> np.ndarray:
+def exponential_tables(jacobian: np.ndarray, step_sizes: np.ndarray) -> np.ndarray:
     """Tables (step sizes, 7, n, n) of the loops, each matrix transposed.
 
     J; phi_1(z/2) / 2 and phi_2(z/2); phi_1, 2 phi_2, 2 phi_2 - 4 phi_3, 4 phi_3 - phi_2 of
     z = h J.  Step sizes grow by a root of 2: each octave doubles the one before.
     """
-    steps = np.asarray(step_sizes)
-    octave = int((steps < 1.99 * steps[0]).sum())
-    tables = np.empty((len(steps), TABLES, *jacobian.shape))
-    half = phi_functions(0.5 * steps[:octave, None, None] * jacobian)
-    for begin in range(0, len(steps), octave):
+    octave = int((step_sizes < 1.99 * step_sizes[0]).sum())
+    tables = np.empty((len(step_sizes), TABLES, *jacobian.shape))
+    half = phi_functions(0.5 * step_sizes[:octave, None, None] * jacobian)
+    for begin in range(0, len(step_sizes), octave):
         full = _doubled(half)
         _, first, second, third = full
         columns = (

@@ -9,19 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.codegen.loop_types import Matrix, Vector, matrix, vector
-from vehiclemor.simulation.integrators.contract import rhs
+from vehiclemor.simulation.integrators.contract import POWERS, rhs
 from vehiclemor.simulation.loop_arguments import RHS_CALLS
 
 # Scratch space beside the stages, by vector.
 VECTORS = ("y", "new", "error", "middle")
-# Powers of the part of a step that has passed, in dense output.
-POWERS = 4
 # Called once in the time loop: bundles of arrays cost more to pass than they take inside.
-INLINED = ("accept", "step")
+INLINED = ("step",)
 
 
 class Work(NamedTuple):
-    """Scratch space: `contract.WORK`, stages by row, coefficients of dense output by power."""
+    """Scratch space: `contract`'s vectors, stages by row, coefficients of dense output by power."""
 
     y: Vector
     f: Vector
@@ -33,34 +31,17 @@ class Work(NamedTuple):
     curve: Matrix
 
 
-def pair_table(
-    weights: Sequence[Sequence[float]],
-    error: Sequence[float],
-    correction: Sequence[float] | None = None,
-) -> np.ndarray:
-    """Table (s + 2 + `POWERS`, s) of a pair of s stages.
+def pair_table(weights: Sequence[Sequence[float]], error: Sequence[float]) -> np.ndarray:
+    """Table (s + 2, s) of a pair of s stages: weights by stage, times of the stages, error.
 
-    Its rows are the weights by stage, the times of the stages, the error, dense output by power.
-
-    Parameters
-    ----------
-    weights
-        Of the stages before, for the second and further stages; the last row gives the new state.
-    error
-        Weights (s,) of the stages in the difference of both solutions.
-    correction
-        Dense output is the cubic through states and slopes at both ends of a step, plus
-        h z^2 (1 - z)^2 times the stages with these weights (s,), 0 by default, where z is the part
-        of the step that has passed.
+    Weights are of the stages before, for the second and further stages, the last of which gives the
+    new state; the error weighs (s,) the stages in the difference of both solutions.
     """
     s = len(weights) + 1
-    a, ends = np.zeros((s, s)), np.eye(s)[[0, -1]]
+    a = np.zeros((s, s))
     for stage, row in enumerate(weights, start=1):
         a[stage, : len(row)] = row
-    more = np.zeros(s) if correction is None else np.array(correction)
-    square = 3.0 * a[-1] - 2.0 * ends[0] - ends[1] + more
-    cube = ends[0] + ends[1] - 2.0 * a[-1] - 2.0 * more
-    return np.vstack([a, a.sum(axis=1), error, ends[0], square, cube, more])
+    return np.vstack([a, a.sum(axis=1), error])
 
 
 def scratch_rows(table: np.ndarray) -> int:
@@ -82,11 +63,6 @@ def work_space(buffer, first, integers, dim, inputs, method):
         stages=stages,
         curve=matrix(buffer, stages_at + count * dim, POWERS, dim),
     )
-
-
-def begin(problem, t, method, work):
-    """Right-hand side at the beginning of a span."""
-    rhs(problem, t, work.y, work.f)
 
 
 def step(problem, t, h, method, work, counts):
@@ -111,24 +87,3 @@ def combine(h, weights, stages, count, result):
         weight = h * weights[j]
         for i in range(len(result)):
             result[i] += weight * stages[j, i]
-
-
-def accept(problem, t, h, method, work, counts):
-    """The last stage is the right-hand side at the end of the step."""
-
-
-def prepare_curve(h, method, work):
-    """Coefficients of dense output by power."""
-    s = len(work.stages)
-    for power in range(POWERS):
-        combine(h, method.tableau[s + 2 + power], work.stages, s, work.curve[power])
-
-
-def interpolate(part, h, work):
-    """State where a part of the step has passed, into `middle`."""
-    y, curve = work.y, work.curve
-    for i in range(len(y)):
-        total = 0.0
-        for power in range(POWERS - 1, -1, -1):
-            total = part * (curve[power, i] + total)
-        work.middle[i] = y[i] + total

@@ -16,6 +16,7 @@ from vehiclemor.simulation.integrators.contract import (
     prepare_curve,
     project,
     reconstruct,
+    rhs,
     step,
     work_space,
 )
@@ -134,7 +135,8 @@ def over_span(problem, times, h, method, control, work, output, sample):
     """
     t, end = times
     y, f, counts = work.y, work.f, output.counts
-    begin(problem, t, method, work)
+    rhs(problem, t, y, f)
+    begin(method, work)
     counts[RHS_CALLS] += 1
     if h <= 0.0:
         # The slope changes the state by a hundredth of its scale, at most.
@@ -150,7 +152,7 @@ def over_span(problem, times, h, method, control, work, output, sample):
     while t < end - 1e-12 * (1.0 + abs(end)):
         if calls_of_this_second(problem, t, counts) > control.most_calls:
             return TOO_MANY_CALLS, t, tried, sample
-        h = longest_step(min(tried, control.longest), method, control, work)
+        h = longest_step(min(tried, control.longest), method, work)
         if t + 1.0001 * h > end:
             h = end - t
         elif control.halve_last > 0.0 and t + 2.0 * h > end:
@@ -181,8 +183,6 @@ def over_span(problem, times, h, method, control, work, output, sample):
         factor = control.safety * error**-control.exponent * before**control.memory_exponent
         before = max(error, control.memory_floor)
         factor = min(control.grow, max(control.shrink, factor))
-        if control.keep_least < factor < control.keep_most:
-            factor = 1.0
         if rejected:
             factor = min(1.0, factor)
             rejected = False
@@ -236,7 +236,6 @@ def record_sample(output, sample):
     if not len(output.point_of_sample):
         return
     output.point_of_sample[sample, 0], output.point_of_sample[sample, 1] = row, -1.0
-    output.point_times[row] = output.samples[sample]
     for j in range(output.sample_inputs.shape[1]):
         output.point_inputs[row, j] = output.sample_inputs[sample, j]
 
@@ -251,7 +250,6 @@ def record_nodes(problem, step, first, following, work, output):
         part = part if node < 2 else 1.0 - part
         interpolate(part, h, work)
         reconstruct(problem, work.middle, output.states[row + node])
-        output.point_times[row + node] = t + part * h
         input_at(problem, t + part * h, output.point_inputs[row + node])
     for k in range(first, following):
         output.point_of_sample[k, 0] = row

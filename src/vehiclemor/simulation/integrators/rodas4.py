@@ -5,7 +5,7 @@ IV.7 and VI.4, in transformed stages (no product with the Jacobian):
 
     (I / (gamma h) - A) U_i = f(t + alpha_i h, y + sum a_ij U_j) + sum c_ij / h U_j + d_i h f_t
 
-Rows of the tableau: a (6), c (6), then alpha, d, m and e; gamma is 1/4.
+Rows of the tableau: a (6), c (6), then alpha, d and m; gamma is 1/4.  The last stage is the error.
 """
 
 from typing import NamedTuple
@@ -15,16 +15,11 @@ import numpy as np
 from vehiclemor.codegen.loop_types import IntVector, Matrix, Vector, matrix
 from vehiclemor.simulation.integrators.contract import POWERS, rhs
 from vehiclemor.simulation.integrators.dense_solves import factorise, substitute
-from vehiclemor.simulation.loop_arguments import (
-    FACTORISATIONS,
-    JACOBIANS,
-    LINEAR_SOLVES,
-    RHS_CALLS,
-)
+from vehiclemor.simulation.loop_arguments import FACTORISATIONS, JACOBIANS, LINEAR_SOLVES, RHS_CALLS
 
 GAMMA = 0.25
 S = 6
-ALPHA, D, M, E = 12, 13, 14, 15
+ALPHA, D, M = 12, 13, 14
 # Scratch space: vectors, then stages and powers of the cubic; matrices; one integer.
 VECTORS = ("y", "f", "new", "f_new", "error", "middle", "image", "f_t", "b")
 ROWS, SQUARES, FLAGS = len(VECTORS) + S + POWERS, 2, 1
@@ -33,7 +28,7 @@ INLINED = ("accept", "step")
 
 
 def tableau() -> np.ndarray:
-    """Coefficients (16, 6), see above."""
+    """Coefficients (15, 6), see above."""
     a, c = np.zeros((6, 6)), np.zeros((6, 6))
     a[1, :1] = [1.544]
     a[2, :2] = [0.9466785280815826, 0.2557011698983284]
@@ -54,15 +49,13 @@ def tableau() -> np.ndarray:
     ]
     m = a[5].copy()
     m[5] = 1.0
-    e = np.zeros(6)
-    e[5] = 1.0
     alpha = np.array([0.0, 0.386, 0.21, 0.63, 1.0, 1.0])
     d = np.array([0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0])
-    return np.vstack([a, c, alpha, d, m, e])
+    return np.vstack([a, c, alpha, d, m])
 
 
 class Work(NamedTuple):
-    """Scratch space: `contract.WORK`, coefficients of the cubic, and what a step needs.
+    """Scratch space: `contract`'s vectors, coefficients of the cubic, and what a step needs.
 
     Right-hand side at a shifted state, time derivative, right side of a linear system; stages by
     row; Jacobian, factors and pivots of the matrix; whether the Jacobian is fresh.
@@ -110,9 +103,8 @@ def work_space(buffer, first, integers, dim, inputs, method):
     )
 
 
-def begin(problem, t, method, work):
-    """Right-hand side at the beginning of a span; no Jacobian is known yet."""
-    rhs(problem, t, work.y, work.f)
+def begin(method, work):
+    """No Jacobian is known yet."""
     work.fresh[0] = 0
 
 
@@ -185,12 +177,11 @@ def step(problem, t, h, method, work, counts):
         for i in range(dim):
             stages[stage, i] = b[i]
     for i in range(dim):
-        total, change = 0.0, 0.0
+        total = 0.0
         for stage in range(S):
             total += tableau[M, stage] * stages[stage, i]
-            change += tableau[E, stage] * stages[stage, i]
         work.new[i] = y[i] + total
-        work.error[i] = change
+        work.error[i] = stages[S - 1, i]
     return True
 
 

@@ -115,15 +115,6 @@ class Frame(NamedTuple):
         return transform.T / np.count_nonzero(transform, axis=1)
 
     @property
-    def coordinate_entries(self) -> list[int]:
-        """Entry of each coordinate in a vector, block after block."""
-        return [
-            first + k
-            for first, block in zip(self.offsets, self.blocks, strict=False)
-            for k in range(len(block))
-        ]
-
-    @property
     def plain(self) -> bool:
         """Whether coordinates are the states."""
         states = sum(len(block) for block in self.blocks)
@@ -219,7 +210,9 @@ class _Step(Listing):
         if self.frame.plain:
             self.sum(to, *[(1.0, name) for name in (start, coordinates) if name], n=self.n)
             return
-        inverse, entries = self.frame.inverse, self.frame.coordinate_entries
+        inverse, entries = self.frame.inverse, list[int]()
+        for first, block in zip(self.frame.offsets, self.frame.blocks, strict=False):
+            entries += range(first, first + len(block))
 
         def read(state: int) -> Value:
             terms = []

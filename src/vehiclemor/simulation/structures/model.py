@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -14,16 +14,16 @@ from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.definition import Structure
 from vehiclemor.registry import choice
-from vehiclemor.simulation.checks import (
-    checked_inputs,
-    left_validity,
-    limits_of,
-    wheel_remarks,
-)
+from vehiclemor.simulation.checks import checked_inputs, left_validity, limits_of, wheel_remarks
 from vehiclemor.simulation.model import Model
 from vehiclemor.simulation.run_timer import timed
 from vehiclemor.simulation.structures import time_loops as compiled
-from vehiclemor.simulation.structures.system import PortLaw, StructuralSystem, factored
+from vehiclemor.simulation.structures.system import (
+    STRUCTURAL_LOOPS,
+    PortLaw,
+    StructuralSystem,
+    factored,
+)
 from vehiclemor.simulation.trajectory import (
     STRUCTURAL_COUNTS,
     Names,
@@ -53,31 +53,6 @@ LONGEST_SPACING = 0.02
 ROUNDING, SYMMETRIC = 1e-6, 1e-9
 # Changes of port forces (N) below which the iteration for the static state ends.
 STATIC_TOLERANCE, STATIC_ITERATIONS = 1e-6, 100
-
-
-def run_of(
-    system: StructuralSystem,
-    maneuver: Excitation,
-    accuracy: tuple[float, float],
-    alike: np.ndarray,
-    recorded: bool,
-) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray, int], str]:
-    """A run from the static state, see `StructuralSystem.integrate`, and a remark on its steps.
-
-    The accuracy is a tolerance and a step size in s; unless it is 0, the step size counts and the
-    tolerance does not.  `alike` are numbers (outputs,) of their units.
-    """
-    tolerance, step = accuracy
-    if step:
-        every, remark = max(round(spacing_of(maneuver) / step), 1), ""
-    else:
-        key, known = (maneuver, tolerance), system.steps_of_runs
-        if key not in known:
-            if len(known) >= MOST_RUNS:
-                known.clear()
-            known[key] = steps_between(system, maneuver, tolerance, alike)
-        every, remark = known[key]
-    return first_samples(system, maneuver, every, maneuver.samples, recorded=recorded), remark
 
 
 def first_samples(
@@ -200,6 +175,13 @@ def wrong_matrices(structure: Structure, ports: int, outputs: int) -> str:
 class StructuralModel(Model):
     """A structure whose ports have a compiled law; it starts from its static state alone."""
 
+    loops, reference = STRUCTURAL_LOOPS, (SOLVER, TIGHT)
+
+    def __post_init__(self) -> None:
+        """Wrong matrices raise now; `GeometryError` where it can't stand."""
+        super().__post_init__()
+        _ = self.system
+
     @cached_property
     def system(self) -> StructuralSystem:
         """The matrices about the static state; `InputError` if the declaration makes none."""
@@ -283,8 +265,10 @@ class StructuralModel(Model):
         """
         maneuver = checked_maneuver(maneuver, self.definition)
         names = None if outputs is None else output_names(outputs)
-        chosen = system or self.system, maneuver, (tolerance, step), self._alike, recorded
-        ((histories, states, counts, reason), remark), seconds = timed(lambda: run_of(*chosen))
+        system = system or self.system
+        (every, remark), choosing = timed(lambda: self._steps(system, maneuver, tolerance, step))
+        run = partial(first_samples, system, maneuver, every, maneuver.samples, recorded=recorded)
+        (histories, states, counts, reason), seconds = timed(run)
         times, inputs = maneuver.recorded_inputs
         failure = ""
         if reason:
@@ -302,12 +286,25 @@ class StructuralModel(Model):
             )
             histories[left:] = np.nan
         remarks = wheel_remarks(self.definition, first[len(limited) :], times)
-        run = self.trajectory(times, inputs, histories, counts, seconds, failure)
         further: dict[str, Any] = {"remark": "; ".join(filter(None, (*remarks, remark)))}
         if recorded:
             further["coordinates"] = states
-        run = Trajectory.of(**run.__dict__ | further)
-        return run if names is None else run.chosen(names)
+        results = times, inputs, histories, counts, choosing + seconds, failure
+        trajectory = self.trajectory(*results, **further)
+        return trajectory if names is None else trajectory.chosen(names)
+
+    def _steps(
+        self, system: StructuralSystem, maneuver: Excitation, tolerance: float, step: float
+    ) -> tuple[int, str]:
+        """Steps between output times by a step in s or, if it is 0, a tolerance; and a remark."""
+        if step:
+            return max(round(spacing_of(maneuver) / step), 1), ""
+        key, known = (maneuver, tolerance), system.steps_of_runs
+        if key not in known:
+            if len(known) >= MOST_RUNS:
+                known.clear()
+            known[key] = steps_between(system, maneuver, tolerance, self._alike)
+        return known[key]
 
     def trajectory(
         self,
@@ -317,18 +314,20 @@ class StructuralModel(Model):
         counts: np.ndarray,
         seconds: float,
         failure: str = "",
+        **further: Any,
     ) -> Trajectory:
         """Trajectory of histories of outputs (samples, outputs); it has diverged if it failed."""
-        return Trajectory.of(
-            times=times,
-            inputs=inputs,
-            coordinates=inputs[:, :0],
-            speeds=inputs[:, :0],
-            outputs=outputs,
-            counts=dict(zip(STRUCTURAL_COUNTS, counts.tolist(), strict=True)),
-            seconds=seconds,
-            status="diverged" if failure else "ok",
-            message=failure,
-            names=self.outputs,
-            model=self,
-        )
+        fields = {
+            "times": times,
+            "inputs": inputs,
+            "coordinates": inputs[:, :0],
+            "speeds": inputs[:, :0],
+            "outputs": outputs,
+            "counts": dict(zip(STRUCTURAL_COUNTS, counts.tolist(), strict=True)),
+            "seconds": seconds,
+            "status": "diverged" if failure else "ok",
+            "message": failure,
+            "names": self.outputs,
+            "model": self,
+        }
+        return Trajectory.of(**fields | further)

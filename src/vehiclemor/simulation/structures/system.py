@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -98,24 +98,20 @@ class StructuralSystem:
     structure: Structure
     law: PortLaw
     steps_of_runs: dict[Any, tuple[int, str]] = field(default_factory=dict)
-    _step_matrices: dict[tuple[float, float], Ready] = field(default_factory=dict)
 
     @cached_property
     def order(self) -> np.ndarray:
         """Order (n,) of the coordinates in which factors of the matrices stay sparse."""
-        return ordering(self.structure.mass + self.structure.stiffness)
+        matrix = self.structure.mass + self.structure.stiffness
+        return np.argsort(factored(matrix, "MMD_AT_PLUS_A").perm_c)
 
-    def step_matrices(self, h: float, radius: float = DAMPED) -> Ready:
-        """The structure with a step size in s; its matrix is factored once."""
-        matrices = self._step_matrices.get((h, radius))
-        if matrices is None:
-            # The estimate of an error needs two step sizes.
-            if len(self._step_matrices) > 3:
-                self._step_matrices.pop(next(iter(self._step_matrices)), None)
-            matrices = self._step_matrices[h, radius] = ready(self._prepared(h, radius))
-        return matrices
+    @cached_property
+    def step_matrices(self) -> Callable[[float, float], Ready]:
+        """Step size in s and spectral radius -> the structure, its matrix factored once."""
+        # The estimate of an error needs two step sizes.
+        return lru_cache(maxsize=4)(self._prepared)
 
-    def _prepared(self, h: float, radius: float) -> StepMatrices:
+    def _prepared(self, h: float, radius: float) -> Ready:
         from scipy.sparse import hstack
 
         s, order = self.structure, self.order
@@ -131,7 +127,7 @@ class StructuralSystem:
         response[:, :p] -= response[:, p:] @ (damping @ coupled[p:, :p])
         compliance = weights.after * (coupled[:p, :p] - by_dampers)
         cq, cv, ca, cf = s.outputs
-        return StepMatrices(
+        matrices = StepMatrices(
             mass=columns_of(mass),
             factor=blocks_of(factor.L),
             ports=columns_of(beside),
@@ -149,6 +145,7 @@ class StructuralSystem:
             accelerations=columns_of(ca.tocsc()[:, order].T),
             forces=columns_of(cf.T),
         )
+        return ready(matrices)
 
     def integrate(
         self,
@@ -197,22 +194,13 @@ def columns_of(matrix: Any) -> Columns:
     return Columns(pieces, table.ravel().astype(np.int64), values)
 
 
-def ordering(matrix: Any) -> np.ndarray:
-    """Order (n,) of rows and columns in which the factors of a matrix stay sparse."""
-    return np.argsort(factored(matrix, "MMD_AT_PLUS_A").perm_c)
-
-
 def factored(matrix: Any, order: str = "NATURAL") -> Any:
     """Factors L (D L') of a symmetric matrix, without pivoting; `GeometryError` if it has none."""
     from scipy.sparse.linalg import splu
 
     try:
-        return splu(
-            matrix.tocsc(),
-            permc_spec=order,
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        symmetric = {"SymmetricMode": True}
+        return splu(matrix.tocsc(), permc_spec=order, diag_pivot_thresh=0.0, options=symmetric)
     except RuntimeError as error:
         raise GeometryError(f"the matrices of the structure are singular ({error})") from None
 

@@ -147,8 +147,8 @@ def test_the_calls_that_are_counted_are_those_that_are_made(solver):
     system.workspace(corners, *how)
     made.clear()
     run = system.run(corners, np.array([1.0, 0.0]), *how)
-    np.testing.assert_allclose(run.path[:, 0], np.cos(run.times), atol=5e-3)
-    assert len(made) == run.counts[0] > 50
+    np.testing.assert_allclose(run.path[:, 0], np.cos(run.output.samples), atol=5e-3)
+    assert len(made) == run.output.counts[0] > 50
 
 
 def test_calls_are_limited_in_each_second_however_long_the_run(monkeypatch):
@@ -170,7 +170,7 @@ def test_calls_are_limited_in_each_second_however_long_the_run(monkeypatch):
     run = system.run(late, np.array([1.0, 0.0]), *how)
     catalogue.control_of.cache_clear()
     assert run.failure.endswith("at t = 60 s")
-    assert len(calls_until_stiff) > 2000 > 3 * (run.counts[0] - len(calls_until_stiff))
+    assert len(calls_until_stiff) > 2000 > 3 * (run.output.counts[0] - len(calls_until_stiff))
 
 
 # Windows

@@ -83,14 +83,8 @@ def guarded(call: Prepared, name: str, dimensions: int, dtype: type) -> np.ndarr
 def check(system: System, inputs: int, windows: ControlPeriods, solver: str) -> None:
     space = system.workspace(steered(inputs), windows, Solver(solver, 1e-5))
     space.memory.start[:] = np.linspace(1.0, 2.0, len(system.reference))
-    arrays = [
-        guarded(space.call, name, dimensions, dtype)
-        for name, dimensions, dtype in (
-            ("memory.buffer", 1, float),
-            ("memory.integers", 1, int),
-            ("output.states", 2, float),
-        )
-    ]
+    kinds = ("memory.buffer", 1, float), ("memory.integers", 1, int), ("output.states", 2, float)
+    arrays = [guarded(space.call, *kind) for kind in kinds]
     assert space.call() == 0
     path = arrays[-1][GUARD:-GUARD]
     assert np.isfinite(path).all()
