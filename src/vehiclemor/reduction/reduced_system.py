@@ -78,25 +78,22 @@ class ReducedSystem(SteppedSystem, ShortRepr):
 
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
         """State (dim,) of a start, as `simulate` begins with it: in the first window's subspace."""
-        return self.projected(self.known(start, inputs), inputs).copy()
+        return self.projected(self.known(start, inputs)[1], inputs).copy()
 
-    def known(self, start: Start, inputs: np.ndarray) -> Any:
-        """What `prepared` gives of a start at inputs; cached by its name or its numbers."""
+    def known(self, start: Start, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Full and reduced state of a start at inputs; cached by its name or its numbers."""
         name = start if isinstance(start, str) else self.model.start(start).tobytes()
         key = name, inputs.tobytes()
-        prepared = self._starts.get(key)
-        if prepared is None:
+        states = self._starts.get(key)
+        if states is None:
             if len(self._starts) >= MOST_STARTS:
                 self._starts.clear()
-            prepared = self._starts[key] = self.prepared(self.model.start(start), inputs)
-        return prepared
-
-    def prepared(self, state: np.ndarray, inputs: np.ndarray) -> Any:
-        """What runs from a full state (2 n,) need of it: the state that is stepped."""
-        return self.encode(state, inputs)
+            state = self.model.start(start)
+            states = self._starts[key] = state, self.encode(state, inputs)
+        return states
 
     @cached_property
-    def _starts(self) -> dict[tuple[str | bytes, bytes], Any]:
+    def _starts(self) -> dict[tuple[str | bytes, bytes], tuple[np.ndarray, np.ndarray]]:
         return {}
 
     def sensitivities(
@@ -134,7 +131,7 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         """Integrate, then decode to full states at the maneuver's output times."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
         inputs = maneuver.recorded_inputs[1]
-        run = self.run(maneuver, self.known(start, inputs[0]))
+        run = self.run(maneuver, self.known(start, inputs[0])[1])
         states = self.decode(run.recorded_states, inputs)
         trajectory = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)
         run.give_back()

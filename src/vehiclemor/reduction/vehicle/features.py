@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, reduce
 from operator import mul
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from vehiclemor.codegen.operations import (
     padded,
     pruned,
 )
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.evaluation import at_samples
 from vehiclemor.simulation.system import System
 
@@ -141,15 +142,6 @@ def product(factors: Term) -> Value:
     return reduce(mul, factors)
 
 
-class Layout(NamedTuple):
-    """Indices in a vehicle's states: of its shape, of position and heading, of pairs that turn."""
-
-    size: int
-    shape: Sequence[int]
-    planar: Sequence[int]
-    pairs: Sequence[tuple[int, int]]
-
-
 def _listed(features: Features) -> tuple[Listing, list[Value]]:
     """Operations of features for a kernel, and the features."""
     listing = Listing()
@@ -181,26 +173,26 @@ def rates_kernel(features: Features, parameters: int) -> Kernel:
     return listing.kernel("derivative", ARGUMENTS)
 
 
-def decoding_kernel(features: Features, layout: Layout, parameters: int) -> Kernel:
+def decoding_kernel(features: Features, shape: VehicleShape, parameters: int) -> Kernel:
     """What gives full states, and after them what is watched.
 
     Constants are the features' parameters, then rows of coefficients: of the terms, and of the
     shape at straight running.
     """
-    k = features.states
+    k, size = features.states, len(shape.model.definition.states)
     listing, factors = _listed(features)
     factors.append(listing.number(1.0))
-    values = listing.sums("_constants", parameters, len(layout.shape), factors)
-    shape = dict(zip(layout.shape, values, strict=True))
+    values = listing.sums("_constants", parameters, len(shape.indices), factors)
+    parts = dict(zip(shape.indices.tolist(), values, strict=True))
     sine, cosine = listing.parts(listing.new("sincos", listing.entry("_x", k)), 2)
-    results: dict[int, Value | float] = dict.fromkeys(range(layout.size), 0.0) | shape
-    for index, i in zip(layout.planar, (k + 1, k + 2, k), strict=True):
+    results: dict[int, Value | float] = dict.fromkeys(range(size), 0.0) | parts
+    for index, i in zip(shape.model.planar.tolist(), (k + 1, k + 2, k), strict=True):
         results[index] = listing.entry("_x", i)
-    for a, b in layout.pairs:
-        results[a] = cosine * shape[a] - sine * shape[b]
-        results[b] = sine * shape[a] + cosine * shape[b]
+    for a, b in shape.pairs:
+        results[a] = cosine * parts[a] - sine * parts[b]
+        results[b] = sine * parts[a] + cosine * parts[b]
     watched = (Value(listing, number) for number, _ in features.watched)
-    results |= enumerate(watched, layout.size)
+    results |= enumerate(watched, size)
     for index, value in results.items():
         listing.store(index, value)
     return listing.kernel("full_state", ARGUMENTS)
@@ -234,12 +226,11 @@ def feature_system(
     parameters: np.ndarray,
     coefficients: np.ndarray,
     error_scale: np.ndarray,
-    reference: np.ndarray,
-    reference_inputs: np.ndarray,
+    inputs_at_rest: np.ndarray,
 ) -> System:
-    """The reduced vehicle as the compiled loops take it, see `ReducedVehicle`.
+    """The reduced vehicle as the compiled loops take it, its Jacobian frozen at straight running.
 
-    The Jacobian is frozen at the reference (states,) and its inputs (inputs,).
+    Arrays are those of `ReducedVehicle`.
     """
     blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in features.blocks]
     for block, (terms, columns) in zip(blocks, features.blocks, strict=True):
@@ -250,9 +241,9 @@ def feature_system(
         _kernels(features, len(parameters)),
         constants,
         features.inputs,
-        np.concatenate([reference, np.zeros(PLANAR)]),
+        np.zeros(dim),
         error_scale,
         np.arange(dim - 2),
         np.zeros(0, dtype=np.int64),
-        reference_inputs=reference_inputs,
+        reference_inputs=inputs_at_rest,
     )

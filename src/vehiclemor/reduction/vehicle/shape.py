@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vehiclemor.multibody.quantities import WHEELS
-from vehiclemor.reduction.vehicle.features import Layout
 from vehiclemor.reduction.vehicle.vehicle_inputs import VehicleInputs, unknown_input
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators.step_kernels import partners
@@ -104,12 +103,6 @@ class VehicleShape:
     def speed(self) -> float:
         """Speed of straight running in m/s."""
         return float(self.rates(self.reference[None], self.model.inputs_at_rest[None])[1][0, 1])
-
-    @property
-    def layout(self) -> Layout:
-        """Where the shape stands in the states."""
-        size = len(self.model.definition.states)
-        return Layout(size, self.indices.tolist(), self.model.planar.tolist(), self.pairs)
 
     def of(self, states: np.ndarray) -> np.ndarray:
         """Shapes (samples, n) of states (samples, 2 n)."""
