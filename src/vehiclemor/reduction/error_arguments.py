@@ -7,7 +7,7 @@ columns up to a multiple of the lanes, filled up with zeros.
 
 from typing import NamedTuple
 
-from vehiclemor.codegen.loop_types import Float, Int, IntMatrix, IntVector, Matrix, Vector
+from vehiclemor.codegen.loop_types import Float, IntMatrix, IntVector, Matrix, Vector
 from vehiclemor.simulation.loop_arguments import Outputs
 
 # Rows of the weights of a step, real and imaginary parts by mode: of the error before it, of what
@@ -87,17 +87,6 @@ class Violated(NamedTuple):
     shapes: Matrix
     slopes: Matrix
     motion: Vector
-
-
-class Passes(NamedTuple):
-    """Passes that are made of a window at most, and the change that ends them.
-
-    Changes of the shape are measured in the ranges of its coordinates, at least in `least`.
-    """
-
-    most: Int
-    settled: Float
-    least: Float
 
 
 class Scratch(NamedTuple):

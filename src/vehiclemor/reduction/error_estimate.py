@@ -145,16 +145,6 @@ def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBo
     return checked
 
 
-def judged_run(
-    simulate: Callable[[Excitation, Start], Trajectory],
-    maneuver: Excitation,
-    start: Start,
-    bounds: Mapping[str, ErrorBound] | None = None,
-) -> Trajectory:
-    """A run of a reduced model, judged by its estimated error in bounds, see `judged`."""
-    return judged(simulate(maneuver, start), simulate, (maneuver, start), bounds)
-
-
 def judged(
     run: Trajectory,
     simulate: Callable[[Excitation, Start], Trajectory],
@@ -261,8 +251,9 @@ def error_estimate(
         of_errors, step = error_model(model, states, float(times[-1])), float(times[1] - times[0])
         first = model.start(start)
         corrected = of_errors.corrected(step, states, inputs, first, passes, bounds)
-    errors = partial(_errors_of_states, model, inputs, states, corrected.states)
-    return ErrorEstimate(times, model, errors, bounds, *corrected[1:])
+    corrected_states, in_bounds, is_settled = corrected
+    errors = partial(_errors_of_states, model, inputs, states, corrected_states)
+    return ErrorEstimate(times, model, errors, bounds, in_bounds, is_settled)
 
 
 def _averaged_jumps(maneuver: Excitation, times: np.ndarray, inputs: np.ndarray) -> np.ndarray:

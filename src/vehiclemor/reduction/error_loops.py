@@ -5,7 +5,7 @@ What goes through it, and how it is laid out, see `error_arguments`.
 
 import math
 
-from vehiclemor.codegen.loop_types import Int, call_lanes, rows_product
+from vehiclemor.codegen.loop_types import Float, Int, call_lanes, rows_product
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.reduction.error_arguments import (
     BEGIN,
@@ -14,7 +14,6 @@ from vehiclemor.reduction.error_arguments import (
     RATES,
     Bounded,
     ModesOfErrors,
-    Passes,
     Path,
     Scratch,
     Shape,
@@ -31,6 +30,8 @@ INLINED = (
 DISJOINT = "step_real_parts", "step_pairs"
 # A change that is larger has gone to infinity, as one that is no number has.
 LARGEST = 1e9
+# Least range of a coordinate of the shape, in which changes are measured (m, rad, m/s, rad/s).
+LEAST_RANGE = 1e-3
 
 
 def corrected_run(
@@ -38,22 +39,24 @@ def corrected_run(
     violated: Violated,
     shape: Shape,
     modes: ModesOfErrors,
-    passes: Passes,
+    most: Int,
+    settled: Float,
     scratch: Scratch,
     bounded: Bounded,
 ) -> Int:
     """Correct states of a run, and write the errors of its bounded outputs.
 
-    Returned is the number of windows that were not settled, or minus one if a correction has gone
-    to infinity.
+    At most so many passes are made of a window; a change that is smaller than the settled one, in
+    ranges of the coordinates, ends them.  Returned is the number of windows that were not settled,
+    or minus one if a correction has gone to infinity.
     """
-    begin_with(path, violated, shape, modes, passes, scratch)
+    begin_with(path, violated, shape, modes, scratch)
     nodes, unsettled = len(path.run), 0
     for first in range(0, nodes, LANES):
         end = min(first + LANES, nodes)
         guess(first, end, modes, scratch)
         change, expected = 0.0, LARGEST
-        for _ in range(passes.most):
+        for _ in range(most):
             full_rates(first, end, shape, violated, scratch)
             modal_sources(first, modes, scratch)
             before = change
@@ -64,9 +67,9 @@ def corrected_run(
                 return -1
             # The next change, if each is smaller than the one before by the same factor.
             expected = change * change / before if change < before else change
-            if expected < passes.settled:
+            if expected < settled:
                 break
-        if expected >= passes.settled:
+        if expected >= settled:
             unsettled += 1
     place(path, shape, scratch)
     judge(path, bounded)
@@ -92,7 +95,7 @@ def judge(path, bounded):
         bounded.errors[k] = size / bounded.bounds[k] if squares < math.inf else math.inf
 
 
-def begin_with(path, violated, shape, modes, passes, scratch):
+def begin_with(path, violated, shape, modes, scratch):
     """Shapes of a run and their slopes, the error at the start, and ranges."""
     run, inputs = path.run, path.inputs
     shapes, scale, moved = scratch.shapes, scratch.scale, scratch.moved[0]
@@ -114,7 +117,7 @@ def begin_with(path, violated, shape, modes, passes, scratch):
             scale[j] = max(scale[j], shapes[i, j])
             moved[j] = min(moved[j], shapes[i, j])
     for j in range(n):
-        scale[j] = 1.0 / max(scale[j] - moved[j], passes.least)
+        scale[j] = 1.0 / max(scale[j] - moved[j], LEAST_RANGE)
     slopes(shapes[:nodes], path.step, scratch.slopes)
     for i in range(len(violated.shapes)):
         for j in range(n):

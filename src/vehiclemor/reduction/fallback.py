@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
-from vehiclemor.reduction.error_estimate import estimates, judged_run
+from vehiclemor.reduction.error_estimate import estimates, judged
 from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
@@ -68,7 +68,8 @@ class FallbackModel(ShortRepr):
 
         It is judged by its estimated error in bounds, those of the model by default.
         """
-        run = judged_run(self.reduced.simulate, maneuver, start, bounds)
+        run = self.reduced.simulate(maneuver, start)
+        run = judged(run, self.reduced.simulate, (maneuver, start), bounds)
         if outputs is not None:
             run = run.chosen(outputs)
         if run.status in WITHOUT_COMPLAINT and run.trust and np.isinf(run.trust.until):
@@ -110,7 +111,7 @@ def run_of(
         return reduced.simulate(*given, outputs, bounds)
     if off:
         return simulated(getattr(reduced, "reduced", reduced), *given, outputs)
-    run = judged_run(reduced.simulate, *given, bounds)
+    run = judged(reduced.simulate(*given), reduced.simulate, given, bounds)
     if run.trust is None and run.finished and estimates(run.model):
         # It is too short, or nothing is bounded.
         remark = "; ".join(filter(None, (run.remark, NOT_ESTIMATED)))

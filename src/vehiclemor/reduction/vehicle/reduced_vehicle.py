@@ -186,11 +186,8 @@ class ReducedVehicle(ReducedSystem):
         turn, forward, left = self.settling @ (self.shape.of(state[None]) - decoded)[0]
         heading = path[0, -PLANAR]
         cosine, sine = np.cos(heading), np.sin(heading)
-        path[0, -PLANAR:] += (
-            turn,
-            forward * cosine - left * sine,
-            forward * sine + left * cosine,
-        )
+        way = forward * cosine - left * sine, forward * sine + left * cosine
+        path[0, -PLANAR:] += turn, *way
         return path[0]
 
     def encoded_path(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
