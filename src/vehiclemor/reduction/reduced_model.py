@@ -139,7 +139,7 @@ class ReducedOrderModel(ShortRepr):
         own = None if bounds is None else self.checked_bounds(bounds, off)
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
-            run = run_of(self.reduced, (chosen, first), names, own, off or self._own_limits)
+            run = run_of(self.reduced, (chosen, first), names, own, off or self._method.own_limits)
         # A copy would take a twentieth of a short run.
         run.__dict__.update(method=self.method, maneuver=chosen.name)
         remarks = run.remark, self._lower_rank, NOT_ESTIMATED if off else ""
@@ -152,7 +152,7 @@ class ReducedOrderModel(ShortRepr):
         """Bounds of `simulate` by output; `InputError` if one is wrong, or none can be judged."""
         if off:
             raise InputError("bounds: runs with trust='off' are not judged")
-        if self._own_limits:
+        if self._method.own_limits:
             raise InputError(f"bounds: errors of these runs by {self.method} are not estimated")
         return checked_bounds(self.model, bounds)
 
@@ -171,19 +171,19 @@ class ReducedOrderModel(ShortRepr):
         """
         from vehiclemor.simulation.build import reparametrised
 
-        model, method = reparametrised(self.model, parameters), component("method", self.method)
-        settings = validated(method, self.model.kind, self.settings)
-        return replace(self, model=model, reduced=for_model(method, self.reduced, model, settings))
+        model = reparametrised(self.model, parameters)
+        settings = validated(self._method, model.kind, self.settings)
+        reduced = for_model(self._method, self.reduced, model, settings)
+        return replace(self, model=model, reduced=reduced)
 
     @cached_property
-    def _own_limits(self) -> bool:
-        return component("method", self.method).own_limits
+    def _method(self) -> Method:
+        return component("method", self.method)
 
     @cached_property
     def _range(self) -> InputRange | None:
         """Known inputs, if the method does not judge its runs."""
-        method: Method = component("method", self.method)
-        return method.known_range(self.model, self.settings, lambda: self.input_range)
+        return self._method.known_range(self.model, self.settings, lambda: self.input_range)
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""

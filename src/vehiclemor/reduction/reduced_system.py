@@ -31,7 +31,22 @@ from vehiclemor.simulation.workspaces import Run, Solver
 MOST_STARTS = 64
 
 
-class ReducedSystem(SteppedSystem, ShortRepr):
+class SteppedModel(ShortRepr):
+    """What systems and mechanisms share whose states are those of the model."""
+
+    def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Full states (samples, n) of states (samples, dim) at inputs (samples, inputs)."""
+        del inputs
+        return states
+
+    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
+        """How far states (samples, dim) go in what the model knows, if it judges itself."""
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """There is no subspace."""
+
+
+class ReducedSystem(SteppedSystem, SteppedModel):
     """Base of systems in reduced states of a full-order model, with the ways there and back.
 
     A subclass is a dataclass that has the attributes below, as fields or cached properties, and
@@ -61,20 +76,11 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         del inputs
         return state
 
-    def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Full states (samples, 2 n) of states (samples, dim) at inputs (samples, inputs)."""
-        del inputs
-        return states
-
     def decoder_slopes(
         self, state: np.ndarray, inputs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the full state (2 n, dim) and (2 n, inputs) by state and inputs."""
         return np.eye(len(state)), np.zeros((len(state), len(inputs)))
-
-    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
-        """How far states (samples, dim) go in what the model knows, if it judges itself."""
-        del states, inputs
 
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
         """State (dim,) of a start, as `simulate` begins with it: in the first window's subspace."""
@@ -137,12 +143,8 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         run.give_back()
         return trajectory
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """There is no subspace."""
-        del states
 
-
-class ReducedMechanism(ShortRepr):
+class ReducedMechanism(SteppedModel):
     """Base of kinematic models: the coordinates, which are the states, follow from the inputs.
 
     A subclass is a dataclass that has `order`, `offline` and `simulate` too.
@@ -196,16 +198,3 @@ class ReducedMechanism(ShortRepr):
         if of == "rhs":
             self.rates(state, inputs, time)
         return self.slopes(state, inputs, by, of)
-
-    def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """The coordinates themselves."""
-        del inputs
-        return states
-
-    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
-        """How far the inputs go in what the model knows, if it judges itself."""
-        del states, inputs
-
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """There is no subspace."""
-        del states
