@@ -77,19 +77,9 @@ class ErrorEstimate(ShortRepr):
         return self.errors_of((name,))[:, 0]
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Of the outputs."""
-        return self.model.outputs
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Of the outputs."""
-        return tuple(quantity.unit for quantity in self.model.definition.outputs)
-
-    @property
     def errors(self) -> np.ndarray:
         """In the units of the outputs (nodes, outputs); infinite if too large to be known."""
-        return self.errors_of(self.names)
+        return self.errors_of(self.model.outputs)
 
     @property
     def used(self) -> dict[str, np.ndarray]:
@@ -106,7 +96,8 @@ class ErrorEstimate(ShortRepr):
         first = min(part.searchsorted(1.0 / RESERVE, "right") for part in used.values())
         until = float(self.times[min(first, len(self.times) - 1)])
         worst = max(used, key=lambda name: used[name][-1])
-        bound, unit = self.bounds[worst], self.units[self.names.index(worst)]
+        bound, outputs = self.bounds[worst], self.model.definition.outputs
+        unit = outputs[self.model.outputs.index(worst)].unit
         error, rms = used[worst][-1] * bound.bound, " RMS" if bound.measure == "rms" else ""
         size = "too large to be known" if np.isinf(error) else f"{error:.3g} {unit}{rms}"
         reason = (

@@ -98,16 +98,20 @@ class Parts:
             value = self._full[part[REFERENCE]]
         elif ARRAY in part:
             value = self._read_array(part, path)
-        elif CLASS in part:
-            fields = {name: inner for name, inner in part.items() if name != CLASS}
-            value = self._read_record(named(part[CLASS]), fields, path)
         elif OPERATIONS in choices:
             value = of_arrays(*(self._read_array(part[n], f"{path}.{n}") for n in OPERATION_ARRAYS))
-        elif record := _record(declared):
-            value = self._read_record(record, part, path)
         else:
-            of = _value_type(_chosen(choices, dict, path))
-            value = self._read_fields(part, path, dict.fromkeys(part, of))
+            kind = named(part[CLASS]) if CLASS in part else _record(declared)
+            inner = {name: value for name, value in part.items() if name != CLASS}
+            if kind is None:
+                types = dict.fromkeys(inner, _value_type(_chosen(choices, dict, path)))
+            else:
+                types = _fields(kind)
+            fields = {n: self.read(part, f"{path}.{n}", types[n]) for n, part in inner.items()}
+            value: Any = fields if kind is None else kind(**fields)
+            # A plug-in's class may derive from one of this package.
+            if hasattr(value, "check_sizes"):
+                value.check_sizes()
         _chosen(choices, type(value), path)
         return value
 
@@ -116,18 +120,6 @@ class Parts:
         types = _item_types(_chosen(choices, kind, path), len(part))
         items = enumerate(zip(part, types, strict=True))
         return kind(self.read(item, f"{path}.{i}", of) for i, (item, of) in items)
-
-    def _read_fields(
-        self, parts: Mapping[str, Any], path: str, types: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        return {n: self.read(part, f"{path}.{n}", types[n]) for n, part in parts.items()}
-
-    def _read_record(self, kind: Any, parts: Mapping[str, Any], path: str) -> Any:
-        record = kind(**self._read_fields(parts, path, _fields(kind)))
-        # A plug-in's class may derive from one of this package.
-        if hasattr(record, "check_sizes"):
-            record.check_sizes()
-        return record
 
     def _read_array(self, part: Mapping[str, Any], path: str) -> np.ndarray:
         kind = part[ARRAY]

@@ -48,19 +48,6 @@ class Tire:
     static: float
 
 
-@dataclass(frozen=True)
-class WheelState:
-    """Tangent of the slip angle, load and, with torques, longitudinal force in N.
-
-    Friction where it is not 1.
-    """
-
-    slip: Value
-    load: Value
-    thrust: Value | None
-    friction: Value | None
-
-
 def add_axles(
     features: SlowFeatures, model: DynamicModel, samples: ShapeSamples, z: np.ndarray
 ) -> None:
@@ -132,10 +119,8 @@ def _add_powers(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence
 def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[str]) -> None:
     """Forces of both tires of an axle by their own law."""
     features = fit.features
-    slips, loads = (
-        np.tan(fit.outputs(model, "slip_angle", wheels)),
-        fit.outputs(model, "Fz", wheels),
-    )
+    slips = np.tan(fit.outputs(model, "slip_angle", wheels))
+    loads = fit.outputs(model, "Fz", wheels)
     small, curved = fit.parts(slips @ MEAN, fit.odd)
     slip, slip_half = features.let(small + curved), fit(slips @ HALF, fit.turning)
     load, load_half = fit(loads @ MEAN, fit.even), fit(loads @ HALF, fit.odd)
@@ -145,14 +130,10 @@ def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[
         values = fit.outputs(model, "Fx", wheels)
         thrust, thrust_half = fit(values @ MEAN, fit.driven), fit(values @ HALF, fit.odd)
         thrusts = [thrust + thrust_half, thrust - thrust_half]
-    grips_of = [features.friction(wheel) for wheel in wheels]
     sides = (slip + slip_half, load + load_half), (slip - slip_half, load - load_half)
-    states = [
-        WheelState(*side, thrust, grip)
-        for side, thrust, grip in zip(sides, thrusts, grips_of, strict=True)
-    ]
     left, right = (
-        add_fiala(features, wheel, state, tire) for wheel, state in zip(wheels, states, strict=True)
+        add_fiala(features, tire, wheel, *side, thrust)
+        for wheel, side, thrust in zip(wheels, sides, thrusts, strict=True)
     )
     for kind, one, other in zip(FORCES, left, right, strict=False):
         features.line(f"{kind}{axle}", one + other)
@@ -164,26 +145,27 @@ def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[
 
 
 def add_fiala(
-    features: SlowFeatures, wheel: str, state: WheelState, tire: Tire
+    features: SlowFeatures, tire: Tire, wheel: str, slip: Value, load: Value, thrust: Value | None
 ) -> tuple[Value, Value, Value]:
     """Lateral force and aligning moment of a wheel, and its part that slides.
 
-    Forces as parts of the static load, moments as parts of it times the width.  Without torques it
-    is Fiala's law at free rolling, else the brush model, at the slip ratio that its longitudinal
+    Given are the tangent of the slip angle, the load and, with torques, the longitudinal force in
+    N.  Forces are parts of the static load, moments parts of it times the width.  Without torques
+    it is Fiala's law at free rolling, else the brush model, at the slip ratio that its longitudinal
     force needs.
     """
     values, parameter, let = tire.values, features.parameter, features.let
-    slip, load, least = let(state.slip), let(state.load), parameter(LEAST_LOAD * tire.static)
-    load = let(0.5 * (load + least + abs(load - least)))
-    grip = load if state.friction is None else let(load * state.friction)
+    slip, load, least = let(slip), let(load), parameter(LEAST_LOAD * tire.static)
+    load, friction = let(0.5 * (load + least + abs(load - least))), features.friction(wheel)
+    grip = load if friction is None else let(load * friction)
     most = parameter(values["largest_friction"])
     fall = parameter(values["largest_friction"] - values["smallest_friction"])
     across, deflection = let(parameter(values["cornering_stiffness"] / 3.0) * slip), None
-    if state.thrust is None:
+    if thrust is None:
         limit = let(grip * (most - fall * abs(slip)))
         raw = let(across / limit)
     else:
-        thrust, per_slip = let(state.thrust), values["longitudinal_slip_stiffness"] / 3.0
+        thrust, per_slip = let(thrust), values["longitudinal_slip_stiffness"] / 3.0
 
         def friction_force(along: Value) -> Value:
             ratio = let(parameter(1.0 / per_slip) * along)
