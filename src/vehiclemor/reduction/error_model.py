@@ -197,9 +197,7 @@ class ErrorModel:
         model, count = self.shape.model, len(self.free.correction)
         if not count:
             return
-        at_first = np.empty(model.equations.shapes["violations"])
-        model.kernels.call("violations", start, inputs, model.constants, at_first)
-        at_first = at_first.ravel()
+        at_first = model.evaluated("violations", start, inputs).ravel()
         if np.abs(at_first).max() < HELD:
             for array in violated:
                 array[:] = 0.0

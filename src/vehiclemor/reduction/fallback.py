@@ -14,7 +14,7 @@ from vehiclemor.arguments import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction.error_estimate import estimates, judged
-from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
+from vehiclemor.reduction.interface import MEMBERS, FittedModel, simulated
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
 from vehiclemor.registry import component
@@ -22,8 +22,11 @@ from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
 NOT_ESTIMATED = "its error was not estimated"
-# What users step and ask is the reduced model.
-STEPPED = ("states", "begin", "step", "rates", "sensitivities", "decode", "trust")
+# What is that of the reduced model: users step and ask this one.
+REDUCED = (
+    *("offline", "order", "best_approximation"),
+    *("states", "begin", "step", "rates", "sensitivities", "decode", "trust"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,23 +42,9 @@ class FallbackModel(ShortRepr):
             require(hasattr(self.reduced, name), name)
 
     def __getattr__(self, name: str) -> Any:
-        if name not in STEPPED:
+        if name not in REDUCED:
             raise AttributeError(f"a model with fallback has no {name}")
         return getattr(self.reduced, name)
-
-    @property
-    def offline(self) -> OfflineCost:
-        """Cost of the reduced model."""
-        return self.reduced.offline
-
-    @property
-    def order(self) -> int:
-        """Order of the reduced model."""
-        return self.reduced.order
-
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """Best approximation of the reduced model."""
-        return self.reduced.best_approximation(states)
 
     def simulate(
         self,
@@ -88,7 +77,7 @@ class FallbackModel(ShortRepr):
         )
 
 
-def with_fallback(reduced: FittedModel, model: Any, settings: Any) -> FittedModel:
+def with_fallback(reduced: FittedModel, model: Any, settings: Any) -> Any:
     """A reduced model with the fallback that its settings name, if they name one."""
     if not isinstance(settings, FallbackSettings) or settings.fallback == "none":
         return reduced
@@ -107,10 +96,12 @@ def run_of(
     off: bool,
 ) -> Trajectory:
     """A run of a reduced model with some outputs alone; its error is estimated unless it is off."""
-    if isinstance(reduced, FallbackModel) and not off:
-        return reduced.simulate(*given, outputs, bounds)
+    if isinstance(reduced, FallbackModel):
+        if not off:
+            return reduced.simulate(*given, outputs, bounds)
+        reduced = reduced.reduced
     if off:
-        return simulated(getattr(reduced, "reduced", reduced), *given, outputs)
+        return simulated(reduced, *given, outputs)
     run = judged(reduced.simulate(*given), reduced.simulate, given, bounds)
     if run.trust is None and run.finished and estimates(run.model):
         # It is too short, or nothing is bounded.

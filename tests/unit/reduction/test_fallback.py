@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vehiclemor.reduction.fallback import FallbackModel
+from vehiclemor.reduction.fallback import FallbackModel, run_of
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods.full_order import FullOrderSystem
 from vehiclemor.reduction.validation import fitted, validated
@@ -76,6 +76,18 @@ def test_a_reduced_run_that_fails_without_a_warning_is_trusted_nowhere():
     run = guarded(LeavesAt(3.0, status="diverged", told=False)).simulate(STEER, "dropped")
     np.testing.assert_array_equal(run.outputs, whole().outputs)
     assert run.remark.startswith("full_order did the run: why, from t = 0 s on")
+
+
+@dataclass(frozen=True)
+class Holder(LeavesAt):
+    """A model of a plug-in with a field that is called as that of a model with fallback."""
+
+    reduced: str = "something else"
+
+
+def test_a_run_that_is_not_judged_is_that_of_the_model_itself():
+    run = run_of(Holder(np.inf, "ok"), (STEER, "dropped"), None, None, off=True)
+    np.testing.assert_array_equal(run.outputs, whole().outputs)
 
 
 def test_settings_reach_both_models():

@@ -57,7 +57,7 @@ class Features:
     operations: tuple[Operation, ...]
     named: tuple[int, ...]  # Numbers of the operations with names, see `operations`.
     terms: tuple[int, ...]  # Number of the operation that gives each feature.
-    # (numbers of features, columns of C) of each block of C that is not zero; all if empty.
+    # (numbers of features, columns of C) of each block of C that is not zero.
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
     # (operation, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
     # the training range.
@@ -66,12 +66,6 @@ class Features:
     def check_sizes(self) -> None:
         """Raise `ValueError` if the operations are more than arithmetic of what they are given."""
         needed_parameters(self)
-
-    @property
-    def blocks(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
-        """Blocks of C: numbers of features, columns."""
-        everything = tuple(range(len(self.terms))), tuple(range(self.states + PLANAR))
-        return self.groups or (everything,)
 
 
 @lru_cache(maxsize=64)
@@ -93,7 +87,7 @@ def needed_parameters(features: Features) -> int:
     calls = sum(op.kind in (*FUNCTIONS, "atan2", "power") for op in operations)
     total = len(operations) + CALL * calls
     require(len(features.groups) <= columns, "groups")
-    for terms, targets in features.blocks:
+    for terms, targets in features.groups:
         check_distinct_indices("groups", terms, len(features.terms))
         check_distinct_indices("groups", targets, columns)
         require(bool(terms and targets), "groups")
@@ -155,7 +149,7 @@ def rates_kernel(features: Features, parameters: int) -> Kernel:
     k, first = features.states, parameters
     listing, values = _listed(features)
     sums: dict[int, list[Value]] = {}
-    for terms, columns in features.blocks:
+    for terms, columns in features.groups:
         parts = listing.sums("_constants", first, len(columns), [values[j] for j in terms])
         first += len(terms) * padded(len(columns))
         for i, part in zip(columns, parts, strict=True):
@@ -232,8 +226,8 @@ def feature_system(
 
     Arrays are those of `ReducedVehicle`.
     """
-    blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in features.blocks]
-    for block, (terms, columns) in zip(blocks, features.blocks, strict=True):
+    blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in features.groups]
+    for block, (terms, columns) in zip(blocks, features.groups, strict=True):
         block[:, : len(columns)] = coefficients[np.ix_(terms, columns)]
     constants = np.concatenate([parameters, *(block.ravel() for block in blocks)])
     dim = features.states + PLANAR

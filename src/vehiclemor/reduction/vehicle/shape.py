@@ -83,11 +83,6 @@ class VehicleShape:
         return VehicleInputs(self.model.inputs)
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Names of the shape's states."""
-        return tuple(self.model.definition.states[i] for i in self.indices)
-
-    @cached_property
     def pairs(self) -> list[tuple[int, int]]:
         """Indices of pairs of states, other than the position, that are components in space."""
         turning, planar = self.model.rotating, set(self.model.planar)
@@ -164,7 +159,7 @@ class VehicleShape:
             parts.append(linear.a @ parts[-1])
         moved = np.hstack(parts)
         moved /= np.abs(moved).max(axis=0)
-        partner = partners(self.names)
+        partner = partners(tuple(self.model.definition.states[i] for i in self.indices))
         matrix = np.zeros((len(partner), len(partner)))
         for i, j in enumerate(partner):
             still = i == j and np.abs(moved[i]).max() <= STILL
