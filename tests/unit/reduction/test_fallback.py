@@ -28,6 +28,7 @@ class LeavesAt:
     told: bool = True
     offline: OfflineCost = field(default_factory=OfflineCost)
     order: int = 0
+    reduced: str = "called as that of a model with fallback"
 
     def simulate(self, *_):
         full = whole()
@@ -70,24 +71,13 @@ def test_a_trusted_run_is_the_reduced_one():
     run, own = guarded(reduced).simulate(STEER, "dropped"), reduced.simulate()
     assert (run.status, run.remark) == ("ok", own.remark)
     np.testing.assert_array_equal(run.outputs, own.outputs)
+    assert run_of(reduced, (STEER, "dropped"), None, None, off=True).status == "ok"
 
 
 def test_a_reduced_run_that_fails_without_a_warning_is_trusted_nowhere():
     run = guarded(LeavesAt(3.0, status="diverged", told=False)).simulate(STEER, "dropped")
     np.testing.assert_array_equal(run.outputs, whole().outputs)
     assert run.remark.startswith("full_order did the run: why, from t = 0 s on")
-
-
-@dataclass(frozen=True)
-class Holder(LeavesAt):
-    """A model of a plug-in with a field that is called as that of a model with fallback."""
-
-    reduced: str = "something else"
-
-
-def test_a_run_that_is_not_judged_is_that_of_the_model_itself():
-    run = run_of(Holder(np.inf, "ok"), (STEER, "dropped"), None, None, off=True)
-    np.testing.assert_array_equal(run.outputs, whole().outputs)
 
 
 def test_settings_reach_both_models():

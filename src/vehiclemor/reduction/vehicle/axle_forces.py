@@ -8,7 +8,6 @@ acts by similarity: what counts is a slip, or a torque, over the friction.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from operator import add
 
@@ -38,14 +37,6 @@ SATURATION = 1.2
 # Least deflection of the contact, so that its direction is one; Newton's steps to the deflection
 # that gives a tire its longitudinal force, and the largest part of the sliding one that they reach.
 LEAST_DEFLECTION, NEWTON, STEEPEST = 1e-9, 2, 0.9
-
-
-@dataclass(frozen=True)
-class Tire:
-    """Parameters of Fiala's tire, and static load in N."""
-
-    values: Mapping[str, float]
-    static: float
 
 
 def add_axles(
@@ -124,7 +115,8 @@ def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[
     small, curved = fit.parts(slips @ MEAN, fit.odd)
     slip, slip_half = features.let(small + curved), fit(slips @ HALF, fit.turning)
     load, load_half = fit(loads @ MEAN, fit.even), fit(loads @ HALF, fit.odd)
-    tire = Tire({name: float(model.parameters[name]) for name in FIALA}, float(loads.mean()))
+    tire = {name: float(model.parameters[name]) for name in FIALA}
+    tire["static_load"] = float(loads.mean())
     thrusts: list[Value | None] = [None, None]
     if features.inputs.torques:
         values = fit.outputs(model, "Fx", wheels)
@@ -138,34 +130,39 @@ def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[
     for kind, one, other in zip(FORCES, left, right, strict=False):
         features.line(f"{kind}{axle}", one + other)
         features.line(f"{kind}D{axle}", one - other)
-    stiffness = 2.0 * tire.values["cornering_stiffness"] / tire.static
+    stiffness = 2.0 * tire["cornering_stiffness"] / tire["static_load"]
     for kind, slope in (("F", -stiffness), ("M", stiffness / 3.0)):
         proportional = features.parameter(slope) * small
         features.line(f"{kind}C{axle}", features.by_name[f"{kind}{axle}"] - proportional)
 
 
 def add_fiala(
-    features: SlowFeatures, tire: Tire, wheel: str, slip: Value, load: Value, thrust: Value | None
+    features: SlowFeatures,
+    tire: Mapping[str, float],
+    wheel: str,
+    slip: Value,
+    load: Value,
+    thrust: Value | None,
 ) -> tuple[Value, Value, Value]:
     """Lateral force and aligning moment of a wheel, and its part that slides.
 
-    Given are the tangent of the slip angle, the load and, with torques, the longitudinal force in
-    N.  Forces are parts of the static load, moments parts of it times the width.  Without torques
-    it is Fiala's law at free rolling, else the brush model, at the slip ratio that its longitudinal
-    force needs.
+    Given are the tire's parameters and its static load, the tangent of the slip angle, the load
+    and, with torques, the longitudinal force in N.  Forces are parts of the static load, moments
+    parts of it times the width.  Without torques it is Fiala's law at free rolling, else the brush
+    model, at the slip ratio that its longitudinal force needs.
     """
-    values, parameter, let = tire.values, features.parameter, features.let
-    slip, load, least = let(slip), let(load), parameter(LEAST_LOAD * tire.static)
+    static, parameter, let = tire["static_load"], features.parameter, features.let
+    slip, load, least = let(slip), let(load), parameter(LEAST_LOAD * static)
     load, friction = let(0.5 * (load + least + abs(load - least))), features.friction(wheel)
     grip = load if friction is None else let(load * friction)
-    most = parameter(values["largest_friction"])
-    fall = parameter(values["largest_friction"] - values["smallest_friction"])
-    across, deflection = let(parameter(values["cornering_stiffness"] / 3.0) * slip), None
+    most = parameter(tire["largest_friction"])
+    fall = parameter(tire["largest_friction"] - tire["smallest_friction"])
+    across, deflection = let(parameter(tire["cornering_stiffness"] / 3.0) * slip), None
     if thrust is None:
         limit = let(grip * (most - fall * abs(slip)))
         raw = let(across / limit)
     else:
-        thrust, per_slip = let(thrust), values["longitudinal_slip_stiffness"] / 3.0
+        thrust, per_slip = let(thrust), tire["longitudinal_slip_stiffness"] / 3.0
 
         def friction_force(along: Value) -> Value:
             ratio = let(parameter(1.0 / per_slip) * along)
@@ -174,14 +171,14 @@ def add_fiala(
         along = let(thrust * (1.0 / 3.0))
         along = _deflected(features, along, across, (thrust, friction_force(along)))
         limit = friction_force(along)
-        nothing = parameter(LEAST_DEFLECTION * tire.static**2)
+        nothing = parameter(LEAST_DEFLECTION * static**2)
         deflection = let(np.sqrt(across * across + along * along + nothing))
         raw = let(deflection / limit)
     features.watched.append((parameter(1.0 / SATURATION) * raw, f"saturation of the {wheel} tire"))
     y = let(clipped(raw))
     left = let(1.0 - abs(y))
     sticking = let(left * left)
-    share = let(parameter(1.0 / tire.static) * limit * y)
+    share = let(parameter(1.0 / static) * limit * y)
     if deflection is not None:
         share = let(share * across / deflection)
     force = let(-share * (3.0 - 3.0 * abs(y) + y * y))

@@ -144,7 +144,9 @@ def _listed(features: Features) -> tuple[Listing, list[Value]]:
     return listing, [Value(listing, number) for number in features.terms]
 
 
-def rates_kernel(features: Features, parameters: int) -> Kernel:
+# A fit makes systems of the same features again and again.
+@cache
+def rates_kernels(features: Features, parameters: int) -> Kernels:
     """The right-hand side; constants are that many parameters, then C."""
     k, first = features.states, parameters
     listing, values = _listed(features)
@@ -164,7 +166,7 @@ def rates_kernel(features: Features, parameters: int) -> Kernel:
         listing.store(i, totals[i])
     listing.store(k + 1, forward * cosine - sideward * sine)
     listing.store(k + 2, forward * sine + sideward * cosine)
-    return listing.kernel("derivative", ARGUMENTS)
+    return Kernels([listing.kernel("derivative", ARGUMENTS)])
 
 
 def decoding_kernel(features: Features, shape: VehicleShape, parameters: int) -> Kernel:
@@ -209,12 +211,6 @@ def _column_kernels(features: Features) -> Kernels:
     return Kernels([listing.kernel("columns", ARGUMENTS)])
 
 
-# A fit makes systems of the same features again and again.
-@cache
-def _kernels(features: Features, parameters: int) -> Kernels:
-    return Kernels([rates_kernel(features, parameters)])
-
-
 def feature_system(
     features: Features,
     parameters: np.ndarray,
@@ -232,7 +228,7 @@ def feature_system(
     constants = np.concatenate([parameters, *(block.ravel() for block in blocks)])
     dim = features.states + PLANAR
     return System(
-        _kernels(features, len(parameters)),
+        rates_kernels(features, len(parameters)),
         constants,
         features.inputs,
         np.zeros(dim),

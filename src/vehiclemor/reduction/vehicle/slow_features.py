@@ -16,8 +16,14 @@ from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.vehicle.features import FeatureListing, Features, feature_columns
 from vehiclemor.reduction.vehicle.fitting import largest
 from vehiclemor.reduction.vehicle.linear_modes import SlowModes
-from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
-from vehiclemor.reduction.vehicle.vehicle_inputs import BRAKE, DRIVE, FRICTION, VehicleInputs
+from vehiclemor.reduction.vehicle.shape import (
+    BRAKE,
+    DRIVE,
+    FRICTION,
+    ShapeSamples,
+    VehicleInputs,
+    VehicleShape,
+)
 
 AXLES = (WHEELS[:2], WHEELS[2:])
 # Factors of a term, by the names of their lines.

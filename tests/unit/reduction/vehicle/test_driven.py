@@ -8,9 +8,9 @@ import pytest
 import vehiclemor as vm
 from tests.oracles.high_fidelity_data import brush
 from vehiclemor.multibody.quantities import FIALA
-from vehiclemor.reduction.vehicle.axle_forces import Tire, add_fiala
+from vehiclemor.reduction.vehicle.axle_forces import add_fiala
+from vehiclemor.reduction.vehicle.shape import VehicleInputs
 from vehiclemor.reduction.vehicle.slow_features import SlowFeatures
-from vehiclemor.reduction.vehicle.vehicle_inputs import VehicleInputs
 from vehiclemor.simulation.build import build
 from vehiclemor.study.scenario import Scenario
 
@@ -125,7 +125,8 @@ def test_the_tire_is_the_brush_of_the_vehicle():
     of_oracle = {f"tyre.{key}": parameters[name] for key, name in zip(short, FIALA, strict=True)}
     made = SlowFeatures(3, 0, VehicleInputs(("friction_FL",)))
     slip, load, thrust, _ = made.z
-    force, moment, _ = add_fiala(made, Tire(parameters, 1000.0), "FL", slip, load, thrust)
+    tire = parameters | {"static_load": 1000.0}
+    force, moment, _ = add_fiala(made, tire, "FL", slip, load, thrust)
     made.line("force", 1000.0 * force)
     made.line("moment", 1000.0 * parameters["tire_width"] * moment)
     random = np.random.default_rng(5)
