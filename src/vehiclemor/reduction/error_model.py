@@ -34,6 +34,7 @@ from vehiclemor.reduction.error_arguments import (
     Shape,
     Violated,
 )
+from vehiclemor.reduction.vehicle.features import filled
 from vehiclemor.reduction.vehicle.shape import RANK, Linearisation, VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import address_of, at_samples
@@ -100,8 +101,8 @@ def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
     motions = changes @ errors.linearised.velocity_a.T
     return ready(
         ModesOfErrors(
-            _filled(errors.in_states(modes.coordinates.T).T),
-            _filled(np.hstack([errors.in_states(changes), motions])),
+            filled(errors.in_states(modes.coordinates.T).T, LANES),
+            filled(np.hstack([errors.in_states(changes), motions]), LANES),
             errors.weights(step),
             slow,
             np.ascontiguousarray(errors.in_states(settling.T).T),
@@ -321,14 +322,6 @@ class ErrorModel:
         end = np.where(small, 0.5 + z / 6.0 + z**2 / 24.0, (mean - 1.0) / divisor)
         parts = decay, step * (mean - end), step * end, self.modes.rates
         return np.array([half for part in parts for half in (part.real, part.imag)])
-
-
-def _filled(matrix: np.ndarray) -> np.ndarray:
-    """A matrix with further columns of zeros, up to a multiple of the lanes."""
-    rows, columns = matrix.shape
-    filled = np.zeros((rows, padded(columns, LANES)))
-    filled[:, :columns] = matrix
-    return filled
 
 
 class Space(NamedTuple):

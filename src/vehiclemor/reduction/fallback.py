@@ -13,7 +13,7 @@ import numpy as np
 from vehiclemor.arguments import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
-from vehiclemor.reduction.error_estimate import estimates, judged
+from vehiclemor.reduction.error_estimate import judged
 from vehiclemor.reduction.interface import MEMBERS, FittedModel, simulated
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
@@ -21,7 +21,6 @@ from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
-NOT_ESTIMATED = "its error was not estimated"
 # What is that of the reduced model: users step and ask this one.
 REDUCED = (
     *("offline", "order", "best_approximation"),
@@ -93,18 +92,14 @@ def run_of(
     given: tuple[Excitation, Start],
     outputs: tuple[str, ...] | None,
     bounds: Mapping[str, ErrorBound] | None,
-    off: bool,
+    estimate: bool,
 ) -> Trajectory:
-    """A run of a reduced model with some outputs alone; its error is estimated unless it is off."""
+    """A run of a reduced model with some outputs alone; whether its error is estimated."""
     if isinstance(reduced, FallbackModel):
-        if not off:
+        if estimate:
             return reduced.simulate(*given, outputs, bounds)
         reduced = reduced.reduced
-    if off:
+    if not estimate:
         return simulated(reduced, *given, outputs)
     run = judged(reduced.simulate(*given), reduced.simulate, given, bounds)
-    if run.trust is None and run.finished and estimates(run.model):
-        # It is too short, or nothing is bounded.
-        remark = "; ".join(filter(None, (run.remark, NOT_ESTIMATED)))
-        run = Trajectory.of(**run.__dict__ | {"remark": remark})
     return run if outputs is None else run.chosen(outputs)

@@ -16,8 +16,8 @@ from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction import model_file
-from vehiclemor.reduction.error_estimate import checked_bounds
-from vehiclemor.reduction.fallback import NOT_ESTIMATED, run_of
+from vehiclemor.reduction.error_estimate import checked_bounds, estimates
+from vehiclemor.reduction.fallback import run_of
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.training import own_speed, training_summary
@@ -33,6 +33,8 @@ from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, ou
 
 if TYPE_CHECKING:
     import xarray as xr
+
+NOT_ESTIMATED = "its error was not estimated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,10 +141,13 @@ class ReducedOrderModel(ShortRepr):
         own = None if bounds is None else self.checked_bounds(bounds, off)
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
-            run = run_of(self.reduced, (chosen, first), names, own, off or self._method.own_limits)
+            estimate = not (off or self._method.own_limits)
+            run = run_of(self.reduced, (chosen, first), names, own, estimate)
+        # It is off, too short, or nothing is bounded.
+        unknown = estimate and run.trust is None and run.finished and estimates(run.model)
+        remarks = run.remark, self._lower_rank, NOT_ESTIMATED if off or unknown else ""
         # A copy would take a twentieth of a short run.
         run.__dict__.update(method=self.method, maneuver=chosen.name)
-        remarks = run.remark, self._lower_rank, NOT_ESTIMATED if off else ""
         run.__dict__["remark"] = "; ".join(filter(None, remarks))
         if not (off or run.trust) and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))

@@ -71,7 +71,7 @@ def test_a_trusted_run_is_the_reduced_one():
     run, own = guarded(reduced).simulate(STEER, "dropped"), reduced.simulate()
     assert (run.status, run.remark) == ("ok", own.remark)
     np.testing.assert_array_equal(run.outputs, own.outputs)
-    assert run_of(reduced, (STEER, "dropped"), None, None, off=True).status == "ok"
+    assert run_of(reduced, (STEER, "dropped"), None, None, estimate=False).status == "ok"
 
 
 def test_a_reduced_run_that_fails_without_a_warning_is_trusted_nowhere():

@@ -44,14 +44,10 @@ def add_axles(
 ) -> None:
     """Add lines of the axles' forces, fitted on training samples with coordinates z."""
     fit = _WheelFit(features, samples, z)
-    if set(FIALA) <= set(model.parameters.entries):
-        features.forces = FORCES
-        for axle, wheels in enumerate(AXLES):
-            _add_tires(fit, model, axle, wheels)
-    else:
-        features.forces = FORCES[:3]
-        for axle, wheels in enumerate(AXLES):
-            _add_powers(fit, model, axle, wheels)
+    known = set(FIALA) <= set(model.parameters.entries)
+    features.forces, add_axle = (FORCES, _add_tires) if known else (FORCES[:3], _add_powers)
+    for axle, wheels in enumerate(AXLES):
+        add_axle(fit, model, axle, wheels)
 
 
 class _WheelFit:

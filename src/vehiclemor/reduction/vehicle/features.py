@@ -25,6 +25,7 @@ from vehiclemor.codegen.operations import (
     COMPARISONS,
     FUNCTIONS,
     MOST_SIZE,
+    WIDTH,
     Kernel,
     Listing,
     Operation,
@@ -131,6 +132,14 @@ class FeatureListing(Listing):
         )
 
 
+def filled(matrix: np.ndarray, width: int = WIDTH) -> np.ndarray:
+    """A matrix with further columns of zeros, up to a multiple of the width."""
+    rows, columns = matrix.shape
+    result = np.zeros((rows, padded(columns, width)))
+    result[:, :columns] = matrix
+    return result
+
+
 def product(factors: Term) -> Value:
     """The product of factors, from the first one on."""
     return reduce(mul, factors)
@@ -222,9 +231,7 @@ def feature_system(
 
     Arrays are those of `ReducedVehicle`.
     """
-    blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in features.groups]
-    for block, (terms, columns) in zip(blocks, features.groups, strict=True):
-        block[:, : len(columns)] = coefficients[np.ix_(terms, columns)]
+    blocks = [filled(coefficients[np.ix_(terms, columns)]) for terms, columns in features.groups]
     constants = np.concatenate([parameters, *(block.ravel() for block in blocks)])
     dim = features.states + PLANAR
     return System(

@@ -9,7 +9,7 @@ import numpy as np
 
 from vehiclemor.arguments import check_shapes, require
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.operations import LANES, Kernel, padded
+from vehiclemor.codegen.operations import LANES, Kernel
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost
@@ -20,6 +20,7 @@ from vehiclemor.reduction.vehicle.features import (
     Features,
     decoding_kernel,
     feature_system,
+    filled,
     needed_parameters,
 )
 from vehiclemor.reduction.vehicle.shape import VehicleShape
@@ -109,8 +110,7 @@ class ReducedVehicle(ReducedSystem):
     @property
     def decoder(self) -> tuple[Kernel, np.ndarray]:
         """The kernel of full states and, behind them, of what is watched; and its constants."""
-        rows = np.vstack([self.decoding, self.shape.reference])
-        rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
+        rows = filled(np.vstack([self.decoding, self.shape.reference]))
         kernel = decoding_kernel(self._decoded_features, self.shape, len(self.parameters))
         return kernel, np.concatenate([self.parameters, rows.ravel()])
 
