@@ -41,6 +41,7 @@ SMALLEST = 1e-100
 # Of mechanisms: largest last step (rad or m) of Newton's method, after which its error is far
 # smaller.
 LAST_STEP = 1e-6
+NOT_ESTIMATED = "its error was not estimated"
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction import model_file
-from vehiclemor.reduction.error_estimate import checked_bounds, estimates
+from vehiclemor.reduction.error_estimate import NOT_ESTIMATED, checked_bounds, estimates
 from vehiclemor.reduction.fallback import run_of
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.settings import Value
@@ -33,8 +33,6 @@ from vehiclemor.simulation.trajectory import Names, Start, Trajectory, Trust, ou
 
 if TYPE_CHECKING:
     import xarray as xr
-
-NOT_ESTIMATED = "its error was not estimated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +62,13 @@ class ReducedOrderModel(ShortRepr):
     input_range: InputRange | None = None
 
     def __str__(self) -> str:
-        lines = [f"{self._name}, order {self.reduced.order}"]
-        if self._lower_rank:
-            lines.append(self._lower_rank)
+        lines = [f"{self._name}, order {self.reduced.order}", self._lower_rank]
         if self.input_range is not None:
             runs = self.__getstate__()["training"]
             sizes, inputs = self.input_range.largest, self.model.definition.inputs
             covered = training_summary(self.method, runs, sizes, inputs)
             lines += [f"{name}: {text}" for name, text in covered.items()]
-        return "\n  ".join(lines)
+        return "\n  ".join(filter(None, lines))
 
     @cached_property
     def _lower_rank(self) -> str:

@@ -25,8 +25,6 @@ from vehiclemor.reduction import parts
 from vehiclemor.reduction.parts import Parts
 
 ROOM = "vehiclemor.reduction"
-
-
 NAMES = [
     *("os:system", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
     *("vehiclemor.simulation.dynamic:DynamicModel", f"{ROOM}.reduced_system:ReducedMechanism"),

@@ -113,13 +113,12 @@ class FeatureListing(Listing):
         self,
         terms: Sequence[Term],
         groups: Any = (),
-        watched: Sequence[tuple[Term, str]] = (),
+        watched: Sequence[tuple[Value, str]] = (),
     ) -> Features:
         """Features, each the product of its factors, and no operation that none needs."""
         numbers = [product(term).number for term in terms]
-        watches = [(product(term).number, what) for term, what in watched]
-        numbers_watched = [number for number, _ in watches]
-        operations, renumbered = pruned(self.operations, [*numbers, *numbers_watched])
+        needed = [*numbers, *(value.number for value, _ in watched)]
+        operations, renumbered = pruned(self.operations, needed)
         named = [renumbered[n] for n in sorted(self.named) if n in renumbered]
         return Features(
             states=len(self.z),
@@ -128,7 +127,7 @@ class FeatureListing(Listing):
             named=tuple(named),
             terms=tuple(renumbered[n] for n in numbers),
             groups=groups,
-            watched=tuple((renumbered[n], what) for n, what in watches),
+            watched=tuple((renumbered[value.number], what) for value, what in watched),
         )
 
 

@@ -133,9 +133,8 @@ class SlowFeatures(FeatureListing):
         """Features of these terms; the first ones are the odd ones."""
         indices = tuple(range(len(terms)))
         groups = (indices[:odd], self.odd_columns), (indices[odd:], self.even_columns)
-        watched = [((value,), meaning) for value, meaning in self.watched]
         factors = [self.term(names) for names in terms]
-        return self.features(factors, groups if odd else (), watched)
+        return self.features(factors, groups if odd else (), self.watched)
 
     def columns(self, terms: Sequence[Names], z: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Terms (samples, terms) of coordinates (samples, states) and inputs.

@@ -1,6 +1,7 @@
 """Reduced vehicles that are driven and braked on roads of different friction."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import vehiclemor as vm
 from tests.oracles.high_fidelity_data import brush
 from vehiclemor.multibody.quantities import FIALA
 from vehiclemor.reduction.vehicle.axle_forces import add_fiala
-from vehiclemor.reduction.vehicle.shape import VehicleInputs
+from vehiclemor.reduction.vehicle.shape import KNOWN, SLIP_OUTPUTS, VehicleInputs, no_vehicle
 from vehiclemor.reduction.vehicle.slow_features import SlowFeatures
 from vehiclemor.simulation.build import build
 from vehiclemor.study.scenario import Scenario
@@ -23,12 +24,8 @@ TIMES = np.linspace(0.0, 5.0, 251)
 @cache
 def reduced(name):
     family = f"{CARS[name]}random_drive"
-    training = [
-        Scenario.of(
-            f"{family}:{seed}", (1.0, AMPLITUDES[seed % 5]), "equilibrium", SPEEDS[seed % 5]
-        )
-        for seed in range(25)
-    ]
+    cases = zip(range(25), 5 * AMPLITUDES, 5 * SPEEDS, strict=True)
+    training = [Scenario.of(f"{family}:{k}", (1.0, a), "equilibrium", v) for k, a, v in cases]
     return vm.reduce(name, "slow_manifold", training=training, steps=2, tolerance=1e-5)
 
 
@@ -116,6 +113,11 @@ def test_random_driving_is_near_that_of_the_vehicle(rom):
         assert np.ptp(full["longitudinal_speed"]) > 1.0
         for name in ("longitudinal_position", "lateral_position"):
             assert np.abs(run[name] - full[name]).max() < 0.3
+
+
+def test_a_vehicle_that_is_not_steered_is_refused():
+    cart = SimpleNamespace(name="cart", planar="xyz", outputs=SLIP_OUTPUTS, inputs=KNOWN)
+    assert no_vehicle(cart) == "the inputs of cart are not a steering and its derivatives"
 
 
 def test_the_tire_is_the_brush_of_the_vehicle():
