@@ -65,20 +65,19 @@ class Parts:
             arrays = as_arrays(value)
             return {name: self._write_array(arrays[name], f"{path}.{name}") for name in arrays}
         if types := _fields(kind):
-            named_kind = {} if kind is _record(declared) else {CLASS: _name(value, path)}
-            fields = {name: getattr(value, name) for name in types}
-            return named_kind | self._write_fields(fields, path, types)
+            fields: dict[str, Any] = {}
+            if kind is not _record(declared):
+                fields[CLASS] = _name(value, path)
+            for name, of in types.items():
+                fields[name] = self.write(getattr(value, name), f"{path}.{name}", of)
+            return fields
         if kind in (tuple, list) and len(types := _item_types(choice, len(value))) == len(value):
             items = enumerate(zip(value, types, strict=True))
             return [self.write(item, f"{path}.{i}", of) for i, (item, of) in items]
         if kind is dict and all(isinstance(key, str) for key in value):
-            return self._write_fields(value, path, dict.fromkeys(value, _value_type(choice)))
+            of = _value_type(choice)
+            return {name: self.write(inner, f"{path}.{name}", of) for name, inner in value.items()}
         raise _unwritable(path, value)
-
-    def _write_fields(
-        self, values: Mapping[str, Any], path: str, types: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        return {n: self.write(value, f"{path}.{n}", types[n]) for n, value in values.items()}
 
     def _write_array(self, value: np.ndarray, path: str) -> dict[str, Any]:
         # Products of matrices are rounded as their numbers stand in memory.

@@ -204,8 +204,7 @@ def normal_equations(
     size = len(free[0])
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     for target, path in zip(targets, paths, strict=True):
-        rows = _sensitivities(reduced, target, path, free, target.shares[:, None] * target.scale)
-        rows = rows.reshape(-1, size)
+        rows = _sensitivities(reduced, target, path, free).reshape(-1, size)
         error = _errors(target, path).ravel()
         weight = max(error @ error, NOTHING) ** -0.5
         normal += weight * (rows.T @ rows)
@@ -214,12 +213,9 @@ def normal_equations(
 
 
 def _sensitivities(
-    reduced: ReducedVehicle, target: Target, path: np.ndarray, free: Free, weights: np.ndarray
+    reduced: ReducedVehicle, target: Target, path: np.ndarray, free: Free
 ) -> np.ndarray:
-    """Derivatives (compared times, states + 3, free coefficients) of a reduced run.
-
-    Those of each state at each time come times its weight (compared times, states + 3).
-    """
+    """Derivatives (compared times, states + 3, free coefficients) of `_errors`."""
     k, c = reduced.features.states, reduced.coefficients
     steps = target.steps
     path, inputs, times = path[steps], target.inputs[steps], target.times[steps]
@@ -253,4 +249,5 @@ def _sensitivities(
     result = np.zeros((samples, dim, len(targets)))
     loop = loops(PATH_LOOPS, ("recurrence",))["recurrence"]
     loop(advance, forcing, result)
+    weights = target.shares[:, None] * target.scale
     return weights[:, :, None] * result[(samples - 1) % COMPARED :: COMPARED]
