@@ -149,7 +149,7 @@ class ErrorModel:
         call.give("modes", _modes_of_errors(self, step))
         call.words[call.address("bounded.outputs.constants")] = model.constants.ctypes.data
         np.copyto(path.run, states)
-        np.copyto(path.inputs, inputs)
+        path.inputs[: len(inputs)], path.inputs[len(inputs) :] = inputs, inputs[-1]
         np.copyto(path.start, start)
         bounded.bounds[:] = [bound.bound for bound in bounds.values()]
         bounded.is_peak[:] = [bound.measure == "max" for bound in bounds.values()]
@@ -166,12 +166,12 @@ class ErrorModel:
         model, modes = self.shape.model, len(self.modes.shapes)
         n, violations = len(model.definition.states), len(self.free.correction)
         rows, of_modes, of_shape = (padded(size, LANES) for size in (nodes, modes, n + 3))
-        widths = n, len(model.inputs), n, n, n, 3, of_modes, of_modes, violations + modes
+        widths = n, n, n, n, 3, of_modes, of_modes, violations + modes
         arrays: list[Any] = [np.empty((rows, columns)) for columns in widths]
         arrays += map(np.empty, ((LANES, n), (LANES, of_shape), n, n, 3))
         scratch = Scratch(*arrays)
         run, corrected = np.empty((2, nodes, n))
-        path = Path(step, run, corrected, np.empty((nodes, len(model.inputs))), np.empty(n))
+        path = Path(step, run, corrected, np.empty((rows, len(model.inputs))), np.empty(n))
         first = min(max(int(SETTLED / step) + 1, 5), nodes)
         violated = Violated(*map(np.zeros, ((first, violations), (first, n), (first, n), 3)))
         outputs, results = model.packed(names, nodes)
