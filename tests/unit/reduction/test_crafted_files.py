@@ -28,10 +28,7 @@ ROOM = "vehiclemor.reduction"
 NAMES = [
     *("os:system", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
     *("vehiclemor.simulation.dynamic:DynamicModel", f"{ROOM}.reduced_system:ReducedMechanism"),
-    *(
-        f"{ROOM}.vehicle.features:{name}"
-        for name in ("monomials", "Features.check_sizes", "PLANAR")
-    ),
+    *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.terms", "PLANAR")),
     # Defined elsewhere.
     f"{ROOM}.vehicle.reduced_vehicle:Features",
 ]
