@@ -237,7 +237,7 @@ def reduced_system(reduced: ReducedVehicle, name: str) -> ExportedSystem:
     }
     rates, source = system.kernels.sources["derivative"], model.kernels.sources["outputs"]
     rate_arrays = arrays | {"_constants": lines.numbers(system.constants)}
-    decoder, decoder_constants = reduced.decoder.kernel
+    decoder, decoder_constants = reduced.decoder
     decoder_arrays = arrays | {"_constants": lines.numbers(decoder_constants)}
     decoded = lines.include(decoder, decoder_arrays)
     output_arrays = {

@@ -7,7 +7,7 @@ columns up to a multiple of the lanes, filled up with zeros.
 
 from typing import NamedTuple
 
-from vehiclemor.codegen.loop_types import Float, Int, IntMatrix, IntVector, Matrix, Vector
+from vehiclemor.codegen.loop_types import Float, IntMatrix, IntVector, Matrix, Vector
 from vehiclemor.simulation.loop_arguments import Outputs
 
 # Rows of the weights of a step, real and imaginary parts by mode: of the error before it, of what
@@ -18,8 +18,8 @@ DECAY, BEGIN, END, RATES = 0, 2, 4, 6
 class Path(NamedTuple):
     """A run of a reduced model at nodes that are a step in s apart.
 
-    Its states and those that are corrected (nodes, n), inputs (nodes, inputs), and the start (n,)
-    of the full model.
+    Its states and those that are corrected (nodes, n), inputs (rows, inputs), of which those behind
+    the nodes are like the last ones, and the start (n,) of the full model.
     """
 
     step: Float
@@ -89,19 +89,8 @@ class Violated(NamedTuple):
     motion: Vector
 
 
-class Passes(NamedTuple):
-    """Passes that are made of a window at most, and the change that ends them.
-
-    Changes of the shape are measured in the ranges of its coordinates, at least in `least`.
-    """
-
-    most: Int
-    settled: Float
-    least: Float
-
-
 class Scratch(NamedTuple):
-    """Room for all nodes: states, inputs, rates, shapes, slopes of the path, motions.
+    """Room for all nodes: states, rates, shapes, slopes of the path, motions.
 
     Then in modes what drives errors, and the errors; what changes shapes: violations of the
     constraints, and changes of the errors.  For the nodes of a window what is left over of the
@@ -110,7 +99,6 @@ class Scratch(NamedTuple):
     """
 
     states: Matrix
-    inputs: Matrix
     rates: Matrix
     shapes: Matrix
     slopes: Matrix

@@ -41,6 +41,7 @@ SMALLEST = 1e-100
 # Of mechanisms: largest last step (rad or m) of Newton's method, after which its error is far
 # smaller.
 LAST_STEP = 1e-6
+NOT_ESTIMATED = "its error was not estimated"
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,19 +78,9 @@ class ErrorEstimate(ShortRepr):
         return self.errors_of((name,))[:, 0]
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Of the outputs."""
-        return self.model.outputs
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Of the outputs."""
-        return tuple(quantity.unit for quantity in self.model.definition.outputs)
-
-    @property
     def errors(self) -> np.ndarray:
         """In the units of the outputs (nodes, outputs); infinite if too large to be known."""
-        return self.errors_of(self.names)
+        return self.errors_of(self.model.outputs)
 
     @property
     def used(self) -> dict[str, np.ndarray]:
@@ -106,7 +97,8 @@ class ErrorEstimate(ShortRepr):
         first = min(part.searchsorted(1.0 / RESERVE, "right") for part in used.values())
         until = float(self.times[min(first, len(self.times) - 1)])
         worst = max(used, key=lambda name: used[name][-1])
-        bound, unit = self.bounds[worst], self.units[self.names.index(worst)]
+        bound, outputs = self.bounds[worst], self.model.definition.outputs
+        unit = outputs[self.model.outputs.index(worst)].unit
         error, rms = used[worst][-1] * bound.bound, " RMS" if bound.measure == "rms" else ""
         size = "too large to be known" if np.isinf(error) else f"{error:.3g} {unit}{rms}"
         reason = (
@@ -143,16 +135,6 @@ def checked_bounds(model: Model, bounds: Mapping[str, Any]) -> dict[str, ErrorBo
         check_positive(f"bound of {name}", pair[1], SMALLEST)
         checked[name] = ErrorBound(measure, float(pair[1]))
     return checked
-
-
-def judged_run(
-    simulate: Callable[[Excitation, Start], Trajectory],
-    maneuver: Excitation,
-    start: Start,
-    bounds: Mapping[str, ErrorBound] | None = None,
-) -> Trajectory:
-    """A run of a reduced model, judged by its estimated error in bounds, see `judged`."""
-    return judged(simulate(maneuver, start), simulate, (maneuver, start), bounds)
 
 
 def judged(
@@ -261,8 +243,9 @@ def error_estimate(
         of_errors, step = error_model(model, states, float(times[-1])), float(times[1] - times[0])
         first = model.start(start)
         corrected = of_errors.corrected(step, states, inputs, first, passes, bounds)
-    errors = partial(_errors_of_states, model, inputs, states, corrected.states)
-    return ErrorEstimate(times, model, errors, bounds, *corrected[1:])
+    corrected_states, in_bounds, is_settled = corrected
+    errors = partial(_errors_of_states, model, inputs, states, corrected_states)
+    return ErrorEstimate(times, model, errors, bounds, in_bounds, is_settled)
 
 
 def _averaged_jumps(maneuver: Excitation, times: np.ndarray, inputs: np.ndarray) -> np.ndarray:

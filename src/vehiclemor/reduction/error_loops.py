@@ -5,7 +5,7 @@ What goes through it, and how it is laid out, see `error_arguments`.
 
 import math
 
-from vehiclemor.codegen.loop_types import Int, call_lanes, rows_product
+from vehiclemor.codegen.loop_types import Float, Int, call_lanes, rows_product
 from vehiclemor.codegen.operations import LANES
 from vehiclemor.reduction.error_arguments import (
     BEGIN,
@@ -14,7 +14,6 @@ from vehiclemor.reduction.error_arguments import (
     RATES,
     Bounded,
     ModesOfErrors,
-    Passes,
     Path,
     Scratch,
     Shape,
@@ -31,6 +30,8 @@ INLINED = (
 DISJOINT = "step_real_parts", "step_pairs"
 # A change that is larger has gone to infinity, as one that is no number has.
 LARGEST = 1e9
+# Least range of a coordinate of the shape, in which changes are measured (m, rad, m/s, rad/s).
+LEAST_RANGE = 1e-3
 
 
 def corrected_run(
@@ -38,23 +39,25 @@ def corrected_run(
     violated: Violated,
     shape: Shape,
     modes: ModesOfErrors,
-    passes: Passes,
+    most: Int,
+    settled: Float,
     scratch: Scratch,
     bounded: Bounded,
 ) -> Int:
     """Correct states of a run, and write the errors of its bounded outputs.
 
-    Returned is the number of windows that were not settled, or minus one if a correction has gone
-    to infinity.
+    At most so many passes are made of a window; a change that is smaller than the settled one, in
+    ranges of the coordinates, ends them.  Returned is the number of windows that were not settled,
+    or minus one if a correction has gone to infinity.
     """
-    begin_with(path, violated, shape, modes, passes, scratch)
+    begin_with(path, violated, shape, modes, scratch)
     nodes, unsettled = len(path.run), 0
     for first in range(0, nodes, LANES):
         end = min(first + LANES, nodes)
         guess(first, end, modes, scratch)
         change, expected = 0.0, LARGEST
-        for _ in range(passes.most):
-            full_rates(first, end, shape, violated, scratch)
+        for _ in range(most):
+            full_rates(first, end, path.inputs, shape, violated, scratch)
             modal_sources(first, modes, scratch)
             before = change
             for i in range(first, end):
@@ -64,9 +67,9 @@ def corrected_run(
                 return -1
             # The next change, if each is smaller than the one before by the same factor.
             expected = change * change / before if change < before else change
-            if expected < passes.settled:
+            if expected < settled:
                 break
-        if expected >= passes.settled:
+        if expected >= settled:
             unsettled += 1
     place(path, shape, scratch)
     judge(path, bounded)
@@ -92,18 +95,14 @@ def judge(path, bounded):
         bounded.errors[k] = size / bounded.bounds[k] if squares < math.inf else math.inf
 
 
-def begin_with(path, violated, shape, modes, passes, scratch):
+def begin_with(path, violated, shape, modes, scratch):
     """Shapes of a run and their slopes, the error at the start, and ranges."""
-    run, inputs = path.run, path.inputs
     shapes, scale, moved = scratch.shapes, scratch.scale, scratch.moved[0]
-    nodes, n = run.shape
+    nodes, n = path.run.shape
     scratch.slopes[nodes:] = 0.0
     for i in range(len(shapes)):
         # Of the last window further nodes are like the last one.
-        k = min(i, nodes - 1)
-        for j in range(inputs.shape[1]):
-            scratch.inputs[i, j] = inputs[k, j]
-        shape_of(run[k], shape, scratch.rates[i], shapes[i])
+        shape_of(path.run[min(i, nodes - 1)], shape, scratch.rates[i], shapes[i])
     for j in range(n):
         # A method may record the first state as it was given.
         near = 4.0 * shapes[1, j] - 6.0 * shapes[2, j]
@@ -114,7 +113,7 @@ def begin_with(path, violated, shape, modes, passes, scratch):
             scale[j] = max(scale[j], shapes[i, j])
             moved[j] = min(moved[j], shapes[i, j])
     for j in range(n):
-        scale[j] = 1.0 / max(scale[j] - moved[j], passes.least)
+        scale[j] = 1.0 / max(scale[j] - moved[j], LEAST_RANGE)
     slopes(shapes[:nodes], path.step, scratch.slopes)
     for i in range(len(violated.shapes)):
         for j in range(n):
@@ -237,19 +236,17 @@ def guess(first, end, modes, scratch):
     change_shapes(first, end, modes, scratch)
 
 
-def full_rates(first, end, shape, violated, scratch):
+def full_rates(first, end, inputs, shape, violated, scratch):
     """Rates of the states at the nodes of a window, and violations of the constraints."""
     states, rates = scratch.states, scratch.rates
     for i in range(first, first + LANES):
         state, deviation = states[i], scratch.shapes[i]
         for j in range(len(state)):
             state[j] = shape.reference[j] + deviation[j]
-    call_lanes(shape.kernels, 0, states, scratch.inputs, shape.constants, rates, first)
+    call_lanes(shape.kernels, 0, states, inputs, shape.constants, rates, first)
     count = violated.violations.shape[1]
     if count:
-        call_lanes(
-            shape.kernels, 1, states, scratch.inputs, shape.constants, scratch.changes, first
-        )
+        call_lanes(shape.kernels, 1, states, inputs, shape.constants, scratch.changes, first)
     for i in range(first, min(end, len(violated.violations))):
         for k in range(count):
             scratch.changes[i, k] -= violated.violations[i, k]

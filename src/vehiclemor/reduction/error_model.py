@@ -29,12 +29,12 @@ from vehiclemor.multibody.quantities import ErrorBound
 from vehiclemor.reduction.error_arguments import (
     Bounded,
     ModesOfErrors,
-    Passes,
     Path,
     Scratch,
     Shape,
     Violated,
 )
+from vehiclemor.reduction.vehicle.features import filled
 from vehiclemor.reduction.vehicle.shape import RANK, Linearisation, VehicleShape
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import address_of, at_samples
@@ -51,13 +51,15 @@ APART = 8
 # Modes start with an error whose rate times the time between nodes is no larger; the others have
 # decayed before it matters.
 FOLLOWED = 8.0
-# Least range of a coordinate of the shape, in which changes are measured (m, rad, m/s, rad/s).
-LEAST_RANGE = 1e-3
 # Violations of constraints and their rates that are none (m, m/s); time in s in which those of a
 # start decay, ten time constants of their stabilisation.
 HELD, SETTLED = 1e-6, 0.2
 # Step of differences; magnitude of a mode's rate times the step below which weights are series.
 DIFFERENCE, SERIES = 1e-6, 1e-3
+# States (nodes, n) of a corrected run, none if it can't be known; the largest error of the bounded
+# outputs in bounds; whether all changes were small in the end.
+Corrected = tuple[np.ndarray | None, float, bool]
+LOST: Corrected = None, math.inf, False
 
 
 def error_model(model: DynamicModel, states: np.ndarray, duration: float) -> ErrorModel:
@@ -82,19 +84,13 @@ def _alike(model: DynamicModel) -> Alike:
 
 @lru_cache(maxsize=256)
 def _at_speed(alike: Alike, speed: float) -> ErrorModel:
-    return ErrorModel(_shape(alike), _pool(*alike.key[:2]), speed)
+    return ErrorModel(_shape(alike), speed)
 
 
-# Its derivatives serve all speeds, the arrays of runs all constants too.
+# Its derivatives serve all speeds.
 @lru_cache(maxsize=64)
 def _shape(alike: Alike) -> VehicleShape:
     return VehicleShape(alike.model)
-
-
-@lru_cache(maxsize=64)
-def _pool(kernel_hash: str, inputs: tuple[str, ...]) -> Pool[Space]:
-    del kernel_hash, inputs
-    return Pool()
 
 
 @lru_cache(maxsize=256)
@@ -105,8 +101,8 @@ def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
     motions = changes @ errors.linearised.velocity_a.T
     return ready(
         ModesOfErrors(
-            _filled(errors.in_states(modes.coordinates.T).T),
-            _filled(np.hstack([errors.in_states(changes), motions])),
+            filled(errors.in_states(modes.coordinates.T).T, LANES),
+            filled(np.hstack([errors.in_states(changes), motions]), LANES),
             errors.weights(step),
             slow,
             np.ascontiguousarray(errors.in_states(settling.T).T),
@@ -127,7 +123,6 @@ class ErrorModel:
     """Modes of a vehicle's shape at straight running, in which errors are propagated."""
 
     shape: VehicleShape
-    pool: Pool[Space]
     speed: float  # Of straight running in m/s.
 
     def corrected(
@@ -145,41 +140,38 @@ class ErrorModel:
         (n,) of the full model; the most passes, and the change that ends them, in ranges of the
         coordinates; bounds of outputs.
         """
-        kind = step, len(states), passes, tuple(bounds), len(self.modes.shapes)
-        space = self.pool.taken(kind, lambda: self._space(*kind))
-        path, bounded = space.path, space.bounded
-        space.call.give("shape", self._of_shape)
-        space.call.give("modes", _modes_of_errors(self, step))
-        space.call.words[space.constants] = self._constants
+        model, kind = self.shape.model, (step, len(states), passes, tuple(bounds))
+        # All constants of the same equations share arrays.
+        shared = model.kernel_hash, model.inputs, len(self.modes.shapes), kind
+        space = SPACES.taken(shared, lambda: self._space(*kind))
+        path, bounded, call = space.path, space.bounded, space.call
+        call.give("shape", self._of_shape)
+        call.give("modes", _modes_of_errors(self, step))
+        call.words[call.address("bounded.outputs.constants")] = model.constants.ctypes.data
         np.copyto(path.run, states)
-        np.copyto(path.inputs, inputs)
+        path.inputs[: len(inputs)], path.inputs[len(inputs) :] = inputs, inputs[-1]
         np.copyto(path.start, start)
         bounded.bounds[:] = [bound.bound for bound in bounds.values()]
         bounded.is_peak[:] = [bound.measure == "max" for bound in bounds.values()]
         self._write_violated(start, inputs[0], step, space.violated)
-        unsettled = space.call()
-        known = path.corrected.copy(), float(bounded.errors.max())
-        self.pool.give_back(kind, space)
-        return Corrected(*known, unsettled == 0) if unsettled >= 0 else LOST
+        unsettled = call()
+        known = path.corrected.copy(), float(bounded.errors.max()), unsettled == 0
+        SPACES.give_back(shared, space)
+        return known if unsettled >= 0 else LOST
 
     def _space(
-        self,
-        step: float,
-        nodes: int,
-        passes: tuple[int, float],
-        names: tuple[str, ...],
-        modes: int,
+        self, step: float, nodes: int, passes: tuple[int, float], names: tuple[str, ...]
     ) -> Space:
         """Arrays of a run with bounds of outputs of these names, and the loop that uses them."""
-        model = self.shape.model
+        model, modes = self.shape.model, len(self.modes.shapes)
         n, violations = len(model.definition.states), len(self.free.correction)
         rows, of_modes, of_shape = (padded(size, LANES) for size in (nodes, modes, n + 3))
-        widths = n, len(model.inputs), n, n, n, 3, of_modes, of_modes, violations + modes
+        widths = n, n, n, n, 3, of_modes, of_modes, violations + modes
         arrays: list[Any] = [np.empty((rows, columns)) for columns in widths]
         arrays += map(np.empty, ((LANES, n), (LANES, of_shape), n, n, 3))
         scratch = Scratch(*arrays)
         run, corrected = np.empty((2, nodes, n))
-        path = Path(step, run, corrected, np.empty((nodes, len(model.inputs))), np.empty(n))
+        path = Path(step, run, corrected, np.empty((rows, len(model.inputs))), np.empty(n))
         first = min(max(int(SETTLED / step) + 1, 5), nodes)
         violated = Violated(*map(np.zeros, ((first, violations), (first, n), (first, n), 3)))
         outputs, results = model.recorder.packed(names, nodes)
@@ -190,11 +182,11 @@ class ErrorModel:
             violated,
             self._of_shape,
             _modes_of_errors(self, step),
-            Passes(*passes, LEAST_RANGE),
+            *passes,
             scratch,
             bounded,
         )
-        return Space(path, violated, bounded, call, call.address("bounded.outputs.constants"))
+        return Space(path, violated, bounded, call)
 
     def _write_violated(
         self, start: np.ndarray, inputs: np.ndarray, step: float, violated: Violated
@@ -206,9 +198,7 @@ class ErrorModel:
         model, count = self.shape.model, len(self.free.correction)
         if not count:
             return
-        at_first = np.empty(model.equations.shapes["violations"])
-        model.kernels.call("violations", start, inputs, model.constants, at_first)
-        at_first = at_first.ravel()
+        at_first = model.evaluated("violations", start, inputs).ravel()
         if np.abs(at_first).max() < HELD:
             for array in violated:
                 array[:] = 0.0
@@ -271,11 +261,6 @@ class ErrorModel:
         return slow, settling
 
     @cached_property
-    def _constants(self) -> int:
-        """Address of the constants of the full model."""
-        return self.shape.model.constants.ctypes.data
-
-    @cached_property
     def _of_shape(self) -> Ready:
         """The shape and the full equations, as the loop takes them."""
         shape, model, kernels = self.shape, self.shape.model, self.shape.model.kernels
@@ -286,21 +271,18 @@ class ErrorModel:
         places = shape.indices, model.planar[[2, 0, 1]], pairs, reference
         return ready(Shape(*places, np.array(addresses), model.constants))
 
-    def _violations(self, deviations: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Violations of the constraints and their rates (samples, 2 c)."""
-        shape, model = self.shape, self.shape.model
-        states = shape.states(deviations + shape.reference, np.zeros((len(deviations), 3)))
-        sizes = states.shape[1], inputs.shape[1], 2 * len(model.definition.constraints)
-        return at_samples(model.kernels, "violations", model.constants, (states, inputs), sizes)
-
     @cached_property
     def free(self) -> Free:
         """Coordinates of the shape that are free, those by which the others are known best."""
-        shape, n = self.shape, len(self.shape.indices)
-        if not shape.model.definition.constraints:
+        shape, model, n = self.shape, self.shape.model, len(self.shape.indices)
+        count = 2 * len(model.definition.constraints)
+        if not count:
             return Free(np.arange(n), np.eye(n), np.zeros((0, n)), np.zeros((0, n)))
         steps = DIFFERENCE * np.vstack([np.eye(n), -np.eye(n)])
-        violations = self._violations(steps, np.zeros((2 * n, len(shape.model.inputs))))
+        states = shape.states(steps + shape.reference, np.zeros((2 * n, 3)))
+        paths = states, np.zeros((2 * n, len(model.inputs)))
+        sizes = len(model.definition.states), len(model.inputs), count
+        violations = at_samples(model.kernels, "violations", model.constants, paths, sizes)
         jacobian = (violations[:n] - violations[n:]).T / (2.0 * DIFFERENCE)
         # Its import takes longer than thousands of estimates.
         import scipy.linalg
@@ -342,39 +324,16 @@ class ErrorModel:
         return np.array([half for part in parts for half in (part.real, part.imag)])
 
 
-def _filled(matrix: np.ndarray) -> np.ndarray:
-    """A matrix with further columns of zeros, up to a multiple of the lanes."""
-    rows, columns = matrix.shape
-    filled = np.zeros((rows, padded(columns, LANES)))
-    filled[:, :columns] = matrix
-    return filled
-
-
-class Corrected(NamedTuple):
-    """A corrected run (nodes, n), none if it can't be known, and whether all changes were small.
-
-    In bounds is the largest error of the run's bounded outputs.
-    """
-
-    states: np.ndarray | None
-    in_bounds: float
-    is_settled: bool
-
-
-LOST = Corrected(None, math.inf, False)
-
-
 class Space(NamedTuple):
-    """Arrays of a run, what its start violates, bounded outputs, and the loop.
-
-    Constants is the index of the word with the address of the outputs' constants.
-    """
+    """Arrays of a run, what its start violates, bounded outputs, and the loop."""
 
     path: Path
     violated: Violated
     bounded: Bounded
     call: Prepared
-    constants: int
+
+
+SPACES: Pool[Space] = Pool()
 
 
 class Free(NamedTuple):

@@ -13,17 +13,19 @@ import numpy as np
 from vehiclemor.arguments import require
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.multibody.quantities import ErrorBound
-from vehiclemor.reduction.error_estimate import estimates, judged_run
-from vehiclemor.reduction.interface import MEMBERS, FittedModel, OfflineCost, simulated
+from vehiclemor.reduction.error_estimate import judged
+from vehiclemor.reduction.interface import MEMBERS, FittedModel, simulated
 from vehiclemor.reduction.reduced_system import ReducedSystem
 from vehiclemor.reduction.settings import FallbackSettings
 from vehiclemor.registry import component
 from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.trajectory import WITHOUT_COMPLAINT, Start, Trajectory, Trust
 
-NOT_ESTIMATED = "its error was not estimated"
-# What users step and ask is the reduced model.
-STEPPED = ("states", "begin", "step", "rates", "sensitivities", "decode", "trust")
+# What is that of the reduced model: users step and ask this one.
+REDUCED = (
+    *("offline", "order", "best_approximation"),
+    *("states", "begin", "step", "rates", "sensitivities", "decode", "trust"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,23 +41,9 @@ class FallbackModel(ShortRepr):
             require(hasattr(self.reduced, name), name)
 
     def __getattr__(self, name: str) -> Any:
-        if name not in STEPPED:
+        if name not in REDUCED:
             raise AttributeError(f"a model with fallback has no {name}")
         return getattr(self.reduced, name)
-
-    @property
-    def offline(self) -> OfflineCost:
-        """Cost of the reduced model."""
-        return self.reduced.offline
-
-    @property
-    def order(self) -> int:
-        """Order of the reduced model."""
-        return self.reduced.order
-
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """Best approximation of the reduced model."""
-        return self.reduced.best_approximation(states)
 
     def simulate(
         self,
@@ -68,7 +56,8 @@ class FallbackModel(ShortRepr):
 
         It is judged by its estimated error in bounds, those of the model by default.
         """
-        run = judged_run(self.reduced.simulate, maneuver, start, bounds)
+        run = self.reduced.simulate(maneuver, start)
+        run = judged(run, self.reduced.simulate, (maneuver, start), bounds)
         if outputs is not None:
             run = run.chosen(outputs)
         if run.status in WITHOUT_COMPLAINT and run.trust and np.isinf(run.trust.until):
@@ -87,7 +76,7 @@ class FallbackModel(ShortRepr):
         )
 
 
-def with_fallback(reduced: FittedModel, model: Any, settings: Any) -> FittedModel:
+def with_fallback(reduced: FittedModel, model: Any, settings: Any) -> Any:
     """A reduced model with the fallback that its settings name, if they name one."""
     if not isinstance(settings, FallbackSettings) or settings.fallback == "none":
         return reduced
@@ -103,16 +92,14 @@ def run_of(
     given: tuple[Excitation, Start],
     outputs: tuple[str, ...] | None,
     bounds: Mapping[str, ErrorBound] | None,
-    off: bool,
+    estimate: bool,
 ) -> Trajectory:
-    """A run of a reduced model with some outputs alone; its error is estimated unless it is off."""
-    if isinstance(reduced, FallbackModel) and not off:
-        return reduced.simulate(*given, outputs, bounds)
-    if off:
-        return simulated(getattr(reduced, "reduced", reduced), *given, outputs)
-    run = judged_run(reduced.simulate, *given, bounds)
-    if run.trust is None and run.finished and estimates(run.model):
-        # It is too short, or nothing is bounded.
-        remark = "; ".join(filter(None, (run.remark, NOT_ESTIMATED)))
-        run = Trajectory.of(**run.__dict__ | {"remark": remark})
+    """A run of a reduced model with some outputs alone; whether its error is estimated."""
+    if isinstance(reduced, FallbackModel):
+        if estimate:
+            return reduced.simulate(*given, outputs, bounds)
+        reduced = reduced.reduced
+    if not estimate:
+        return simulated(reduced, *given, outputs)
+    run = judged(reduced.simulate(*given), reduced.simulate, given, bounds)
     return run if outputs is None else run.chosen(outputs)

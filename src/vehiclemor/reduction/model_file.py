@@ -110,9 +110,10 @@ def read(path: Any) -> dict[str, Any]:
         further = {"model": model, "method": method, "settings": settings}
         return further | {"training": tuple(training)} | fields
     except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError) as error:
-        raise _unfit(path, one_line(error)) from None
+        why = one_line(error)
     except (SyntaxError, ValueError, VehiclemorError) as error:
-        raise _unfit(path, str(error)) from None
+        why = str(error)
+    raise FileError(f"{path}: does not fit what is installed ({why}); reduce the model again")
 
 
 def training_of(path: Path, inputs: Sequence[Quantity]) -> dict[str, str]:
@@ -189,7 +190,3 @@ def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         if sum(8 * math.prod(variable.shape) for variable in file.variables.values()) > MOST_BYTES:
             raise FileError(f"{path}: its variables have more than {MOST_BYTES} bytes")
         return {name: variable[...] for name, variable in file.variables.items()}, attrs
-
-
-def _unfit(path: Path, why: str) -> FileError:
-    return FileError(f"{path}: does not fit what is installed ({why}); reduce the model again")

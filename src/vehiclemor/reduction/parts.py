@@ -65,20 +65,19 @@ class Parts:
             arrays = as_arrays(value)
             return {name: self._write_array(arrays[name], f"{path}.{name}") for name in arrays}
         if types := _fields(kind):
-            named_kind = {} if kind is _record(declared) else {CLASS: _name(value, path)}
-            fields = {name: getattr(value, name) for name in types}
-            return named_kind | self._write_fields(fields, path, types)
+            fields: dict[str, Any] = {}
+            if kind is not _record(declared):
+                fields[CLASS] = _name(value, path)
+            for name, of in types.items():
+                fields[name] = self.write(getattr(value, name), f"{path}.{name}", of)
+            return fields
         if kind in (tuple, list) and len(types := _item_types(choice, len(value))) == len(value):
             items = enumerate(zip(value, types, strict=True))
             return [self.write(item, f"{path}.{i}", of) for i, (item, of) in items]
         if kind is dict and all(isinstance(key, str) for key in value):
-            return self._write_fields(value, path, dict.fromkeys(value, _value_type(choice)))
+            of = _value_type(choice)
+            return {name: self.write(inner, f"{path}.{name}", of) for name, inner in value.items()}
         raise _unwritable(path, value)
-
-    def _write_fields(
-        self, values: Mapping[str, Any], path: str, types: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        return {n: self.write(value, f"{path}.{n}", types[n]) for n, value in values.items()}
 
     def _write_array(self, value: np.ndarray, path: str) -> dict[str, Any]:
         # Products of matrices are rounded as their numbers stand in memory.
@@ -98,16 +97,20 @@ class Parts:
             value = self._full[part[REFERENCE]]
         elif ARRAY in part:
             value = self._read_array(part, path)
-        elif CLASS in part:
-            fields = {name: inner for name, inner in part.items() if name != CLASS}
-            value = self._read_record(named(part[CLASS]), fields, path)
         elif OPERATIONS in choices:
             value = of_arrays(*(self._read_array(part[n], f"{path}.{n}") for n in OPERATION_ARRAYS))
-        elif record := _record(declared):
-            value = self._read_record(record, part, path)
         else:
-            of = _value_type(_chosen(choices, dict, path))
-            value = self._read_fields(part, path, dict.fromkeys(part, of))
+            kind = named(part[CLASS]) if CLASS in part else _record(declared)
+            inner = {name: value for name, value in part.items() if name != CLASS}
+            if kind is None:
+                types = dict.fromkeys(inner, _value_type(_chosen(choices, dict, path)))
+            else:
+                types = _fields(kind)
+            fields = {n: self.read(part, f"{path}.{n}", types[n]) for n, part in inner.items()}
+            value: Any = fields if kind is None else kind(**fields)
+            # A plug-in's class may derive from one of this package.
+            if hasattr(value, "check_sizes"):
+                value.check_sizes()
         _chosen(choices, type(value), path)
         return value
 
@@ -116,18 +119,6 @@ class Parts:
         types = _item_types(_chosen(choices, kind, path), len(part))
         items = enumerate(zip(part, types, strict=True))
         return kind(self.read(item, f"{path}.{i}", of) for i, (item, of) in items)
-
-    def _read_fields(
-        self, parts: Mapping[str, Any], path: str, types: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        return {n: self.read(part, f"{path}.{n}", types[n]) for n, part in parts.items()}
-
-    def _read_record(self, kind: Any, parts: Mapping[str, Any], path: str) -> Any:
-        record = kind(**self._read_fields(parts, path, _fields(kind)))
-        # A plug-in's class may derive from one of this package.
-        if hasattr(record, "check_sizes"):
-            record.check_sizes()
-        return record
 
     def _read_array(self, part: Mapping[str, Any], path: str) -> np.ndarray:
         kind = part[ARRAY]

@@ -16,8 +16,8 @@ from vehiclemor.files import data_folder
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.inputs.maneuver import registered
 from vehiclemor.reduction import model_file
-from vehiclemor.reduction.error_estimate import checked_bounds
-from vehiclemor.reduction.fallback import NOT_ESTIMATED, run_of
+from vehiclemor.reduction.error_estimate import NOT_ESTIMATED, checked_bounds, estimates
+from vehiclemor.reduction.fallback import run_of
 from vehiclemor.reduction.interface import FittedModel, Method, lower_rank
 from vehiclemor.reduction.settings import Value
 from vehiclemor.reduction.training import own_speed, training_summary
@@ -62,15 +62,13 @@ class ReducedOrderModel(ShortRepr):
     input_range: InputRange | None = None
 
     def __str__(self) -> str:
-        lines = [f"{self._name}, order {self.reduced.order}"]
-        if self._lower_rank:
-            lines.append(self._lower_rank)
+        lines = [f"{self._name}, order {self.reduced.order}", self._lower_rank]
         if self.input_range is not None:
             runs = self.__getstate__()["training"]
             sizes, inputs = self.input_range.largest, self.model.definition.inputs
             covered = training_summary(self.method, runs, sizes, inputs)
             lines += [f"{name}: {text}" for name, text in covered.items()]
-        return "\n  ".join(lines)
+        return "\n  ".join(filter(None, lines))
 
     @cached_property
     def _lower_rank(self) -> str:
@@ -139,10 +137,13 @@ class ReducedOrderModel(ShortRepr):
         own = None if bounds is None else self.checked_bounds(bounds, off)
         with blamed(f"method {self.method!r}: simulate", self.reduced):
             names = None if outputs is None else output_names(outputs)
-            run = run_of(self.reduced, (chosen, first), names, own, off or self._own_limits)
+            estimate = not (off or self._method.own_limits)
+            run = run_of(self.reduced, (chosen, first), names, own, estimate)
+        # It is off, too short, or nothing is bounded.
+        unknown = estimate and run.trust is None and run.finished and estimates(run.model)
+        remarks = run.remark, self._lower_rank, NOT_ESTIMATED if off or unknown else ""
         # A copy would take a twentieth of a short run.
         run.__dict__.update(method=self.method, maneuver=chosen.name)
-        remarks = run.remark, self._lower_rank, NOT_ESTIMATED if off else ""
         run.__dict__["remark"] = "; ".join(filter(None, remarks))
         if not (off or run.trust) and self._range is not None:
             run = run.judged(self._range.trust(self.model, chosen, own_speed(self.model) or 0.0))
@@ -152,7 +153,7 @@ class ReducedOrderModel(ShortRepr):
         """Bounds of `simulate` by output; `InputError` if one is wrong, or none can be judged."""
         if off:
             raise InputError("bounds: runs with trust='off' are not judged")
-        if self._own_limits:
+        if self._method.own_limits:
             raise InputError(f"bounds: errors of these runs by {self.method} are not estimated")
         return checked_bounds(self.model, bounds)
 
@@ -171,19 +172,19 @@ class ReducedOrderModel(ShortRepr):
         """
         from vehiclemor.simulation.build import reparametrised
 
-        model, method = reparametrised(self.model, parameters), component("method", self.method)
-        settings = validated(method, self.model.kind, self.settings)
-        return replace(self, model=model, reduced=for_model(method, self.reduced, model, settings))
+        model = reparametrised(self.model, parameters)
+        settings = validated(self._method, model.kind, self.settings)
+        reduced = for_model(self._method, self.reduced, model, settings)
+        return replace(self, model=model, reduced=reduced)
 
     @cached_property
-    def _own_limits(self) -> bool:
-        return component("method", self.method).own_limits
+    def _method(self) -> Method:
+        return component("method", self.method)
 
     @cached_property
     def _range(self) -> InputRange | None:
         """Known inputs, if the method does not judge its runs."""
-        method: Method = component("method", self.method)
-        return method.known_range(self.model, self.settings, lambda: self.input_range)
+        return self._method.known_range(self.model, self.settings, lambda: self.input_range)
 
     def dataset(self, run: Trajectory) -> xr.Dataset:
         """A run as a labelled dataset, with units."""

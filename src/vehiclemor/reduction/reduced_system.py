@@ -24,7 +24,22 @@ from vehiclemor.simulation.workspaces import Run, Solver
 MOST_STARTS = 64
 
 
-class ReducedSystem(SteppedSystem, ShortRepr):
+class SteppedModel(ShortRepr):
+    """What systems and mechanisms share whose states are those of the model."""
+
+    def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Full states (samples, n) of states (samples, dim) at inputs (samples, inputs)."""
+        del inputs
+        return states
+
+    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
+        """How far states (samples, dim) go in what the model knows, if it judges itself."""
+
+    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
+        """There is no subspace."""
+
+
+class ReducedSystem(SteppedSystem, SteppedModel):
     """Base of systems in reduced states of a full-order model, with the ways there and back.
 
     A subclass is a dataclass that has the attributes below, as fields or cached properties, and
@@ -54,42 +69,30 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         del inputs
         return state
 
-    def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Full states (samples, 2 n) of states (samples, dim) at inputs (samples, inputs)."""
-        del inputs
-        return states
-
     def decoder_slopes(
         self, state: np.ndarray, inputs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the full state (2 n, dim) and (2 n, inputs) by state and inputs."""
         return np.eye(len(state)), np.zeros((len(state), len(inputs)))
 
-    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
-        """How far states (samples, dim) go in what the model knows, if it judges itself."""
-        del states, inputs
-
     def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
         """State (dim,) of a start, as `simulate` begins with it: in the first window's subspace."""
-        return self.projected(self.known(start, inputs), inputs).copy()
+        return self.projected(self.known(start, inputs)[1], inputs).copy()
 
-    def known(self, start: Start, inputs: np.ndarray) -> Any:
-        """What `prepared` gives of a start at inputs; cached by its name or its numbers."""
+    def known(self, start: Start, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Full and reduced state of a start at inputs; cached by its name or its numbers."""
         name = start if isinstance(start, str) else self.model.start(start).tobytes()
         key = name, inputs.tobytes()
-        prepared = self._starts.get(key)
-        if prepared is None:
+        states = self._starts.get(key)
+        if states is None:
             if len(self._starts) >= MOST_STARTS:
                 self._starts.clear()
-            prepared = self._starts[key] = self.prepared(self.model.start(start), inputs)
-        return prepared
-
-    def prepared(self, state: np.ndarray, inputs: np.ndarray) -> Any:
-        """What runs from a full state (2 n,) need of it: the state that is stepped."""
-        return self.encode(state, inputs)
+            state = self.model.start(start)
+            states = self._starts[key] = state, self.encode(state, inputs)
+        return states
 
     @cached_property
-    def _starts(self) -> dict[tuple[str | bytes, bytes], Any]:
+    def _starts(self) -> dict[tuple[str | bytes, bytes], tuple[np.ndarray, np.ndarray]]:
         return {}
 
     def sensitivities(
@@ -127,18 +130,14 @@ class ReducedSystem(SteppedSystem, ShortRepr):
         """Integrate, then decode to full states at the maneuver's output times."""
         maneuver = checked_maneuver(maneuver, self.model.definition)
         inputs = maneuver.recorded_inputs[1]
-        run = self.run(maneuver, self.known(start, inputs[0]))
+        run = self.run(maneuver, self.known(start, inputs[0])[1])
         states = self.decode(run.output.states, inputs)
         trajectory = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)
         run.give_back()
         return trajectory
 
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """There is no subspace."""
-        del states
 
-
-class ReducedMechanism(ShortRepr):
+class ReducedMechanism(SteppedModel):
     """Base of kinematic models: the coordinates, which are the states, follow from the inputs.
 
     A subclass is a dataclass that has `order`, `offline` and `simulate` too.
@@ -192,16 +191,3 @@ class ReducedMechanism(ShortRepr):
         if of == "rhs":
             self.rates(state, inputs, time)
         return self.slopes(state, inputs, by, of)
-
-    def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """The coordinates themselves."""
-        del inputs
-        return states
-
-    def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
-        """How far the inputs go in what the model knows, if it judges itself."""
-        del states, inputs
-
-    def best_approximation(self, states: np.ndarray) -> np.ndarray | None:
-        """There is no subspace."""
-        del states

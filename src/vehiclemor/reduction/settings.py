@@ -54,11 +54,6 @@ def _one_of(names: Collection[str]) -> tuple[Any, ...]:
 
 
 AnyIntegrator = Annotated[str, *_one_of(INTEGRATORS)]
-# How a reduced system is integrated: the same two settings of all methods that have one.
-Solver = Annotated[
-    AnyIntegrator,
-    Field(description="as of full_order; etdrk4 freezes the Jacobian"),
-]
 # Projected systems have no Jacobian to freeze.
 ProjectedSolver = Annotated[str, *_one_of([name for name in INTEGRATORS if not frozen(name)])]
 # Of an iteration.
@@ -80,7 +75,9 @@ class OnlineSettings(Settings):
     """How a reduced system is integrated."""
 
     integration = ("solver", "tolerance")
-    solver: Solver = "etdrk4"
+    solver: AnyIntegrator = Field(
+        "etdrk4", description="as of full_order; etdrk4 freezes the Jacobian"
+    )
     tolerance: Tolerance = 1e-3
 
 

@@ -64,27 +64,9 @@ def trust_in(ranges: Mapping[str, tuple[float, float]]) -> Trust:
     )
     if until == np.inf:
         return Trust(indicator)
-    return Trust(indicator, until, by_factor(f"{name} leaves its known range", used))
-
-
-def by_factor(reason: str, factor: float) -> str:
-    """A reason with how many times the range of training is used."""
     # Of what was zero in training no multiple tells anything.
-    return f"{reason} by a factor of {factor:.3g}" if factor < 1e6 else reason
-
-
-def largest_samples(maneuvers: Sequence[Excitation]) -> np.ndarray:
-    """Largest magnitudes (1, inputs) of inputs, at output times."""
-    values = [np.abs(maneuver.at(maneuver.times)).max(axis=0) for maneuver in maneuvers]
-    return EDGE * np.maximum(np.max(values, axis=0), NOTHING)[None]
-
-
-def largest_bands(maneuvers: Sequence[Excitation]) -> np.ndarray:
-    """Largest magnitudes and shares (6, inputs) of inputs of structures, see `bands_of`."""
-    largest = np.max([bands_of(maneuver) for maneuver in maneuvers], axis=0)
-    # A share so small does not matter.
-    largest[1:] = np.maximum(CHANCE * largest[1:], QUIET)
-    return EDGE * np.maximum(largest, NOTHING)
+    factor = f" by a factor of {used:.3g}" if used < 1e6 else ""
+    return Trust(indicator, until, f"{name} leaves its known range{factor}")
 
 
 @lru_cache(maxsize=512)
@@ -128,11 +110,15 @@ class InputRange:
     def trust(self, model: Model, maneuver: Excitation, speed: float) -> Trust:
         """How far a run with an initial speed in m/s goes in the range."""
         maneuver = completed(maneuver, model.definition)
+        names = [f"input {name}" for name in model.inputs]
         if model.kind == "structural":
-            ranges = self._bands(model.inputs, maneuver)
+            bands = ["", *(f", {low:g} to {high:g} Hz" for low, high in pairwise(BANDS))]
+            names = [f"{name}{band}" for name in names for band in bands]
+            times, used = np.zeros(1), (bands_of(maneuver) / self._sizes).T.reshape(1, -1)
         else:
             times, inputs = maneuver.recorded_inputs
-            ranges = self._samples(model.inputs, inputs, times)
+            used = inputs / self._sizes[0]
+        ranges = ranges_of(times, used, names)
         if model.kind != "ae":
             off = abs(speed - self.speed) / self.reach
             ranges["initial speed"] = off, 0.0 if off > 1.0 else np.inf
@@ -140,22 +126,10 @@ class InputRange:
         ranges["duration"] = lasts, self.longest if lasts > 1.0 else np.inf
         return trust_in(ranges)
 
-    def _bands(self, names: Sequence[str], maneuver: Excitation) -> dict[str, tuple[float, float]]:
-        """How far the inputs of a structure go, in magnitude and in each band."""
-        used = bands_of(maneuver) / self._sizes
-        words = ["", *(f", {low:g} to {high:g} Hz" for low, high in pairwise(BANDS))]
-        labels = [f"input {name}{word}" for name in names for word in words]
-        return ranges_of(np.zeros(1), used.T.reshape(1, -1), labels)
-
     def trust_of_inputs(self, names: Sequence[str], inputs: np.ndarray) -> Trust:
         """How far inputs (samples, inputs) go in the range, each for itself."""
-        return trust_in(self._samples(names, inputs, np.zeros(len(inputs))))
-
-    def _samples(
-        self, names: Sequence[str], inputs: np.ndarray, times: np.ndarray
-    ) -> dict[str, tuple[float, float]]:
-        """How far samples of inputs go in magnitude."""
-        return ranges_of(times, inputs / self._sizes[0], [f"input {name}" for name in names])
+        names = [f"input {name}" for name in names]
+        return trust_of(np.zeros(len(inputs)), inputs / self._sizes[0], names)
 
 
 def input_range(model: Model, runs: Sequence[tuple[Excitation, float]]) -> InputRange:
@@ -166,9 +140,15 @@ def input_range(model: Model, runs: Sequence[tuple[Excitation, float]]) -> Input
     middle = 0.5 * (low + high)
     reach = EDGE * (max(0.5 * (high - low), SPEED_SLACK * middle) or 1.0)
     longest = max(maneuver.duration for maneuver in maneuvers)
-    largest_of = largest_bands if model.kind == "structural" else largest_samples
     lasts = np.inf if model.kind == "ae" else EDGE * longest
-    return InputRange(largest_of(maneuvers), middle, reach, lasts)
+    if model.kind == "structural":
+        largest = np.max([bands_of(maneuver) for maneuver in maneuvers], axis=0)
+        # A share so small does not matter.
+        largest[1:] = np.maximum(CHANCE * largest[1:], QUIET)
+    else:
+        samples = [np.abs(maneuver.at(maneuver.times)).max(axis=0) for maneuver in maneuvers]
+        largest = np.max(samples, axis=0)[None]
+    return InputRange(EDGE * np.maximum(largest, NOTHING), middle, reach, lasts)
 
 
 def band_range(model: Model, highest: float) -> InputRange:

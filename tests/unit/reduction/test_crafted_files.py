@@ -25,12 +25,10 @@ from vehiclemor.reduction import parts
 from vehiclemor.reduction.parts import Parts
 
 ROOM = "vehiclemor.reduction"
-
-
 NAMES = [
     *("os:system", "vehiclemor.files:write_text", f"{ROOM}.no_such_room:thing"),
     *("vehiclemor.simulation.dynamic:DynamicModel", f"{ROOM}.reduced_system:ReducedMechanism"),
-    *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.blocks", "PLANAR")),
+    *(f"{ROOM}.vehicle.features:{name}" for name in ("monomials", "Features.terms", "PLANAR")),
     # Defined elsewhere.
     f"{ROOM}.vehicle.reduced_vehicle:Features",
 ]

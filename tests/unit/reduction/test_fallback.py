@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vehiclemor.reduction.fallback import FallbackModel
+from vehiclemor.reduction.fallback import FallbackModel, run_of
 from vehiclemor.reduction.interface import OfflineCost
 from vehiclemor.reduction.methods.full_order import FullOrderSystem
 from vehiclemor.reduction.validation import fitted, validated
@@ -28,6 +28,7 @@ class LeavesAt:
     told: bool = True
     offline: OfflineCost = field(default_factory=OfflineCost)
     order: int = 0
+    reduced: str = "called as that of a model with fallback"
 
     def simulate(self, *_):
         full = whole()
@@ -70,6 +71,7 @@ def test_a_trusted_run_is_the_reduced_one():
     run, own = guarded(reduced).simulate(STEER, "dropped"), reduced.simulate()
     assert (run.status, run.remark) == ("ok", own.remark)
     np.testing.assert_array_equal(run.outputs, own.outputs)
+    assert run_of(reduced, (STEER, "dropped"), None, None, estimate=False).status == "ok"
 
 
 def test_a_reduced_run_that_fails_without_a_warning_is_trusted_nowhere():

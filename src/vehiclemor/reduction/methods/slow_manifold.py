@@ -174,7 +174,7 @@ def _fitted_on_rates(
     linear = [*small, *required.odd, *straight, *required.even]
     decoded = chosen(linear, every_term, samples.deviations, DECODED)
     decoded.sort(key=lambda term: term not in odd)
-    decoding = np.zeros((len(decoded), len(shape.names)))
+    decoding = np.zeros((len(decoded), len(shape.indices)))
     decoding[: len(shapes)] = shapes
     return ReducedVehicle(
         shape.model,

@@ -8,7 +8,6 @@ acts by similarity: what counts is a slip, or a torque, over the friction.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from operator import add
 
@@ -40,40 +39,15 @@ SATURATION = 1.2
 LEAST_DEFLECTION, NEWTON, STEEPEST = 1e-9, 2, 0.9
 
 
-@dataclass(frozen=True)
-class Tire:
-    """Parameters of Fiala's tire, and static load in N."""
-
-    values: Mapping[str, float]
-    static: float
-
-
-@dataclass(frozen=True)
-class WheelState:
-    """Tangent of the slip angle, load and, with torques, longitudinal force in N.
-
-    Friction where it is not 1.
-    """
-
-    slip: Value
-    load: Value
-    thrust: Value | None
-    friction: Value | None
-
-
 def add_axles(
     features: SlowFeatures, model: DynamicModel, samples: ShapeSamples, z: np.ndarray
 ) -> None:
     """Add lines of the axles' forces, fitted on training samples with coordinates z."""
     fit = _WheelFit(features, samples, z)
-    if set(FIALA) <= set(model.parameters.entries):
-        features.forces = FORCES
-        for axle, wheels in enumerate(AXLES):
-            _add_tires(fit, model, axle, wheels)
-    else:
-        features.forces = FORCES[:3]
-        for axle, wheels in enumerate(AXLES):
-            _add_powers(fit, model, axle, wheels)
+    known = set(FIALA) <= set(model.parameters.entries)
+    features.forces, add_axle = (FORCES, _add_tires) if known else (FORCES[:3], _add_powers)
+    for axle, wheels in enumerate(AXLES):
+        add_axle(fit, model, axle, wheels)
 
 
 class _WheelFit:
@@ -132,58 +106,59 @@ def _add_powers(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence
 def _add_tires(fit: _WheelFit, model: DynamicModel, axle: int, wheels: Sequence[str]) -> None:
     """Forces of both tires of an axle by their own law."""
     features = fit.features
-    slips, loads = (
-        np.tan(fit.outputs(model, "slip_angle", wheels)),
-        fit.outputs(model, "Fz", wheels),
-    )
+    slips = np.tan(fit.outputs(model, "slip_angle", wheels))
+    loads = fit.outputs(model, "Fz", wheels)
     small, curved = fit.parts(slips @ MEAN, fit.odd)
     slip, slip_half = features.let(small + curved), fit(slips @ HALF, fit.turning)
     load, load_half = fit(loads @ MEAN, fit.even), fit(loads @ HALF, fit.odd)
-    tire = Tire({name: float(model.parameters[name]) for name in FIALA}, float(loads.mean()))
+    tire = {name: float(model.parameters[name]) for name in FIALA}
+    tire["static_load"] = float(loads.mean())
     thrusts: list[Value | None] = [None, None]
     if features.inputs.torques:
         values = fit.outputs(model, "Fx", wheels)
         thrust, thrust_half = fit(values @ MEAN, fit.driven), fit(values @ HALF, fit.odd)
         thrusts = [thrust + thrust_half, thrust - thrust_half]
-    grips_of = [features.friction(wheel) for wheel in wheels]
     sides = (slip + slip_half, load + load_half), (slip - slip_half, load - load_half)
-    states = [
-        WheelState(*side, thrust, grip)
-        for side, thrust, grip in zip(sides, thrusts, grips_of, strict=True)
-    ]
     left, right = (
-        add_fiala(features, wheel, state, tire) for wheel, state in zip(wheels, states, strict=True)
+        add_fiala(features, tire, wheel, *side, thrust)
+        for wheel, side, thrust in zip(wheels, sides, thrusts, strict=True)
     )
     for kind, one, other in zip(FORCES, left, right, strict=False):
         features.line(f"{kind}{axle}", one + other)
         features.line(f"{kind}D{axle}", one - other)
-    stiffness = 2.0 * tire.values["cornering_stiffness"] / tire.static
+    stiffness = 2.0 * tire["cornering_stiffness"] / tire["static_load"]
     for kind, slope in (("F", -stiffness), ("M", stiffness / 3.0)):
         proportional = features.parameter(slope) * small
         features.line(f"{kind}C{axle}", features.by_name[f"{kind}{axle}"] - proportional)
 
 
 def add_fiala(
-    features: SlowFeatures, wheel: str, state: WheelState, tire: Tire
+    features: SlowFeatures,
+    tire: Mapping[str, float],
+    wheel: str,
+    slip: Value,
+    load: Value,
+    thrust: Value | None,
 ) -> tuple[Value, Value, Value]:
     """Lateral force and aligning moment of a wheel, and its part that slides.
 
-    Forces as parts of the static load, moments as parts of it times the width.  Without torques it
-    is Fiala's law at free rolling, else the brush model, at the slip ratio that its longitudinal
-    force needs.
+    Given are the tire's parameters and its static load, the tangent of the slip angle, the load
+    and, with torques, the longitudinal force in N.  Forces are parts of the static load, moments
+    parts of it times the width.  Without torques it is Fiala's law at free rolling, else the brush
+    model, at the slip ratio that its longitudinal force needs.
     """
-    values, parameter, let = tire.values, features.parameter, features.let
-    slip, load, least = let(state.slip), let(state.load), parameter(LEAST_LOAD * tire.static)
-    load = let(0.5 * (load + least + abs(load - least)))
-    grip = load if state.friction is None else let(load * state.friction)
-    most = parameter(values["largest_friction"])
-    fall = parameter(values["largest_friction"] - values["smallest_friction"])
-    across, deflection = let(parameter(values["cornering_stiffness"] / 3.0) * slip), None
-    if state.thrust is None:
+    static, parameter, let = tire["static_load"], features.parameter, features.let
+    slip, load, least = let(slip), let(load), parameter(LEAST_LOAD * static)
+    load, friction = let(0.5 * (load + least + abs(load - least))), features.friction(wheel)
+    grip = load if friction is None else let(load * friction)
+    most = parameter(tire["largest_friction"])
+    fall = parameter(tire["largest_friction"] - tire["smallest_friction"])
+    across, deflection = let(parameter(tire["cornering_stiffness"] / 3.0) * slip), None
+    if thrust is None:
         limit = let(grip * (most - fall * abs(slip)))
         raw = let(across / limit)
     else:
-        thrust, per_slip = let(state.thrust), values["longitudinal_slip_stiffness"] / 3.0
+        thrust, per_slip = let(thrust), tire["longitudinal_slip_stiffness"] / 3.0
 
         def friction_force(along: Value) -> Value:
             ratio = let(parameter(1.0 / per_slip) * along)
@@ -192,14 +167,14 @@ def add_fiala(
         along = let(thrust * (1.0 / 3.0))
         along = _deflected(features, along, across, (thrust, friction_force(along)))
         limit = friction_force(along)
-        nothing = parameter(LEAST_DEFLECTION * tire.static**2)
+        nothing = parameter(LEAST_DEFLECTION * static**2)
         deflection = let(np.sqrt(across * across + along * along + nothing))
         raw = let(deflection / limit)
     features.watched.append((parameter(1.0 / SATURATION) * raw, f"saturation of the {wheel} tire"))
     y = let(clipped(raw))
     left = let(1.0 - abs(y))
     sticking = let(left * left)
-    share = let(parameter(1.0 / tire.static) * limit * y)
+    share = let(parameter(1.0 / static) * limit * y)
     if deflection is not None:
         share = let(share * across / deflection)
     force = let(-share * (3.0 - 3.0 * abs(y) + y * y))

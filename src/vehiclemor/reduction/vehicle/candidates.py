@@ -42,19 +42,13 @@ def wheel_terms(features: SlowFeatures) -> tuple[list[Names], list[Names], list[
 
 @dataclass(frozen=True)
 class Required:
-    """Terms that the equations always have.
+    """Terms that the equations always have."""
 
-    Attributes
-    ----------
-    small, straight
-        Small steering, with what left wheels have more of a torque, and straight running: odd and
-        even ones whose coefficients are those of the linearised vehicle.
-    odd, even
-        Others, whose coefficients are fitted.
-    """
-
+    # Of small steering, with what left wheels have more of a torque, and of straight running: odd
+    # and even ones whose coefficients are those of the linearised vehicle.
     small: Sequence[Names]
     straight: Sequence[Names]
+    # Others, whose coefficients are fitted.
     odd: Sequence[Names]
     even: Sequence[Names]
 

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, reduce
 from operator import mul
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from vehiclemor.codegen.operations import (
     COMPARISONS,
     FUNCTIONS,
     MOST_SIZE,
+    WIDTH,
     Kernel,
     Listing,
     Operation,
@@ -32,6 +33,7 @@ from vehiclemor.codegen.operations import (
     padded,
     pruned,
 )
+from vehiclemor.reduction.vehicle.shape import VehicleShape
 from vehiclemor.simulation.evaluation import at_samples
 from vehiclemor.simulation.system import System
 
@@ -56,7 +58,7 @@ class Features:
     operations: tuple[Operation, ...]
     named: tuple[int, ...]  # Numbers of the operations with names, see `operations`.
     terms: tuple[int, ...]  # Number of the operation that gives each feature.
-    # (numbers of features, columns of C) of each block of C that is not zero; all if empty.
+    # (numbers of features, columns of C) of each block of C that is not zero.
     groups: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = ()
     # (operation, what it is) of what tells how far a run goes: at a magnitude of 1 it leaves
     # the training range.
@@ -65,12 +67,6 @@ class Features:
     def check_sizes(self) -> None:
         """Raise `ValueError` if the operations are more than arithmetic of what they are given."""
         needed_parameters(self)
-
-    @property
-    def blocks(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
-        """Blocks of C: numbers of features, columns."""
-        everything = tuple(range(len(self.terms))), tuple(range(self.states + PLANAR))
-        return self.groups or (everything,)
 
 
 @lru_cache(maxsize=64)
@@ -92,7 +88,7 @@ def needed_parameters(features: Features) -> int:
     calls = sum(op.kind in (*FUNCTIONS, "atan2", "power") for op in operations)
     total = len(operations) + CALL * calls
     require(len(features.groups) <= columns, "groups")
-    for terms, targets in features.blocks:
+    for terms, targets in features.groups:
         check_distinct_indices("groups", terms, len(features.terms))
         check_distinct_indices("groups", targets, columns)
         require(bool(terms and targets), "groups")
@@ -117,13 +113,12 @@ class FeatureListing(Listing):
         self,
         terms: Sequence[Term],
         groups: Any = (),
-        watched: Sequence[tuple[Term, str]] = (),
+        watched: Sequence[tuple[Value, str]] = (),
     ) -> Features:
         """Features, each the product of its factors, and no operation that none needs."""
         numbers = [product(term).number for term in terms]
-        watches = [(product(term).number, what) for term, what in watched]
-        numbers_watched = [number for number, _ in watches]
-        operations, renumbered = pruned(self.operations, [*numbers, *numbers_watched])
+        needed = [*numbers, *(value.number for value, _ in watched)]
+        operations, renumbered = pruned(self.operations, needed)
         named = [renumbered[n] for n in sorted(self.named) if n in renumbered]
         return Features(
             states=len(self.z),
@@ -132,22 +127,21 @@ class FeatureListing(Listing):
             named=tuple(named),
             terms=tuple(renumbered[n] for n in numbers),
             groups=groups,
-            watched=tuple((renumbered[n], what) for n, what in watches),
+            watched=tuple((renumbered[value.number], what) for value, what in watched),
         )
+
+
+def filled(matrix: np.ndarray, width: int = WIDTH) -> np.ndarray:
+    """A matrix with further columns of zeros, up to a multiple of the width."""
+    rows, columns = matrix.shape
+    result = np.zeros((rows, padded(columns, width)))
+    result[:, :columns] = matrix
+    return result
 
 
 def product(factors: Term) -> Value:
     """The product of factors, from the first one on."""
     return reduce(mul, factors)
-
-
-class Layout(NamedTuple):
-    """Indices in a vehicle's states: of its shape, of position and heading, of pairs that turn."""
-
-    size: int
-    shape: Sequence[int]
-    planar: Sequence[int]
-    pairs: Sequence[tuple[int, int]]
 
 
 def _listed(features: Features) -> tuple[Listing, list[Value]]:
@@ -158,12 +152,14 @@ def _listed(features: Features) -> tuple[Listing, list[Value]]:
     return listing, [Value(listing, number) for number in features.terms]
 
 
-def rates_kernel(features: Features, parameters: int) -> Kernel:
+# A fit makes systems of the same features again and again.
+@cache
+def rates_kernels(features: Features, parameters: int) -> Kernels:
     """The right-hand side; constants are that many parameters, then C."""
     k, first = features.states, parameters
     listing, values = _listed(features)
     sums: dict[int, list[Value]] = {}
-    for terms, columns in features.blocks:
+    for terms, columns in features.groups:
         parts = listing.sums("_constants", first, len(columns), [values[j] for j in terms])
         first += len(terms) * padded(len(columns))
         for i, part in zip(columns, parts, strict=True):
@@ -178,29 +174,29 @@ def rates_kernel(features: Features, parameters: int) -> Kernel:
         listing.store(i, totals[i])
     listing.store(k + 1, forward * cosine - sideward * sine)
     listing.store(k + 2, forward * sine + sideward * cosine)
-    return listing.kernel("derivative", ARGUMENTS)
+    return Kernels([listing.kernel("derivative", ARGUMENTS)])
 
 
-def decoding_kernel(features: Features, layout: Layout, parameters: int) -> Kernel:
+def decoding_kernel(features: Features, shape: VehicleShape, parameters: int) -> Kernel:
     """What gives full states, and after them what is watched.
 
     Constants are the features' parameters, then rows of coefficients: of the terms, and of the
     shape at straight running.
     """
-    k = features.states
+    k, size = features.states, len(shape.model.definition.states)
     listing, factors = _listed(features)
     factors.append(listing.number(1.0))
-    values = listing.sums("_constants", parameters, len(layout.shape), factors)
-    shape = dict(zip(layout.shape, values, strict=True))
+    values = listing.sums("_constants", parameters, len(shape.indices), factors)
+    parts = dict(zip(shape.indices.tolist(), values, strict=True))
     sine, cosine = listing.parts(listing.new("sincos", listing.entry("_x", k)), 2)
-    results: dict[int, Value | float] = dict.fromkeys(range(layout.size), 0.0) | shape
-    for index, i in zip(layout.planar, (k + 1, k + 2, k), strict=True):
+    results: dict[int, Value | float] = dict.fromkeys(range(size), 0.0) | parts
+    for index, i in zip(shape.model.planar.tolist(), (k + 1, k + 2, k), strict=True):
         results[index] = listing.entry("_x", i)
-    for a, b in layout.pairs:
-        results[a] = cosine * shape[a] - sine * shape[b]
-        results[b] = sine * shape[a] + cosine * shape[b]
+    for a, b in shape.pairs:
+        results[a] = cosine * parts[a] - sine * parts[b]
+        results[b] = sine * parts[a] + cosine * parts[b]
     watched = (Value(listing, number) for number, _ in features.watched)
-    results |= enumerate(watched, layout.size)
+    results |= enumerate(watched, size)
     for index, value in results.items():
         listing.store(index, value)
     return listing.kernel("full_state", ARGUMENTS)
@@ -223,36 +219,27 @@ def _column_kernels(features: Features) -> Kernels:
     return Kernels([listing.kernel("columns", ARGUMENTS)])
 
 
-# A fit makes systems of the same features again and again.
-@cache
-def _kernels(features: Features, parameters: int) -> Kernels:
-    return Kernels([rates_kernel(features, parameters)])
-
-
 def feature_system(
     features: Features,
     parameters: np.ndarray,
     coefficients: np.ndarray,
     error_scale: np.ndarray,
-    reference: np.ndarray,
-    reference_inputs: np.ndarray,
+    inputs_at_rest: np.ndarray,
 ) -> System:
-    """The reduced vehicle as the compiled loops take it, see `ReducedVehicle`.
+    """The reduced vehicle as the compiled loops take it, its Jacobian frozen at straight running.
 
-    The Jacobian is frozen at the reference (states,) and its inputs (inputs,).
+    Arrays are those of `ReducedVehicle`.
     """
-    blocks = [np.zeros((len(terms), padded(len(c)))) for terms, c in features.blocks]
-    for block, (terms, columns) in zip(blocks, features.blocks, strict=True):
-        block[:, : len(columns)] = coefficients[np.ix_(terms, columns)]
+    blocks = [filled(coefficients[np.ix_(terms, columns)]) for terms, columns in features.groups]
     constants = np.concatenate([parameters, *(block.ravel() for block in blocks)])
     dim = features.states + PLANAR
     return System(
-        _kernels(features, len(parameters)),
+        rates_kernels(features, len(parameters)),
         constants,
         features.inputs,
-        np.concatenate([reference, np.zeros(PLANAR)]),
+        np.zeros(dim),
         error_scale,
         np.arange(dim - 2),
         np.zeros(0, dtype=np.int64),
-        reference_inputs=reference_inputs,
+        reference_inputs=inputs_at_rest,
     )

@@ -37,8 +37,8 @@ DIFFERENCE = 1e-6
 NOTHING = 1e-12
 DAMPING = 1e-4
 MOST_DAMPING = 1e2
-# (indices of features, column) of the coefficients that may change.
-Free = Sequence[tuple[Sequence[int], int]]
+# Features and columns of the coefficients that may change, one entry for each.
+Free = tuple[np.ndarray, np.ndarray]
 
 
 def ridge_fit(columns: np.ndarray, values: np.ndarray, weight: float) -> np.ndarray:
@@ -119,10 +119,7 @@ class Target:
 
 
 def targets_of(
-    reduced: ReducedVehicle,
-    training: Training,
-    runs: Sequence[Trajectory],
-    heading: float = YAW_BOUND,
+    reduced: ReducedVehicle, training: Training, runs: Sequence[Trajectory], heading: float
 ) -> list[Target]:
     """Training runs in reduced states; `heading` is the error in rad that counts as `PLACE`."""
     k, result = reduced.features.states - 1, []
@@ -142,28 +139,26 @@ def targets_of(
     return result
 
 
-def free_entries(free: Free) -> tuple[np.ndarray, np.ndarray]:
-    """Features and columns of the coefficients that may change, one entry for each."""
-    terms = np.concatenate([features for features, _ in free])
-    counts = [len(features) for features, _ in free]
-    return terms, np.repeat([column for _, column in free], counts)
-
-
 def improved(
-    reduced: ReducedVehicle, targets: Sequence[Target], free: Free, steps: int
+    reduced: ReducedVehicle,
+    targets: Sequence[Target],
+    free: Sequence[tuple[Sequence[int], int]],
+    steps: int,
 ) -> ReducedVehicle:
     """The reduced vehicle after so many damped Gauss-Newton steps of its free coefficients.
 
-    The sum of the runs' errors is minimised, not that of their squares (iteratively reweighted
-    least squares): the worst runs, near a spin, count no more than the others.
+    Free are indices of features, each with the column of their coefficients.  The sum of the runs'
+    errors is minimised, not that of their squares (iteratively reweighted least squares): the worst
+    runs, near a spin, count no more than the others.
     """
     paths, error = _compared(reduced, targets)
-    terms, targeted = free_entries(free)
+    terms = np.concatenate([features for features, _ in free])
+    columns = np.repeat([column for _, column in free], [len(features) for features, _ in free])
     change, moved, damping = np.zeros(len(terms)), reduced, DAMPING
     for _ in range(steps):
         if not np.isfinite(error):
             break
-        normal, gradient = normal_equations(moved, targets, paths, free)
+        normal, gradient = normal_equations(moved, targets, paths, (terms, columns))
         scale = np.sqrt(np.diag(normal))
         # Of a feature that is zero in all samples.
         scale[scale == 0.0] = 1.0
@@ -171,7 +166,7 @@ def improved(
         while damping < MOST_DAMPING:
             step = np.linalg.solve(scaled + damping * np.eye(len(scale)), gradient / scale) / scale
             coefficients = reduced.coefficients.copy()
-            coefficients[terms, targeted] += change - step
+            coefficients[terms, columns] += change - step
             candidate = replace(reduced, coefficients=coefficients)
             new, new_error = _compared(candidate, targets)
             if new_error < error:
@@ -206,11 +201,10 @@ def normal_equations(
     free: Free,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Normal matrix and gradient of the sum of errors by the free coefficients."""
-    size = sum(len(terms) for terms, _ in free)
+    size = len(free[0])
     normal, gradient = np.zeros((size, size)), np.zeros(size)
     for target, path in zip(targets, paths, strict=True):
-        rows = _sensitivities(reduced, target, path, free, target.shares[:, None] * target.scale)
-        rows = rows.reshape(-1, size)
+        rows = _sensitivities(reduced, target, path, free).reshape(-1, size)
         error = _errors(target, path).ravel()
         weight = max(error @ error, NOTHING) ** -0.5
         normal += weight * (rows.T @ rows)
@@ -219,12 +213,9 @@ def normal_equations(
 
 
 def _sensitivities(
-    reduced: ReducedVehicle, target: Target, path: np.ndarray, free: Free, weights: np.ndarray
+    reduced: ReducedVehicle, target: Target, path: np.ndarray, free: Free
 ) -> np.ndarray:
-    """Derivatives (compared times, states + 3, free coefficients) of a reduced run.
-
-    Those of each state at each time come times its weight (compared times, states + 3).
-    """
+    """Derivatives (compared times, states + 3, free coefficients) of `_errors`."""
     k, c = reduced.features.states, reduced.coefficients
     steps = target.steps
     path, inputs, times = path[steps], target.inputs[steps], target.times[steps]
@@ -251,11 +242,12 @@ def _sensitivities(
     inverse = np.linalg.inv(np.eye(dim) - half * jacobian[1:])
     advance = inverse @ (np.eye(dim) + half * jacobian[:-1])
     now, before = half * inverse @ turns[1:], half * inverse @ turns[:-1]
-    terms, targets = free_entries(free)
+    terms, targets = free
     driven = columns[:samples, None, terms]
     forcing = np.take(now, targets, axis=2) * driven[1:]
     forcing += np.take(before, targets, axis=2) * driven[:-1]
     result = np.zeros((samples, dim, len(targets)))
     loop = loops(PATH_LOOPS, ("recurrence",))["recurrence"]
     loop(advance, forcing, result)
+    weights = target.shares[:, None] * target.scale
     return weights[:, :, None] * result[(samples - 1) % COMPARED :: COMPARED]

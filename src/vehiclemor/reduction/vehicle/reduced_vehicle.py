@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from vehiclemor.arguments import check_shapes, require
 from vehiclemor.codegen.kernels import Kernels
-from vehiclemor.codegen.loops import Prepared
-from vehiclemor.codegen.operations import LANES, Kernel, padded
+from vehiclemor.codegen.operations import LANES, Kernel
 from vehiclemor.inputs.checks import checked_maneuver
 from vehiclemor.inputs.excitation import Excitation
 from vehiclemor.reduction.interface import OfflineCost
@@ -21,13 +18,12 @@ from vehiclemor.reduction.trust import trust_of
 from vehiclemor.reduction.vehicle.features import (
     PLANAR,
     Features,
-    Layout,
     decoding_kernel,
     feature_system,
+    filled,
     needed_parameters,
 )
 from vehiclemor.reduction.vehicle.shape import VehicleShape
-from vehiclemor.short_repr import ShortRepr
 from vehiclemor.simulation.control_periods import ControlPeriods, whole_space
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.evaluation import (
@@ -43,90 +39,6 @@ from vehiclemor.simulation.trajectory import Start, Trajectory, Trust
 from vehiclemor.simulation.workspaces import Run
 
 NO_COST = OfflineCost()
-
-
-class DecodingSpace(NamedTuple):
-    """Arrays of one decoding at a time, and the loop that writes the states.
-
-    `counts` are the words of the call in which the number of rows stands.
-    """
-
-    states: np.ndarray
-    call: Prepared
-    counts: Sequence[int]
-
-
-@dataclass(frozen=True, eq=False)
-class Decoding(ShortRepr):
-    """How full states follow from reduced ones, see `ReducedVehicle`.
-
-    Coefficients (terms, n) are of the shape's deviation from its reference, straight running.
-    """
-
-    features: Features
-    parameters: np.ndarray
-    coefficients: np.ndarray
-    reference: np.ndarray
-    layout: Layout
-
-    @property
-    def kernel(self) -> tuple[Kernel, np.ndarray]:
-        """The kernel of full states and, behind them, of what is watched; and its constants."""
-        rows = np.vstack([self.coefficients, self.reference])
-        rows = np.pad(rows, ((0, 0), (0, padded(rows.shape[1]) - rows.shape[1])))
-        kernel = decoding_kernel(self.features, self.layout, len(self.parameters))
-        return kernel, np.concatenate([self.parameters, rows.ravel()])
-
-    @cached_property
-    def _kernels(self) -> tuple[Kernels, np.ndarray]:
-        kernel, constants = self.kernel
-        kernel.check(self.features.states + PLANAR, self.features.inputs, len(constants))
-        return Kernels([kernel]), constants
-
-    @property
-    def _results(self) -> int:
-        return self.layout.size + len(self.features.watched)
-
-    def slopes(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of full states by reduced ones and inputs."""
-        kernels, constants = self._kernels
-        size, arrays = self.layout.size, (state, inputs, constants)
-        by_state = partial(kernels, "full_state", arrays, self._results, STATE)
-        by_inputs = partial(kernels, "full_state", arrays, self._results, INPUTS)
-        return by_state[:size], by_inputs[:size]
-
-    def states(self, path: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-        """Full states and, behind them, what is watched (samples, 2 n + watched).
-
-        The path has reduced states (samples, states + 3).
-        """
-        kernels, constants = self._kernels
-        sizes = self.features.states + PLANAR, self.features.inputs, self._results
-        return at_samples(kernels, "full_state", constants, (path, inputs), sizes)
-
-    def of_run(self, run: Run) -> np.ndarray:
-        """As of `states`, results where a run is recorded: its first `run.rows` rows.
-
-        The array belongs to the run.
-        """
-        space = run.cached_loops.get("decoded")
-        if space is None:
-            space = self._space(run.output.states, run.inputs, run.rows)
-            run.cached_loops["decoded"] = space
-        for index in space.counts:
-            space.call.words[index] = run.rows
-        space.call()
-        return space.states
-
-    def _space(self, path: np.ndarray, inputs: np.ndarray, rows: int) -> DecodingSpace:
-        """The loop over arrays of a run, packed once."""
-        kernels, constants = self._kernels
-        lanes = LANES if rows >= LANES else 1
-        address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
-        states = np.empty((len(path), self._results))
-        call = path_loops()["kernel_path"].prepared(path, inputs, address, constants, states)
-        counts = [call.address(name) + 1 for name in ("path", "inputs", "result")]
-        return DecodingSpace(states, call, counts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +71,7 @@ class ReducedVehicle(ReducedSystem):
 
     def check_sizes(self) -> None:
         """Raise `ValueError` if kernels would read or write beyond these arrays."""
-        features, decoded = self.features, self.decoded_features or self.features
+        features, decoded = self.features, self._decoded_features
         k, n, inputs = features.states, len(self.shape.indices), len(self.model.inputs)
         require((features.inputs, decoded.inputs) == (inputs, inputs), "features")
         require(decoded.states == k, "features")
@@ -182,8 +94,7 @@ class ReducedVehicle(ReducedSystem):
     def system(self) -> System:
         """The compiled equations."""
         arrays = self.parameters, self.coefficients, self.error_scale
-        reference = np.zeros(self.features.states), self.model.inputs_at_rest
-        return feature_system(self.features, *arrays, *reference)
+        return feature_system(self.features, *arrays, self.model.inputs_at_rest)
 
     @property
     def spaces(self) -> ControlPeriods:
@@ -196,20 +107,70 @@ class ReducedVehicle(ReducedSystem):
         x, y, heading = self.model.definition.planar
         return (*(f"z{i}" for i in range(self.features.states)), heading, x, y)
 
+    @property
+    def decoder(self) -> tuple[Kernel, np.ndarray]:
+        """The kernel of full states and, behind them, of what is watched; and its constants."""
+        rows = filled(np.vstack([self.decoding, self.shape.reference]))
+        kernel = decoding_kernel(self._decoded_features, self.shape, len(self.parameters))
+        return kernel, np.concatenate([self.parameters, rows.ravel()])
+
+    @property
+    def _decoded_features(self) -> Features:
+        return self.decoded_features or self.features
+
+    @cached_property
+    def _decoder(self) -> tuple[Kernels, np.ndarray]:
+        kernel, constants = self.decoder
+        kernel.check(self.order, self.features.inputs, len(constants))
+        return Kernels([kernel]), constants
+
+    @property
+    def _decoded_size(self) -> int:
+        """Number of full states and of what is watched."""
+        return len(self.model.definition.states) + len(self._decoded_features.watched)
+
+    def _decoded(self, path: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Full states and, behind them, what is watched (samples, 2 n + watched)."""
+        kernels, constants = self._decoder
+        sizes = self.order, self.features.inputs, self._decoded_size
+        return at_samples(kernels, "full_state", constants, (path, inputs), sizes)
+
+    def _decoded_run(self, run: Run) -> np.ndarray:
+        """The same in the first `run.rows` rows, where a run is recorded.
+
+        The array belongs to the run.
+        """
+        held = run.cached_loops.get("decoded")
+        if held is None:
+            (kernels, constants), lanes = self._decoder, LANES if run.rows >= LANES else 1
+            address = np.array([address_of(kernels, "full_state", lanes)], dtype=np.int64)
+            states = np.empty((len(run.output.states), self._decoded_size))
+            path = run.output.states, run.inputs
+            call = path_loops()["kernel_path"].prepared(*path, address, constants, states)
+            counts = [call.address(name) + 1 for name in ("path", "inputs", "result")]
+            held = run.cached_loops["decoded"] = states, call, counts
+        states, call, counts = held
+        for index in counts:
+            call.words[index] = run.rows
+        call()
+        return states
+
     def decode(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Full states (samples, 2 n) of reduced ones."""
-        return self.decoder.states(states, inputs)[:, : self.decoder.layout.size]
+        return self._decoded(states, inputs)[:, : len(self.model.definition.states)]
 
     def decoder_slopes(
         self, state: np.ndarray, inputs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the full state by the reduced one and by the inputs."""
-        return self.decoder.slopes(state, inputs)
+        (kernels, constants), size = self._decoder, len(self.model.definition.states)
+        given = kernels, "full_state", (state, inputs, constants), self._decoded_size
+        return partial(*given, STATE)[:size], partial(*given, INPUTS)[:size]
 
     def trust(self, states: np.ndarray, inputs: np.ndarray) -> Trust | None:
         """How far states (samples, states + 3) go in the ranges that are watched."""
-        names = [name for _, name in self.decoder.features.watched]
-        used = self.decoder.states(states, inputs)[:, self.decoder.layout.size :]
+        names = [name for _, name in self._decoded_features.watched]
+        used = self._decoded(states, inputs)[:, len(self.model.definition.states) :]
         return trust_of(np.zeros(len(states)), used, names) if names else None
 
     def encode(self, state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -224,11 +185,8 @@ class ReducedVehicle(ReducedSystem):
         turn, forward, left = self.settling @ (self.shape.of(state[None]) - decoded)[0]
         heading = path[0, -PLANAR]
         cosine, sine = np.cos(heading), np.sin(heading)
-        path[0, -PLANAR:] += (
-            turn,
-            forward * cosine - left * sine,
-            forward * sine + left * cosine,
-        )
+        way = forward * cosine - left * sine, forward * sine + left * cosine
+        path[0, -PLANAR:] += turn, *way
         return path[0]
 
     def encoded_path(self, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -237,12 +195,6 @@ class ReducedVehicle(ReducedSystem):
         x, y, heading = self.model.planar
         z = deviations @ self.encoding.T - inputs @ self.feedthrough.T
         return np.hstack([z, states[:, [heading, x, y]]])
-
-    @cached_property
-    def decoder(self) -> Decoding:
-        """The compiled way back to full states."""
-        shape, features = self.shape, self.decoded_features or self.features
-        return Decoding(features, self.parameters, self.decoding, shape.reference, shape.layout)
 
     def path(self, maneuver: Excitation, start: Start) -> np.ndarray | None:
         """Reduced states (samples, states + 3), if the run comes to its end."""
@@ -259,7 +211,7 @@ class ReducedVehicle(ReducedSystem):
         inputs = maneuver.recorded_inputs[1]
         state, encoded = self.known(start, inputs[0])
         run = self.run(maneuver, encoded, record_all_until=0.0)
-        states = self.decoder.of_run(run)
+        states = self._decoded_run(run)
         samples = run.output.point_of_sample
         if not len(samples) or samples[0, 1] < 0.0:
             # The start is known better than its slow part.
@@ -267,11 +219,3 @@ class ReducedVehicle(ReducedSystem):
         trajectory = self.model.recorded(maneuver, run, inputs, states, outputs=outputs)
         run.give_back()
         return trajectory
-
-    def begin(self, start: Start, inputs: np.ndarray) -> np.ndarray:
-        """Reduced state of a start."""
-        return self.known(start, inputs)[1].copy()
-
-    def prepared(self, state: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A full state as a start, and its reduced state at inputs."""
-        return state, self.encode(state, inputs)

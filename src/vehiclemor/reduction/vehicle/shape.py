@@ -7,6 +7,7 @@ heading and the position follow by quadratures:
     shape' = f(shape, u);  psi' = r,  X' = U cos(psi) - V sin(psi),  Y' = U sin(psi) + V cos(psi)
 
 with r, U, V functions of shape and u.  Angles of the wheels' spin are left out for the same reason.
+Inputs are the steering with its derivatives, and torques and friction of the wheels.
 """
 
 from collections.abc import Sequence
@@ -16,9 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vehiclemor.multibody.quantities import WHEELS
-from vehiclemor.reduction.vehicle.features import Layout
-from vehiclemor.reduction.vehicle.vehicle_inputs import VehicleInputs, unknown_input
+from vehiclemor.multibody.quantities import OPTIONAL_INPUTS, WHEELS
 from vehiclemor.simulation.dynamic import DynamicModel
 from vehiclemor.simulation.integrators.step_kernels import partners
 from vehiclemor.simulation.model import Model
@@ -30,6 +29,11 @@ STEP = 6e-6
 STILL, POWERS, RANK = 1e-6, 4, 1e-10
 # Outputs in which the slow manifold has its nonlinear terms.
 SLIP_OUTPUTS = ("roll", *(f"slip_angle_{wheel}" for wheel in WHEELS))
+DRIVE, BRAKE, FRICTION = "drive_torque", "brake_torque", "friction"
+# Steps of inputs in differences: of torques in N m, of all others.
+TORQUE_STEP, INPUT_STEP = 1.0, 1e-5
+OPTIONAL = {quantity.name for quantity in OPTIONAL_INPUTS}
+KNOWN = {f"{kind}_{wheel}" for kind in (DRIVE, BRAKE, FRICTION) for wheel in WHEELS}
 
 
 def no_vehicle(model: Model) -> str:
@@ -39,7 +43,12 @@ def no_vehicle(model: Model) -> str:
     missing = [name for name in SLIP_OUTPUTS if name not in model.outputs]
     if missing:
         return f"{model.name} has no output {', '.join(missing)}"
-    return unknown_input(model)
+    steering, *others = [name for name in model.inputs if name not in KNOWN] or [""]
+    if driven := [name for name in others if name in OPTIONAL]:
+        return f"it reduces vehicles on an even road; this one is driven by {driven[0]} too"
+    if not steering or others != [f"{steering}_dot", f"{steering}_ddot"][: len(others)]:
+        return f"the inputs of {model.name} are not a steering and its derivatives"
+    return ""
 
 
 def no_steered_vehicle(model: Model) -> str:
@@ -47,6 +56,45 @@ def no_steered_vehicle(model: Model) -> str:
     if driven := model.definition.choice.driven if hasattr(model, "definition") else ():
         return f"it reduces vehicles that steer alone; this one is driven by {driven[0]} too"
     return no_vehicle(model)
+
+
+@dataclass(frozen=True)
+class VehicleInputs:
+    """Names of a vehicle's inputs; steering and its derivatives come first."""
+
+    names: tuple[str, ...]
+
+    @property
+    def steering(self) -> int:
+        """How many inputs are the steering and its derivatives."""
+        return sum(name not in OPTIONAL for name in self.names)
+
+    @property
+    def torques(self) -> bool:
+        """Whether drive or brakes are inputs."""
+        return any(name.startswith((DRIVE, BRAKE)) for name in self.names)
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Steps (inputs,) of differences."""
+        torque = [name.startswith((DRIVE, BRAKE)) for name in self.names]
+        return np.where(torque, TORQUE_STEP, INPUT_STEP)
+
+    def left_torque(self, left: str, right: str) -> np.ndarray:
+        """Inputs (inputs,) by which the left wheel has 1 N m of drive more, and no more in sum."""
+        change = np.zeros(len(self.names))
+        for wheel, half in ((left, 0.5), (right, -0.5)):
+            drive, brake = self.of_wheel(DRIVE, wheel), self.of_wheel(BRAKE, wheel)
+            if drive is not None:
+                change[drive] = half
+            elif brake is not None:
+                change[brake] = -half
+        return change
+
+    def of_wheel(self, kind: str, wheel: str) -> int | None:
+        """Index of an input at a wheel, if it is one."""
+        name = f"{kind}_{wheel}"
+        return self.names.index(name) if name in self.names else None
 
 
 @dataclass(frozen=True)
@@ -84,11 +132,6 @@ class VehicleShape:
         return VehicleInputs(self.model.inputs)
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Names of the shape's states."""
-        return tuple(self.model.definition.states[i] for i in self.indices)
-
-    @cached_property
     def pairs(self) -> list[tuple[int, int]]:
         """Indices of pairs of states, other than the position, that are components in space."""
         turning, planar = self.model.rotating, set(self.model.planar)
@@ -104,12 +147,6 @@ class VehicleShape:
     def speed(self) -> float:
         """Speed of straight running in m/s."""
         return float(self.rates(self.reference[None], self.model.inputs_at_rest[None])[1][0, 1])
-
-    @property
-    def layout(self) -> Layout:
-        """Where the shape stands in the states."""
-        size = len(self.model.definition.states)
-        return Layout(size, self.indices.tolist(), self.model.planar.tolist(), self.pairs)
 
     def of(self, states: np.ndarray) -> np.ndarray:
         """Shapes (samples, n) of states (samples, 2 n)."""
@@ -171,7 +208,7 @@ class VehicleShape:
             parts.append(linear.a @ parts[-1])
         moved = np.hstack(parts)
         moved /= np.abs(moved).max(axis=0)
-        partner = partners(self.names)
+        partner = partners(tuple(self.model.definition.states[i] for i in self.indices))
         matrix = np.zeros((len(partner), len(partner)))
         for i, j in enumerate(partner):
             still = i == j and np.abs(moved[i]).max() <= STILL

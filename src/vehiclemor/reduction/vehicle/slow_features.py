@@ -16,8 +16,14 @@ from vehiclemor.multibody.quantities import WHEELS
 from vehiclemor.reduction.vehicle.features import FeatureListing, Features, feature_columns
 from vehiclemor.reduction.vehicle.fitting import largest
 from vehiclemor.reduction.vehicle.linear_modes import SlowModes
-from vehiclemor.reduction.vehicle.shape import ShapeSamples, VehicleShape
-from vehiclemor.reduction.vehicle.vehicle_inputs import BRAKE, DRIVE, FRICTION, VehicleInputs
+from vehiclemor.reduction.vehicle.shape import (
+    BRAKE,
+    DRIVE,
+    FRICTION,
+    ShapeSamples,
+    VehicleInputs,
+    VehicleShape,
+)
 
 AXLES = (WHEELS[:2], WHEELS[2:])
 # Factors of a term, by the names of their lines.
@@ -127,9 +133,8 @@ class SlowFeatures(FeatureListing):
         """Features of these terms; the first ones are the odd ones."""
         indices = tuple(range(len(terms)))
         groups = (indices[:odd], self.odd_columns), (indices[odd:], self.even_columns)
-        watched = [((value,), meaning) for value, meaning in self.watched]
         factors = [self.term(names) for names in terms]
-        return self.features(factors, groups if odd else (), watched)
+        return self.features(factors, groups if odd else (), self.watched)
 
     def columns(self, terms: Sequence[Names], z: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Terms (samples, terms) of coordinates (samples, states) and inputs.

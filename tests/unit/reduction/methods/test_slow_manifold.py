@@ -98,7 +98,7 @@ def test_it_is_right_on_inputs_between_those_that_it_has_seen(reduced):
 
 
 def _without_curvature(reduced):
-    c, (odd, even) = reduced.coefficients.copy(), (block[0] for block in reduced.features.blocks)
+    c, (odd, even) = reduced.coefficients.copy(), (block[0] for block in reduced.features.groups)
     # Four lateral coordinates and the steering; 1, the speed and four symmetric coordinates.
     c[list(odd[5:])] = 0.0
     c[list(even[6:])] = 0.0

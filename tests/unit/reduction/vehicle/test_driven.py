@@ -1,6 +1,7 @@
 """Reduced vehicles that are driven and braked on roads of different friction."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +9,9 @@ import pytest
 import vehiclemor as vm
 from tests.oracles.high_fidelity_data import brush
 from vehiclemor.multibody.quantities import FIALA
-from vehiclemor.reduction.vehicle.axle_forces import Tire, WheelState, add_fiala
+from vehiclemor.reduction.vehicle.axle_forces import add_fiala
+from vehiclemor.reduction.vehicle.shape import KNOWN, SLIP_OUTPUTS, VehicleInputs, no_vehicle
 from vehiclemor.reduction.vehicle.slow_features import SlowFeatures
-from vehiclemor.reduction.vehicle.vehicle_inputs import VehicleInputs
 from vehiclemor.simulation.build import build
 from vehiclemor.study.scenario import Scenario
 
@@ -23,12 +24,8 @@ TIMES = np.linspace(0.0, 5.0, 251)
 @cache
 def reduced(name):
     family = f"{CARS[name]}random_drive"
-    training = [
-        Scenario.of(
-            f"{family}:{seed}", (1.0, AMPLITUDES[seed % 5]), "equilibrium", SPEEDS[seed % 5]
-        )
-        for seed in range(25)
-    ]
+    cases = zip(range(25), 5 * AMPLITUDES, 5 * SPEEDS, strict=True)
+    training = [Scenario.of(f"{family}:{k}", (1.0, a), "equilibrium", v) for k, a, v in cases]
     return vm.reduce(name, "slow_manifold", training=training, steps=2, tolerance=1e-5)
 
 
@@ -118,15 +115,19 @@ def test_random_driving_is_near_that_of_the_vehicle(rom):
             assert np.abs(run[name] - full[name]).max() < 0.3
 
 
+def test_a_vehicle_that_is_not_steered_is_refused():
+    cart = SimpleNamespace(name="cart", planar="xyz", outputs=SLIP_OUTPUTS, inputs=KNOWN)
+    assert no_vehicle(cart) == "the inputs of cart are not a steering and its derivatives"
+
+
 def test_the_tire_is_the_brush_of_the_vehicle():
     values = build("high_fidelity_vehicle").parameters
     parameters = {name: float(values[name]) for name in FIALA}
     short = ("c_long", "c_alpha", "mu_max", "mu_min", "width")
     of_oracle = {f"tyre.{key}": parameters[name] for key, name in zip(short, FIALA, strict=True)}
     made = SlowFeatures(3, 0, VehicleInputs(("friction_FL",)))
-    slip, load, thrust, _ = made.z
-    state = WheelState(slip, load, thrust, made.friction("FL"))
-    force, moment, _ = add_fiala(made, "FL", state, Tire(parameters, 1000.0))
+    tire = parameters | {"static_load": 1e3}
+    force, moment, _ = add_fiala(made, tire, "FL", *made.z[:3])
     made.line("force", 1000.0 * force)
     made.line("moment", 1000.0 * parameters["tire_width"] * moment)
     random = np.random.default_rng(5)

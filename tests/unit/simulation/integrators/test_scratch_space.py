@@ -109,8 +109,7 @@ def test_a_reduced_run_stays_in_its_space(n, rank, inputs, formulation, solver):
 def test_a_step_of_a_reduced_vehicle_stays_in_its_space():
     listing = FeatureListing(3, 1)
     z, alone = listing.z, (*listing.z, *listing.u, listing.number(1.0))
-    features = listing.features([*((value,) for value in alone), tuple(z)])
-    system = feature_system(
-        features, np.zeros(0), -0.1 * np.ones((6, 6)), np.ones(6), np.zeros(3), np.zeros(1)
-    )
-    check(system, 1, whole_space(6), "etdrk4")
+    terms, everything = [*((value,) for value in alone), tuple(z)], (range(6), range(6))
+    features = listing.features(terms, (everything,))
+    arrays = np.zeros(0), -0.1 * np.ones((6, 6)), np.ones(6), np.zeros(1)
+    check(feature_system(features, *arrays), 1, whole_space(6), "etdrk4")
