@@ -182,7 +182,7 @@ def maneuver(name, value):
         ("name", [3], "name of a maneuver is 3"),
         ("duration", [-1.0, "5", 1e300], "duration"),
         ("samples", [0, 2.5, 10**12], "samples is"),
-        ("inputs", ["delta"], "inputs is 'delta'"),
+        ("inputs", [3, ["delta", 1]], "inputs is"),
     ],
 )
 def test_maneuvers_that_are_none(name, values, word):

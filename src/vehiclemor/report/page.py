@@ -107,7 +107,8 @@ def _run_studies(wanted: Sequence[str], folder: Path, jobs: int) -> dict[str, xr
     for name in chosen:
         for dataset in run_studies(name, folder, jobs).values():
             # Two studies may have one name, but not one file.
-            datasets[Path(dataset.encoding["source"]).stem] = dataset
+            file = Path(dataset.encoding.get("source", dataset.attrs["study"]))
+            datasets[file.stem] = dataset
     return datasets
 
 
