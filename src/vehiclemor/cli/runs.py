@@ -1,8 +1,9 @@
 """One run or one model: simulated, drawn, exported, given to other programs."""
 
 import inspect
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -111,6 +112,12 @@ def simulate(
 
     outputs = ready.outputs if all_outputs else tabled_outputs(ready.definition)
     print(simulation_text(dataset, outputs, ready.counts))
+    _write(dataset, out, picture)
+    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
+
+
+def _write(dataset: Any, out: Path | None, picture: Path | None) -> None:
+    """Write a run to those files that are asked for, and say so."""
     if out is not None:
         from vehiclemor.netcdf_file import write_dataset
 
@@ -121,7 +128,6 @@ def simulate(
         print(f"written: {picture}")
     if out is None and picture is None:
         print("nothing is saved: --out FILE.nc saves the result, --plot draws it")
-    return FAILED if dataset["status"].item() in ("diverged", "error") else 0
 
 
 def _maneuver(name: str | None, csv: list[str] | None) -> str | vm.Signal | None:
@@ -219,6 +225,32 @@ def plot(
     print(f"written: {picture}")
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Exported:
+    """Options of what an export holds: its integrator, numbers, inputs and outputs.
+
+    Parameters
+    ----------
+    step
+        Step size in s of the integrator in C and FMU.
+    integrator
+        In C and FMU: rk4, explicit; ros2, linearly implicit with one Jacobian, for longer steps.
+    precision
+        Of the numbers in C and FMU.
+    inputs
+        Optional inputs of the full model that the export has, such as brake_torque_FL.
+    outputs
+        Outputs that the export computes; all by default.
+    """
+
+    step: float = STEP
+    integrator: Integrator = "rk4"
+    precision: Precision = "double"
+    inputs: Annotated[tuple[str, ...], Several, Parameter(name="--input", show_default=False)] = ()
+    outputs: Annotated[list[str] | None, Several, Parameter(name="--output")] = None
+
+
 def export(
     model: str,
     *,
@@ -228,11 +260,7 @@ def export(
     parameter: Parameters = None,
     out: Path | None = None,
     overwrite: bool = False,
-    step: float = STEP,
-    integrator: Integrator = "rk4",
-    precision: Precision = "double",
-    inputs: Annotated[tuple[str, ...], Several, Parameter(name="--input", show_default=False)] = (),
-    outputs: Annotated[list[str] | None, Several, Parameter(name="--output")] = None,
+    exported: Exported = Exported(),
 ) -> None:
     """Export a model, or a reduced one, for another tool.
 
@@ -251,16 +279,6 @@ def export(
         Folder or file; under the model's name here by default.
     overwrite
         Replace an export that is there.
-    step
-        Step size in s of the integrator in C and FMU.
-    integrator
-        In C and FMU: rk4, explicit; ros2, linearly implicit with one Jacobian, for longer steps.
-    precision
-        Of the numbers in C and FMU.
-    inputs
-        Optional inputs of the full model that the export has, such as brake_torque_FL.
-    outputs
-        Outputs that the export computes; all by default.
     """
     given, values = key_values("--set", settings), key_values("--parameter", parameter)
     file = Path(model).suffix == ".nc"
@@ -278,17 +296,7 @@ def export(
         out = destination(name_of(model, method), to, out, overwrite)
         if method is not None:
             chosen = vm.reduce(chosen, method, **given)
-    written = vm.export(
-        chosen,
-        to,
-        out,
-        step=step,
-        precision=precision,
-        integrator=integrator,
-        inputs=inputs,
-        outputs=outputs,
-        overwrite=overwrite,
-    )
+    written = vm.export(chosen, to, out, overwrite=overwrite, **vars(exported))
     print(f"written: {written}")
 
 
