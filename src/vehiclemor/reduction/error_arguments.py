@@ -18,8 +18,8 @@ DECAY, BEGIN, END, RATES = 0, 2, 4, 6
 class Path(NamedTuple):
     """A run of a reduced model at nodes that are a step in s apart.
 
-    Its states and those that are corrected (nodes, n), inputs (rows, inputs), of which those behind
-    the nodes are like the last ones, and the start (n,) of the full model.
+    Its states and those that are corrected (nodes, n), inputs (nodes, inputs), and the start (n,)
+    of the full model.
     """
 
     step: Float
@@ -90,7 +90,7 @@ class Violated(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Room for all nodes: states, rates, shapes, slopes of the path, motions.
+    """Room for all nodes: states, inputs, rates, shapes, slopes of the path, motions.
 
     Then in modes what drives errors, and the errors; what changes shapes: violations of the
     constraints, and changes of the errors.  For the nodes of a window what is left over of the
@@ -99,6 +99,7 @@ class Scratch(NamedTuple):
     """
 
     states: Matrix
+    inputs: Matrix
     rates: Matrix
     shapes: Matrix
     slopes: Matrix

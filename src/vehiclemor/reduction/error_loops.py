@@ -57,7 +57,7 @@ def corrected_run(
         guess(first, end, modes, scratch)
         change, expected = 0.0, LARGEST
         for _ in range(most):
-            full_rates(first, end, path.inputs, shape, violated, scratch)
+            full_rates(first, end, shape, violated, scratch)
             modal_sources(first, modes, scratch)
             before = change
             for i in range(first, end):
@@ -97,12 +97,16 @@ def judge(path, bounded):
 
 def begin_with(path, violated, shape, modes, scratch):
     """Shapes of a run and their slopes, the error at the start, and ranges."""
+    run, inputs = path.run, path.inputs
     shapes, scale, moved = scratch.shapes, scratch.scale, scratch.moved[0]
-    nodes, n = path.run.shape
+    nodes, n = run.shape
     scratch.slopes[nodes:] = 0.0
     for i in range(len(shapes)):
         # Of the last window further nodes are like the last one.
-        shape_of(path.run[min(i, nodes - 1)], shape, scratch.rates[i], shapes[i])
+        k = min(i, nodes - 1)
+        for j in range(inputs.shape[1]):
+            scratch.inputs[i, j] = inputs[k, j]
+        shape_of(run[k], shape, scratch.rates[i], shapes[i])
     for j in range(n):
         # A method may record the first state as it was given.
         near = 4.0 * shapes[1, j] - 6.0 * shapes[2, j]
@@ -236,17 +240,19 @@ def guess(first, end, modes, scratch):
     change_shapes(first, end, modes, scratch)
 
 
-def full_rates(first, end, inputs, shape, violated, scratch):
+def full_rates(first, end, shape, violated, scratch):
     """Rates of the states at the nodes of a window, and violations of the constraints."""
     states, rates = scratch.states, scratch.rates
     for i in range(first, first + LANES):
         state, deviation = states[i], scratch.shapes[i]
         for j in range(len(state)):
             state[j] = shape.reference[j] + deviation[j]
-    call_lanes(shape.kernels, 0, states, inputs, shape.constants, rates, first)
+    call_lanes(shape.kernels, 0, states, scratch.inputs, shape.constants, rates, first)
     count = violated.violations.shape[1]
     if count:
-        call_lanes(shape.kernels, 1, states, inputs, shape.constants, scratch.changes, first)
+        call_lanes(
+            shape.kernels, 1, states, scratch.inputs, shape.constants, scratch.changes, first
+        )
     for i in range(first, min(end, len(violated.violations))):
         for k in range(count):
             scratch.changes[i, k] -= violated.violations[i, k]

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -93,6 +93,12 @@ def _shape(alike: Alike) -> VehicleShape:
     return VehicleShape(alike.model)
 
 
+@cache
+def _spaces() -> Pool[Space]:
+    """Arrays of runs that have ended."""
+    return Pool()
+
+
 @lru_cache(maxsize=256)
 def _modes_of_errors(errors: ErrorModel, step: float) -> Ready:
     """What the loop needs of the modes at nodes that are a step in s apart."""
@@ -143,20 +149,20 @@ class ErrorModel:
         model, kind = self.shape.model, (step, len(states), passes, tuple(bounds))
         # All constants of the same equations share arrays.
         shared = model.kernel_hash, model.inputs, len(self.modes.shapes), kind
-        space = SPACES.taken(shared, lambda: self._space(*kind))
+        space = _spaces().taken(shared, lambda: self._space(*kind))
         path, bounded, call = space.path, space.bounded, space.call
         call.give("shape", self._of_shape)
         call.give("modes", _modes_of_errors(self, step))
         call.words[call.address("bounded.outputs.constants")] = model.constants.ctypes.data
         np.copyto(path.run, states)
-        path.inputs[: len(inputs)], path.inputs[len(inputs) :] = inputs, inputs[-1]
+        np.copyto(path.inputs, inputs)
         np.copyto(path.start, start)
         bounded.bounds[:] = [bound.bound for bound in bounds.values()]
         bounded.is_peak[:] = [bound.measure == "max" for bound in bounds.values()]
         self._write_violated(start, inputs[0], step, space.violated)
         unsettled = call()
         known = path.corrected.copy(), float(bounded.errors.max()), unsettled == 0
-        SPACES.give_back(shared, space)
+        _spaces().give_back(shared, space)
         return known if unsettled >= 0 else LOST
 
     def _space(
@@ -166,12 +172,12 @@ class ErrorModel:
         model, modes = self.shape.model, len(self.modes.shapes)
         n, violations = len(model.definition.states), len(self.free.correction)
         rows, of_modes, of_shape = (padded(size, LANES) for size in (nodes, modes, n + 3))
-        widths = n, n, n, n, 3, of_modes, of_modes, violations + modes
+        widths = n, len(model.inputs), n, n, n, 3, of_modes, of_modes, violations + modes
         arrays: list[Any] = [np.empty((rows, columns)) for columns in widths]
         arrays += map(np.empty, ((LANES, n), (LANES, of_shape), n, n, 3))
         scratch = Scratch(*arrays)
         run, corrected = np.empty((2, nodes, n))
-        path = Path(step, run, corrected, np.empty((rows, len(model.inputs))), np.empty(n))
+        path = Path(step, run, corrected, np.empty((nodes, len(model.inputs))), np.empty(n))
         first = min(max(int(SETTLED / step) + 1, 5), nodes)
         violated = Violated(*map(np.zeros, ((first, violations), (first, n), (first, n), 3)))
         outputs, results = model.recorder.packed(names, nodes)
@@ -331,9 +337,6 @@ class Space(NamedTuple):
     violated: Violated
     bounded: Bounded
     call: Prepared
-
-
-SPACES: Pool[Space] = Pool()
 
 
 class Free(NamedTuple):
