@@ -165,8 +165,9 @@ class DynamicModel(Model):
         begin = begin if type(begin) is float else number("begin", begin)
         how = Solver(solver, tolerance, times, longest_step, begin)
         names = None if outputs is None else output_names(outputs)
-        state, space = self.start(start), whole_space(len(self.definition.states))
-        trajectory = self.driven_by(maneuver).integrate(maneuver, state, space, how, names)
+        model, space = self.driven_by(maneuver), whole_space(len(self.definition.states))
+        # Its equilibrium is solved with its own equations.
+        trajectory = model.integrate(maneuver, model.start(start), space, how, names)
         if trajectory.status not in WITHOUT_COMPLAINT:
             raise ConvergenceError(f"{self.name}: {trajectory.message}", trajectory)
         return trajectory
