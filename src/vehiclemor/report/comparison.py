@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from vehiclemor.arguments import file_path
+from vehiclemor.arguments import MOST_JOBS, count, file_path
 from vehiclemor.exceptions import InputError
 from vehiclemor.files import data_names
 from vehiclemor.registry import component, names, unknown
@@ -90,6 +90,7 @@ def compare(
         `study_comparison` in `vehiclemor.report.comparison`.
     """
     what, folder = str(file_path("what", what)), file_path("results", results)
+    count("jobs", jobs, most=MOST_JOBS)
     if seed is not None and (what == PAPER or what in names("model")):
         raise InputError(f"seed: comparison {what!r} samples no test runs of its own")
     if what == PAPER:

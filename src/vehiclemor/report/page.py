@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vehiclemor.arguments import file_path, study_names
+from vehiclemor.arguments import MOST_JOBS, count, file_path, study_names
 from vehiclemor.exceptions import FileError, InputError
 from vehiclemor.failure import attempt_apart
 from vehiclemor.files import begins_with, replaceable, write_text
@@ -78,6 +78,7 @@ def write_report(
         raise InputError(f"out: {path} does not end in .html")
     replaceable(path, "report of vehiclemor", begins_with(BEGINNING))
     studies = study_names("studies", studies)
+    count("jobs", jobs, most=MOST_JOBS)
     left_out: dict[str, str] = {}
     sections: list[Section] = []
     datasets = _run_studies(studies, folder, jobs) if studies else _stored(folder, left_out)
