@@ -94,6 +94,8 @@ def check_point(dataset: xr.Dataset, kind: str, chosen: Mapping[str, object]) ->
         raise InputError("neither a run nor a study that can be drawn")
     dimensions = [str(name) for name in dataset["status"].dims]
     for key in chosen:
+        if not dimensions:
+            raise InputError(f"a single run has no dimension to choose, such as {key!r}")
         choice("dimension of the result", key, dimensions)
     # What has no methods, such as a timing, is refused where it is drawn.
     return dimensions if "label" in dimensions else []

@@ -161,6 +161,9 @@ def _rounds(
     work = f"rounds of times on {model.name}, {what}"
     tell(work, 0, rounds[0] + 1)
     fits = [_warm_fit(model, e, bool(w.any())) for e, w in zip(experiments, wanted, strict=True)]
+    for (reduced, _), runs in zip(fits, wanted, strict=True):
+        if isinstance(reduced, Failure) and runs.any():
+            raise RuntimeError(f"its runs have finished, but the fit fails: {reduced.message}")
     models = [model_of_run(model, scenario) for scenario in scenarios]
     for_test: list[list[Any]] = []
     for reduced, _ in fits:
